@@ -1,0 +1,99 @@
+"""Periodic stiffness (paper 3, Eqs 1-5): a massless spring k(x) = k_m (1 + eps cos(2 pi x / L))."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from ...catalog.schema import PeriodicStiffnessData
+from .. import coupling
+from ..jit import kernel
+
+
+class PeriodicLine(NamedTuple):
+    """Constants of the line."""
+
+    mean: float  # k_m (N/m)
+    variation: float  # epsilon (-)
+    wavenumber: float  # 2 pi / L (1/m)
+
+
+class PeriodicWire(NamedTuple):
+    """A massless wire has no state; Numba wants a field."""
+
+    nothing: NDArray[np.float64]
+
+
+def wave_speed(data: PeriodicStiffnessData) -> float:
+    """Speed of waves along the wire (m/s): no wave runs along a spring."""
+    return np.inf
+
+
+def line_end(data: PeriodicStiffnessData, spans: int) -> float:
+    """How far a run goes unless told otherwise (m)."""
+    return spans * data.span_length
+
+
+def build(
+    data: PeriodicStiffnessData, spans: int, spacing: float, time_step: float
+) -> PeriodicLine:
+    """Constants of the line; there is no grid, and any time step will do."""
+    return PeriodicLine(data.mean_stiffness, data.stiffness_variation, 2 * np.pi / data.span_length)
+
+
+def at_rest(line: PeriodicLine, lanes: int) -> PeriodicWire:
+    """State of all lanes."""
+    return PeriodicWire(np.zeros(lanes))
+
+
+def start_point(line: PeriodicLine) -> tuple[float, float, float]:
+    """Height (m), compliance of the wire, and of a massless spring (m/N), where a run starts."""
+    return 0.0, 0.0, 1.0 / (line.mean * (1.0 + line.variation))
+
+
+def settle(line: PeriodicLine, wire: PeriodicWire, lane: int, force: float) -> None:
+    """Put one lane at rest under a force (N) at the starting point."""
+
+
+def supports(data: PeriodicStiffnessData, spans: int) -> NDArray[np.float64]:
+    """Positions (m) of the supports whose uplift is recorded: a spring has none."""
+    return np.zeros(0)
+
+
+def droppers(data: PeriodicStiffnessData, spans: int) -> NDArray[np.float64]:
+    """Positions (m) of the droppers."""
+    return np.zeros(0)
+
+
+@kernel
+def stiffness(line, x):
+    """Stiffness k (N/m) at x (m)."""
+    return line.mean * (1.0 + line.variation * np.cos(line.wavenumber * x))
+
+
+@overload(coupling.move_wire)
+def _move_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+    if getattr(line, "instance_class", None) is not PeriodicLine:
+        return None
+
+    def move(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+        return 0.0, 0.0, 1.0 / stiffness(line, x1)
+
+    return move
+
+
+@overload(coupling.load_wire)
+def _load_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+    if getattr(line, "instance_class", None) is not PeriodicLine:
+        return None
+    return lambda line, wire, lane, x0, x1, force: None
+
+
+@overload(coupling.record_wire)
+def _record_wire(line, wire, lane, uplift, tension):  # type: ignore[no-untyped-def]
+    if getattr(line, "instance_class", None) is not PeriodicLine:
+        return None
+    return lambda line, wire, lane, uplift, tension: None

@@ -1,0 +1,146 @@
+"""Lanes of one pantograph on one line: the arrays behind the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..catalog.schema import CatenaryData, PantographData, PeriodicStiffnessData
+from ..errors import InputError
+from . import actuator as actuators
+from . import coupling, pantograph
+from .catenary import MODELS
+from .coupling import CHANNELS, Run, Samples
+
+Array = NDArray[np.float64]
+
+TIME_STEP = 1e-3
+"""Time step (s). With SPACING, sigma is within 0.5 % of the converged value: docs/convergence.md."""
+SPACING = 0.25
+"""Grid of the flexible catenary (m)."""
+
+
+class Plant:
+    """Pantographs on a line, one a lane; all lanes advance together in one kernel call."""
+
+    def __init__(
+        self,
+        catenary: CatenaryData,
+        pantograph_data: PantographData,
+        *,
+        lanes: int = 1,
+        spans: int | None = None,
+        time_step: float = TIME_STEP,
+        spacing: float = SPACING,
+        actuator: actuators.Actuator | None = None,
+        waves: int = 0,
+        bilateral: bool = False,
+    ) -> None:
+        """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
+
+        waves: cosines of irregularity a lane may have. bilateral: let the contact pull, as paper 3's
+        equations do. Raises InputError where the step (s) or grid (m) is not usable.
+        """
+        for name, value in (("time_step", time_step), ("spacing", spacing)):
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"{name} must be a positive number, not {value!r}.")
+        if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
+            raise InputError(f"spans must be a whole number from 3 to 1000, not {spans!r}.")
+        self.catenary, self.pantograph = catenary, pantograph_data
+        self.spans = spans or catenary.spans
+        self.time_step = time_step
+        self.model = MODELS[catenary.kind]  # type: ignore[attr-defined]
+        self.line = self.model.build(catenary, self.spans, spacing, time_step)
+        self.wire = self.model.at_rest(self.line, lanes)
+        self.body = pantograph.body(pantograph_data, time_step, lanes)
+        self.actuator = actuator or actuators.Actuator()
+        self.drive = actuators.drive(self.actuator, time_step, lanes)
+        self.supports = self.model.supports(catenary, self.spans)
+        self.droppers = self.model.droppers(catenary, self.spans)
+
+        stiffness = pantograph_data.contact_stiffness
+        if stiffness == "rigid":
+            massless = isinstance(catenary, PeriodicStiffnessData)
+            self._strip = 0.0 if massless else 1 / pantograph.STRIP_STIFFNESS
+        else:
+            self._strip = 1 / stiffness
+        self.run = Run(
+            step=np.zeros(lanes, dtype=np.int64),
+            start=np.zeros(lanes),
+            stride=np.zeros(lanes),
+            strip_compliance=np.full(lanes, self._strip),
+            strip_damping=np.full(lanes, pantograph_data.contact_damping / time_step),
+            lowest_force=np.full(lanes, -np.inf if bilateral else 0.0),
+            force=np.zeros(lanes),
+            gap=np.zeros(lanes),
+            stiffness=np.zeros(lanes),
+            waves=np.zeros((lanes, waves, 3)),
+        )
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return len(self.run.step)
+
+    @property
+    def line_end(self) -> float:
+        """How far a run goes unless told otherwise (m)."""
+        return float(self.model.line_end(self.catenary, self.spans))
+
+    @property
+    def line_length(self) -> float:
+        """How far a run can go (m)."""
+        return self.spans * self.catenary.span_length
+
+    def check_speed(self, speed: float) -> None:
+        """Raise InputError unless a train can run at this speed (m/s) under this line."""
+        limit = self.model.wave_speed(self.catenary)
+        if not (np.isfinite(speed) and 0 < speed < limit):
+            bound = "" if np.isinf(limit) else (
+                f" and below the wave speed of the contact wire, {3.6 * limit:.0f} km/h"
+            )
+            raise InputError(
+                f"The speed must lie above 0{bound} on line '{self.catenary.name}', "
+                f"not at {3.6 * speed:g} km/h."
+            )
+
+    def start(self, lane: int, speed: float, waves: Array | None = None) -> None:
+        """Put a lane at the start of the line, at rest under the nominal force.
+
+        speed: of the train (m/s), not beyond the waves of the wire. waves: the line's irregularity,
+        (waves, 3) as ``line_condition.draw`` gives it. Raises InputError for a bad speed.
+        """
+        self.check_speed(speed)
+        run = self.run
+        run.waves[lane] = 0.0 if waves is None else waves
+        height, wire, spring = self.model.start_point(self.line)
+        height += coupling.irregularity.py_func(run.waves[lane], 0.0)  # type: ignore[attr-defined]
+        compliance = self._strip + wire + spring
+        lift = self.pantograph.nominal_force(speed)
+        self.body.lift[lane] = lift
+        self.body.state[lane] = pantograph.rest(self.pantograph, lift, height, compliance)
+        force = (self.body.state[lane, 0] - height) / compliance
+        self.model.settle(self.line, self.wire, lane, force)
+        actuators.release(self.drive, lane)
+        run.step[lane] = 0
+        run.stride[lane] = speed * self.time_step
+        run.force[lane] = force
+        run.gap[lane] = force * (self._strip + spring)
+        run.stiffness[lane] = 1 / (self._strip + spring)
+
+    def samples(self, steps: int, *, uplift: bool = True, tension: bool = False) -> Samples:
+        """Arrays for ``advance`` to record ``steps`` steps in."""
+        return Samples(
+            channels=np.zeros((self.lanes, steps, CHANNELS)),
+            uplift=np.zeros((self.lanes, steps, len(self.supports) if uplift else 0)),
+            tension=np.zeros((self.lanes, steps, len(self.droppers) if tension else 0)),
+        )
+
+    def advance(self, command: Array, steps: int, samples: Samples, first: int) -> None:
+        """Advance all lanes by ``steps`` under commands (lanes, 2) (N: frame, head).
+
+        Samples are recorded from row ``first`` on.
+        """
+        coupling.advance(
+            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples, first
+        )

@@ -1,0 +1,62 @@
+"""Keyword arguments that are data: a preset's name, a table, or the settings themselves."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import InputError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Settings(BaseModel):
+    """Frozen, validated data; an unknown key is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+S = TypeVar("S", bound=Settings)
+
+
+def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None = None) -> S:
+    """Settings from an instance, a table of its keys, or the name of a preset.
+
+    Raises InputError, naming the argument and the key, where the value is not valid.
+    """
+    presets = presets or {}
+    if isinstance(value, kind):
+        return value
+    if isinstance(value, str) and value in presets:
+        return presets[value]
+    if isinstance(value, Mapping):
+        try:
+            return kind.model_validate(dict(value))
+        except ValidationError as error:
+            raise InputError(f"{name} is not valid: {explain(error)}.") from error
+    options = [f"'{preset}'" for preset in presets]
+    options.append(f"a table with keys among {', '.join(kind.model_fields)}")
+    raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
+
+
+def explain(error: ValidationError, skip: frozenset[str] = frozenset()) -> str:
+    """One clause a problem: the key, what was expected, what was given."""
+    parts = []
+    for problem in error.errors():
+        key = ".".join(str(part) for part in problem["loc"] if part not in skip)
+        message = problem["msg"].removeprefix("Value error, ")
+        given = problem["input"]
+        shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
+        parts.append(f"key '{key}': {message}{shown}" if key else message)
+    return "; ".join(parts)
+
+
+def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
+    """A clause with the nearest known name, if any is near, and all of them."""
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}known are {', '.join(known)}"
