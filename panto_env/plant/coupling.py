@@ -79,16 +79,16 @@ def irregularity(waves, x):
 
 
 @kernel
-def advance(line, wire, body, drive, run, command, steps, samples, first):
+def advance(line, wire, body, drive, run, command, steps, samples):
     """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N).
 
-    Samples are written from row ``first`` on.
+    The sample of a lane's step n (counted from 0) is written to row n + 1: row 0 is the start.
     """
     half = body.state.shape[1] // 2
     recorded = samples.uplift.shape[2] > 0 or samples.tension.shape[2] > 0
     for lane in range(body.state.shape[0]):
         state, waves = body.state[lane], run.waves[lane]
-        for s in range(first, first + steps):
+        for _ in range(steps):
             n = run.step[lane]
             x0 = run.start[lane] + run.stride[lane] * n
             x1 = run.start[lane] + run.stride[lane] * (n + 1)
@@ -114,7 +114,7 @@ def advance(line, wire, body, drive, run, command, steps, samples, first):
             load_wire(line, wire, lane, x0, x1, force)
             gap_1 = state[0] - wire_free - wire_yield * force
 
-            row = samples.channels[lane, s]
+            row = samples.channels[lane, n + 1]
             row[CONTACT_FORCE] = force
             row[HEAD_HEIGHT] = 0.5 * (head_0 + state[0])
             row[FRAME_HEIGHT] = 0.5 * (frame_0 + state[half - 1])
@@ -124,7 +124,9 @@ def advance(line, wire, body, drive, run, command, steps, samples, first):
             row[FRAME_FORCE] = drive.force[lane, FRAME]
             row[HEAD_FORCE] = drive.force[lane, HEAD]
             if recorded:
-                record_wire(line, wire, lane, samples.uplift[lane, s], samples.tension[lane, s])
+                record_wire(
+                    line, wire, lane, samples.uplift[lane, n + 1], samples.tension[lane, n + 1]
+                )
             run.force[lane] = force
             run.gap[lane] = gap_1
             run.stiffness[lane] = stiffness

@@ -61,14 +61,14 @@ class Plant:
         stiffness = pantograph_data.contact_stiffness
         if stiffness == "rigid":
             massless = isinstance(catenary, PeriodicStiffnessData)
-            self._strip = 0.0 if massless else 1 / pantograph.STRIP_STIFFNESS
+            self.strip_compliance = 0.0 if massless else 1 / pantograph.STRIP_STIFFNESS
         else:
-            self._strip = 1 / stiffness
+            self.strip_compliance = 1 / stiffness
         self.run = Run(
             step=np.zeros(lanes, dtype=np.int64),
             start=np.zeros(lanes),
             stride=np.zeros(lanes),
-            strip_compliance=np.full(lanes, self._strip),
+            strip_compliance=np.full(lanes, self.strip_compliance),
             strip_damping=np.full(lanes, pantograph_data.contact_damping / time_step),
             lowest_force=np.full(lanes, -np.inf if bilateral else 0.0),
             force=np.zeros(lanes),
@@ -115,7 +115,7 @@ class Plant:
         run.waves[lane] = 0.0 if waves is None else waves
         height, wire, spring = self.model.start_point(self.line)
         height += coupling.irregularity.py_func(run.waves[lane], 0.0)  # type: ignore[attr-defined]
-        compliance = self._strip + wire + spring
+        compliance = self.strip_compliance + wire + spring
         lift = self.pantograph.nominal_force(speed)
         self.body.lift[lane] = lift
         self.body.state[lane] = pantograph.rest(self.pantograph, lift, height, compliance)
@@ -125,22 +125,22 @@ class Plant:
         run.step[lane] = 0
         run.stride[lane] = speed * self.time_step
         run.force[lane] = force
-        run.gap[lane] = force * (self._strip + spring)
-        run.stiffness[lane] = 1 / (self._strip + spring)
+        run.gap[lane] = force * (self.strip_compliance + spring)
+        run.stiffness[lane] = 1 / (self.strip_compliance + spring)
 
-    def samples(self, steps: int, *, uplift: bool = True, tension: bool = False) -> Samples:
-        """Arrays for ``advance`` to record ``steps`` steps in."""
+    def samples(self, rows: int, *, uplift: bool = True, tension: bool = False) -> Samples:
+        """Arrays of ``rows`` rows for ``advance`` to record in, one more than there are steps."""
         return Samples(
-            channels=np.zeros((self.lanes, steps, CHANNELS)),
-            uplift=np.zeros((self.lanes, steps, len(self.supports) if uplift else 0)),
-            tension=np.zeros((self.lanes, steps, len(self.droppers) if tension else 0)),
+            channels=np.zeros((self.lanes, rows, CHANNELS)),
+            uplift=np.zeros((self.lanes, rows, len(self.supports) if uplift else 0)),
+            tension=np.zeros((self.lanes, rows, len(self.droppers) if tension else 0)),
         )
 
-    def advance(self, command: Array, steps: int, samples: Samples, first: int) -> None:
+    def advance(self, command: Array, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` under commands (lanes, 2) (N: frame, head).
 
-        Samples are recorded from row ``first`` on.
+        The sample of a lane's step n (counted from 0) is recorded in row n + 1.
         """
         coupling.advance(
-            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples, first
+            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples
         )

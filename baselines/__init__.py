@@ -1,0 +1,1 @@
+"""Reference policies and the benchmark that compares policies."""
