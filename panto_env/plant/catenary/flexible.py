@@ -4,8 +4,8 @@ Motion is computed about the static shape by finite differences on a uniform gri
 leapfrog in time. The tension term uses the fourth-order modified-wave stencil
 delta2 u - (1 - C^2)/12 delta4 u (C: Courant number), whose five points bending needs anyway.
 Point loads and droppers act through four nodes by cubic interpolation. Local springs (droppers,
-supports, steady arms, contact) are taken as the mean (1/4, 1/2, 1/4) over three time levels, node by
-node and implicitly: they conserve energy and do not bound the step.
+supports, steady arms, contact) act by the mean of two half-steps, which is (1/4, 1/2, 1/4) over three
+time levels, each implicitly on its own: they conserve energy and do not bound the step.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class FlexibleLine(NamedTuple):
     support_spring: Array  # (supports, 3, 2): weights of the three time levels, newest first (N/m)
     dropper_node: Index  # (droppers,): first of four nodes
     dropper_weight: Array  # (droppers, 4)
-    dropper_spring: Array  # (droppers, 3): weights of the three time levels, newest first (N/m)
+    dropper_stiffness: Array  # (droppers,): in tension (N/m)
+    dropper_damping: Array  # (droppers,): in tension, over the time step (N/m)
     dropper_yield: Array  # (droppers,): relative displacement of the ends by 1 N (m/N)
     dropper_static: Array  # (droppers,): static tension (N)
 
@@ -146,7 +147,8 @@ def build(data: FlexibleCatenaryData, spans: int, spacing: float, time_step: flo
         support_spring=support,
         dropper_node=first,
         dropper_weight=weights,
-        dropper_spring=np.array([levels(k, beta * k, time_step) for k in stiffness]),
+        dropper_stiffness=stiffness,
+        dropper_damping=beta * stiffness / time_step,
         dropper_yield=squares,
         dropper_static=np.tile(shape.dropper_tension, spans),
     )
@@ -276,21 +278,53 @@ def hold_supports(line, wire, lane, now, new):
 
 
 @kernel
+def dropper_change(stiffness, damping, static, past, free, yielding):
+    """Change of a dropper's tension about the static one (N), over the two half-steps it acts in.
+
+    Its extension, averaged over a step, goes from ``past`` to ``free - yielding * change`` (m). The
+    force is the change of the spring's energy over the change of extension (a discrete gradient), so
+    that going slack and taut again conserves energy: for a taut dropper it is the mean spring force.
+    """
+    slack = static / stiffness  # extensions below -slack carry no tension
+    a, b = past + slack, free + slack + yielding * static  # b: were the tension 0
+    if a >= 0.0:
+        change = (0.5 * stiffness * (past + free) + damping * (free - past)) / (
+            1.0 + (0.5 * stiffness + damping) * yielding
+        )
+        if free - yielding * change >= -slack:
+            return max(change, -static)
+        # from taut to slack: T = k a^2 / (2 (a - b + yielding T))
+        fall = a - b
+        tension = (np.sqrt(fall * fall + 2 * yielding * stiffness * a * a) - fall) / (2 * yielding)
+        return tension - static
+    if b <= 0.0:
+        return -static
+    # from slack to taut, at the extension e > 0: k e^2 = 2 T (e - a), e = b - yielding T
+    stiff = 1.0 + 0.5 * stiffness * yielding
+    e = (a + b + np.sqrt((a + b) ** 2 - 4 * stiff * a * b)) / (2 * stiff)
+    return (b - e) / yielding - static
+
+
+@kernel
 def pull_droppers(line, wire, lane, now, new):
     """Droppers: each one scalar equation for its tension, which is never negative."""
     for d in range(line.dropper_node.size):
         i = line.dropper_node[d]
-        weight, spring = line.dropper_weight[d], line.dropper_spring[d]
-        extension, extension_free = 0.0, 0.0
+        weight, static = line.dropper_weight[d], line.dropper_static[d]
+        present, free = 0.0, 0.0
         for k in range(4):
-            extension += weight[k] * (now[MESSENGER, i + k] - now[CONTACT, i + k])
-            extension_free += weight[k] * (new[MESSENGER, i + k] - new[CONTACT, i + k])
-        change = (
-            spring[0] * extension_free + spring[1] * extension + spring[2] * wire.extension_past[lane, d]
-        ) / (1.0 + spring[0] * line.dropper_yield[d])
-        change = max(change, -line.dropper_static[d])
-        wire.extension_past[lane, d] = extension
-        wire.tension[lane, d] = line.dropper_static[d] + change
+            present += weight[k] * (now[MESSENGER, i + k] - now[CONTACT, i + k])
+            free += weight[k] * (new[MESSENGER, i + k] - new[CONTACT, i + k])
+        change = dropper_change(
+            line.dropper_stiffness[d],
+            line.dropper_damping[d],
+            static,
+            0.5 * (wire.extension_past[lane, d] + present),
+            0.5 * (present + free),
+            0.5 * line.dropper_yield[d],
+        )
+        wire.extension_past[lane, d] = present
+        wire.tension[lane, d] = static + change
         for k in range(4):
             new[CONTACT, i + k] += line.mobility[CONTACT, i + k] * weight[k] * change
             new[MESSENGER, i + k] -= line.mobility[MESSENGER, i + k] * weight[k] * change

@@ -1,0 +1,38 @@
+"""What commands share: tables for people, JSON for machines."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
+Plot = Annotated[str | None, typer.Option(help="Write a picture to this file (.png, .svg, .pdf).")]
+
+console = Console()
+progress_console = Console(stderr=True)
+
+
+def print_json(value: Any) -> None:
+    """Print JSON to standard output; figures that are not numbers become null."""
+    json.dump(_clean(value), sys.stdout, indent=2, ensure_ascii=False)
+    sys.stdout.write("\n")
+
+
+def _clean(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _clean(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_clean(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def number(value: float, digits: int = 1) -> str:
+    """A figure for a table; a dash where there is none."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"

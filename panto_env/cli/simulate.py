@@ -1,0 +1,119 @@
+"""``panto simulate``: one pass along a line."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.progress import Progress
+from rich.table import Table
+
+from ..errors import InputError
+from ..metrics import en50367_checks
+from ..trajectory import Trajectory
+from .output import Json, Plot, console, number, print_json, progress_console
+
+LINES = (
+    ("mean", "mean force F_m", "N", 1.0),
+    ("std", "standard deviation σ", "N", 1.0),
+    ("statistical_max", "F_m + 3σ", "N", 1.0),
+    ("statistical_min", "F_m − 3σ", "N", 1.0),
+    ("max", "maximum", "N", 1.0),
+    ("min", "minimum", "N", 1.0),
+    ("max_uplift", "maximum uplift at supports", "mm", 1e3),
+    ("contact_loss", "contact loss CL", "%", 1.0),
+    ("cost_function", "cost function CF", "N m", 1.0),
+    ("effort", "actuator force, rms", "N", 1.0),
+    ("effort_rate", "rate of actuator force, rms", "N/s", 1.0),
+    ("distance", "over a distance of", "m", 1.0),
+)
+
+
+def simulate(
+    catenary: Annotated[str, typer.Option(help="Line: a catalogue name or TOML file.")] = "en50318-2002",
+    pantograph: Annotated[str, typer.Option(help="Pantograph, likewise.")] = "en50318-2002",
+    speed: Annotated[float, typer.Option(help="Train speed (km/h).")] = 300.0,
+    policy: Annotated[
+        str | None, typer.Option(help="Policy: a name, name:key=value,... or a model file.")
+    ] = None,
+    spans: Annotated[
+        str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")
+    ] = None,
+    distance: Annotated[float | None, typer.Option(help="How far to run (m).")] = None,
+    actuator: Annotated[str, typer.Option(help="Actuator: ideal or realistic.")] = "ideal",
+    sensors: Annotated[str, typer.Option(help="Sensors: ideal or realistic.")] = "ideal",
+    line_condition: Annotated[str, typer.Option(help="Line: new, fair or worn.")] = "new",
+    seed: Annotated[int, typer.Option(help="Seed of irregularity and noise.")] = 0,
+    time_step: Annotated[float | None, typer.Option(help="Time step (ms).")] = None,
+    spacing: Annotated[float | None, typer.Option(help="Grid of the flexible line (m).")] = None,
+    bilateral: Annotated[
+        bool, typer.Option("--bilateral", help="Let the contact pull, as paper 3 does.")
+    ] = False,
+    output: Annotated[str | None, typer.Option(help="Save the run to this Parquet file.")] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Simulate one pass along a line and print its figures."""
+    from ..simulation import simulate as run
+
+    settings: dict[str, Any] = {
+        "actuator": actuator,
+        "sensors": sensors,
+        "line_condition": line_condition,
+        "distance": distance,
+        "bilateral": bilateral,
+    }
+    if time_step is not None:
+        settings["time_step"] = 1e-3 * time_step
+    if spacing is not None:
+        settings["spacing"] = spacing
+    chosen = parse_spans(spans)
+    with Progress(console=progress_console, transient=True) as progress:
+        bar = progress.add_task("simulating", total=1.0)
+        trajectory = run(
+            catenary,
+            pantograph,
+            speed,
+            policy,
+            seed=seed,
+            progress=lambda share: progress.update(bar, completed=share),
+            **settings,
+        )
+    figures = trajectory.summary(chosen)
+    if output is not None:
+        trajectory.save(output)
+    if plot is not None:
+        from .. import figures as figures_module
+
+        figures_module.save(figures_module.plot_run(trajectory, chosen), plot)
+    if json:
+        print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
+        return
+    table = Table("figure", "value", "unit")
+    for key, label, unit, scale in LINES:
+        table.add_row(label, number(scale * getattr(figures, key), 2), unit)
+    title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
+    console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
+    if trajectory.terminated:
+        console.print("[bold red]The run ended early: it left the plant's valid range.")
+    console.print(table)
+    kept = en50367_checks(figures, trajectory.speed_kmh / 3.6)
+    console.print(
+        "EN 50367 (as recalled):",
+        ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),
+    )
+
+
+def parse_spans(text: str | None) -> tuple[int, int] | None:
+    """Spans from "5-6". Raises InputError where the text is not two whole numbers."""
+    if text is None:
+        return None
+    first, dash, last = text.partition("-")
+    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
+        raise InputError(f"--spans must read first-last, as 5-6, not '{text}'.")
+    return int(first), int(last)
+
+
+def _facts(run: Trajectory) -> dict[str, Any]:
+    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "nominal_force")
+    return {name: getattr(run, name) for name in names}

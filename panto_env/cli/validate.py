@@ -1,0 +1,92 @@
+"""``panto validate``: the table of EN 50318:2002, and how the figures converge."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from .. import validation
+from ..plant.plant import SPACING, TIME_STEP
+from .output import Json, Plot, console, number, print_json, progress_console
+
+
+def validate(
+    convergence: Annotated[
+        bool, typer.Option("--convergence", help="Print how the figures converge in grid and step.")
+    ] = False,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
+    runs = validation.reference_runs()
+    checks = validation.check(runs)
+    if plot is not None:
+        from .. import figures
+
+        labels = [f"{run.speed_kmh:g} km/h" for run in runs]
+        title = "Reference model of EN 50318:2002, spans 5 and 6"
+        figures.save(figures.plot_forces(runs, labels, validation.SPANS, title), plot)
+    table = _convergence() if convergence else []
+    passed = all(check.inside for check in checks)
+    if json:
+        rows = [vars(check) | {"inside": check.inside} for check in checks]
+        print_json({"passed": passed, "checks": rows, "convergence": table})
+    else:
+        _print_checks(checks)
+        if convergence:
+            _print_convergence(table)
+        console.print("All figures inside." if passed else "[bold red]Not all figures are inside.")
+    if not passed:
+        raise typer.Exit(1)
+
+
+def _print_checks(checks: list[validation.Check]) -> None:
+    table = Table(title="EN 50318:2002 reference model, spans 5 and 6, low-passed at 20 Hz")
+    table.add_column("figure")
+    for speed in validation.SPEEDS_KMH:
+        table.add_column(f"{speed:g} km/h", justify="right")
+        table.add_column("accepted", justify="right")
+    for name in validation.ACCEPTED:
+        cells = [f"{validation.LABELS[name]} ({validation.ACCEPTED[name][1]})"]
+        for item in (check for check in checks if check.figure == name):
+            value = number(item.value, 2)
+            cells.append(value if item.inside else f"[bold red]{value} outside[/]")
+            low, high = number(item.lowest, 0), number(item.highest, 0)
+            cells.append(low if low == high else f"{low} to {high}")
+        table.add_row(*cells)
+    console.print(table)
+    console.print(
+        f"Grid {SPACING:g} m, time step {1e3 * TIME_STEP:g} ms. The catalogue entry en50318-2002 says "
+        "which open values were chosen, and how: `panto list en50318-2002`."
+    )
+
+
+def _convergence() -> list[dict[str, float]]:
+    rows = []
+    for spacing, step in validation.GRIDS:
+        with progress_console.status(f"grid {spacing:g} m, step {1e3 * step:g} ms"):
+            runs = validation.reference_runs(spacing=spacing, time_step=step)
+        for run in runs:
+            figures = run.summary(validation.SPANS).as_dict()
+            rows.append({"spacing": spacing, "time_step": step, "speed_kmh": run.speed_kmh} | figures)
+    return rows
+
+
+def _print_convergence(rows: list[dict[str, float]]) -> None:
+    table = Table(title="Convergence; σ relative to the finest")
+    for heading in ("km/h", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "σ (%)", "max (N)", "min (N)"):
+        table.add_column(heading, justify="right")
+    table.add_column("uplift (mm)", justify="right")
+    finest = {row["speed_kmh"]: row["std"] for row in rows}  # the last row of a speed is the finest
+    for row in sorted(rows, key=lambda row: row["speed_kmh"]):
+        relative = 100 * (row["std"] / finest[row["speed_kmh"]] - 1)
+        values = (row["mean"], row["std"], relative, row["max"], row["min"], 1e3 * row["max_uplift"])
+        table.add_row(
+            f"{row['speed_kmh']:g}",
+            f"{row['spacing']:g}",
+            f"{1e3 * row['time_step']:g}",
+            *(number(value, 2) for value in values),
+        )
+    console.print(table)

@@ -1,0 +1,88 @@
+"""Plots of runs. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import InputError
+from .files import write_whole
+from .metrics import low_pass
+from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure, whole or not at all. Raises InputError for a suffix that is not a picture's."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    known = FigureCanvasAgg(figure).get_supported_filetypes()
+    if Path(path).suffix[1:].lower() not in known:
+        raise InputError(
+            f"The plot {path} must end in one of .{', .'.join(sorted(known))}; .png will do."
+        )
+    with write_whole(path) as temporary:
+        figure.savefig(temporary, dpi=120)
+
+
+def plot_run(run: Trajectory, spans: tuple[int, int] | None = None) -> Figure:
+    """Contact force, heights and actuator force of a run along the line."""
+    from matplotlib.figure import Figure
+
+    active = bool(run.frame_force.any() or run.head_force.any())
+    figure = Figure(figsize=(10, 7.5 if active else 6), layout="constrained")
+    axes = figure.subplots(3 if active else 2, 1, sharex=True)
+    filtered = low_pass(run.contact_force, run.time_step)
+    axes[0].plot(run.position, run.contact_force, color="0.75", linewidth=0.8, label="raw")
+    axes[0].plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz")
+    axes[0].axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
+    axes[0].set(ylabel="contact force (N)")
+    axes[0].set_title(f"{run.pantograph} on {run.catenary}, {run.speed_kmh:g} km/h, {run.policy}")
+    axes[1].plot(run.position, 1e3 * run.wire, color="tab:red", label="contact wire")
+    axes[1].plot(run.position, 1e3 * run.head, color="tab:blue", label="collector head")
+    axes[1].set(ylabel="height (mm)")
+    if active:
+        axes[2].plot(run.position, run.frame_force, color="tab:green", label="on the frame")
+        axes[2].plot(run.position, run.head_force, color="tab:olive", label="on the head")
+        axes[2].set(ylabel="actuator force (N)")
+    for axis in axes:
+        mark_supports(axis, run)
+        axis.legend(loc="upper right", ncols=3, fontsize="small")
+    first, last = spans or (1, int(run.position[-1] // run.span_length) + 1)
+    end = min(last * run.span_length, float(run.position[-1]))
+    axes[-1].set(xlabel="position (m); grey lines: supports", xlim=((first - 1) * run.span_length, end))
+    return figure
+
+
+def plot_forces(
+    runs: Sequence[Trajectory], labels: Sequence[str], spans: tuple[int, int], title: str
+) -> Figure:
+    """Low-passed contact forces of several runs over the same spans, one panel a run."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 1.2 + 1.9 * len(runs)), layout="constrained")
+    axes = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axis, run, label in zip(axes, runs, labels, strict=True):
+        axis.plot(run.position, run.contact_force, color="0.8", linewidth=0.8, label="raw")
+        filtered = low_pass(run.contact_force, run.time_step)
+        axis.plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz")
+        axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
+        axis.set(ylabel="contact force (N)")
+        axis.set_title(label, loc="left", fontsize="medium")
+        mark_supports(axis, run)
+    axes[0].legend(loc="upper right", ncols=3, fontsize="small")
+    span = runs[0].span_length
+    axes[-1].set(xlabel="position (m)", xlim=((spans[0] - 1) * span, spans[1] * span))
+    figure.suptitle(title)
+    return figure
+
+
+def mark_supports(axis: Axes, run: Trajectory) -> None:
+    """Thin lines where the supports stand."""
+    count = int(run.position[-1] // run.span_length) + 2
+    for k in range(count):
+        axis.axvline(k * run.span_length, color="0.85", linewidth=0.8, zorder=0)
