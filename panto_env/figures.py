@@ -22,9 +22,7 @@ def save(figure: Figure, path: str | Path) -> None:
 
     known = FigureCanvasAgg(figure).get_supported_filetypes()
     if Path(path).suffix[1:].lower() not in known:
-        raise InputError(
-            f"The plot {path} must end in one of .{', .'.join(sorted(known))}; .png will do."
-        )
+        raise InputError(f"The plot {path} must end in one of .{', .'.join(sorted(known))}; .png will do.")
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .errors import InputError
-
-Array = NDArray[np.float64]
 
 CUTOFF = 20.0
 """Low-pass of the contact force (Hz), EN 50317."""

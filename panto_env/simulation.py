@@ -33,7 +33,10 @@ def simulate(
     Raises InputError for what is not valid.
     """
     task = Task(
-        catenary=catenary, pantograph=pantograph, speed_kmh=speed_kmh, **{"record_droppers": True} | settings
+        catenary=catenary,
+        pantograph=pantograph,
+        speed_kmh=speed_kmh,
+        **{"record_droppers": True} | settings,
     )
     if task.lanes != 1:
         raise InputError("simulate makes one pass; leave lanes at 1.")
@@ -57,8 +60,7 @@ def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | N
         action = np.asarray(policy.act(task.observation[0].copy()), dtype=float)
         if action.shape != task.action[0].shape or not np.isfinite(action).all():
             raise InputError(
-                f"The policy must return {task.action.shape[1]} finite numbers as its action, "
-                f"not {action!r}."
+                f"The policy must return {task.action.shape[1]} finite numbers as its action, not {action!r}."
             )
         task.step(action[None])
         if progress is not None:

@@ -96,7 +96,10 @@ def measure(repeats: int = 5, report: Callable[[str], None] = lambda _: None) ->
         report(name)
         envs.append(asdict(env_speed(name, repeats)))
     return {
-        "machine": {"processor": platform.processor() or platform.machine(), "python": platform.python_version()},
+        "machine": {
+            "processor": platform.processor() or platform.machine(),
+            "python": platform.python_version(),
+        },
         "repeats": repeats,
         "plants": plants,
         "environments": envs,

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import metrics
+from .arrays import Array
 from .errors import InputError
 from .files import write_whole
 
-Array = NDArray[np.float64]
 FORMAT = 1
 SERIES = (
     "time",
@@ -145,7 +145,10 @@ class Trajectory:
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
             series = {name: table[name].to_numpy() for name in SERIES}
-            for name, places in (("uplift", "support_position"), ("dropper_force", "dropper_position")):
+            for name, places in (
+                ("uplift", "support_position"),
+                ("dropper_force", "dropper_position"),
+            ):
                 held = [c for c in table.column_names if c.startswith(f"{name}_")]
                 columns = [table[f"{name}_{k}"].to_numpy() for k in range(len(held))]
                 series[name] = np.array(columns).T if columns else np.zeros((table.num_rows, 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from .simulation import simulate
 from .trajectory import Trajectory
@@ -51,11 +52,9 @@ class Check:
         return self.lowest <= self.value <= self.highest
 
 
-def reference_runs(**numerics: float) -> list[Trajectory]:
+def reference_runs(**numerics: Any) -> list[Trajectory]:
     """The reference model's run at each speed; numerics: ``time_step`` (s), ``spacing`` (m)."""
-    return [
-        simulate(REFERENCE_MODEL, REFERENCE_MODEL, speed, **numerics) for speed in SPEEDS_KMH
-    ]
+    return [simulate(REFERENCE_MODEL, REFERENCE_MODEL, speed, **numerics) for speed in SPEEDS_KMH]
 
 
 def check(runs: list[Trajectory]) -> list[Check]:

@@ -417,9 +417,7 @@ BAD: list[tuple[str, str, str, str, str]] = [
 
 
 @pytest.mark.parametrize(("file", "old", "new", "key", "expected"), BAD)
-def test_bad_value_is_named(
-    tmp_path: Path, file: str, old: str, new: str, key: str, expected: str
-) -> None:
+def test_bad_value_is_named(tmp_path: Path, file: str, old: str, new: str, key: str, expected: str) -> None:
     text = {"pantograph": PANTOGRAPH, "line": LINE, "spring": SPRING}[file]
     assert text.count(old) >= 1
     path = write(tmp_path, text.replace(old, new, 1))

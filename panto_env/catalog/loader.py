@@ -111,11 +111,11 @@ def _read(path: Path, _modified: int, adapter: TypeAdapter[Any]) -> Any:
         return adapter.validate_python({"name": path.stem, **values, "sources": sources})
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {_explain(error)}.") from error
-    except _BadTable as error:
+    except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
 
 
-class _BadTable(Exception):
+class _TableError(Exception):
     """A table that is meant to give a value with its source, but does not."""
 
 
@@ -126,7 +126,7 @@ def _split(table: dict[str, Any], prefix: str, sources: dict[str, str]) -> dict[
         place = f"{prefix}{key}"
         if isinstance(item, dict) and not item.keys().isdisjoint({"value", "source"}):
             if "value" not in item or not set(item) <= {"value", "source"}:
-                raise _BadTable(
+                raise _TableError(
                     f"key '{place}' must hold 'value' and, where wanted, 'source', and nothing "
                     f"else (given: {', '.join(map(repr, item))})"
                 )

@@ -36,9 +36,7 @@ class PantographData(Entry):
     contact_stiffness: Positive | Literal["rigid"] = Field(
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
-    contact_damping: NonNegative = Field(
-        0.0, description="damper beside the contact spring (N s/m)"
-    )
+    contact_damping: NonNegative = Field(0.0, description="damper beside the contact spring (N s/m)")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     @model_validator(mode="after")
@@ -133,9 +131,7 @@ class FlexibleCatenaryData(CatenaryData):
     """Contact and messenger wire, droppers, supports and steady arms."""
 
     kind: Literal["flexible"] = "flexible"
-    encumbrance: Positive = Field(
-        description="height of messenger over contact wire at support (m)"
-    )
+    encumbrance: Positive = Field(description="height of messenger over contact wire at support (m)")
     contact_wire: Wire
     messenger_wire: Wire
     droppers: Droppers

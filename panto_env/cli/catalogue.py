@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -13,12 +14,13 @@ from ..errors import InputError
 from ..task.policy import policy_names
 from .output import Json, console, print_json
 
-LOADERS = {"catenary": load_catenary, "pantograph": load_pantograph}
+LOADERS: dict[str, Callable[[str], Any]] = {"catenary": load_catenary, "pantograph": load_pantograph}
 
 
 def list_entries(
     name: Annotated[
-        str | None, typer.Argument(help="Show all values of this entry, or TOML file, with sources.")
+        str | None,
+        typer.Argument(help="Show all values of this entry, or TOML file, with sources."),
     ] = None,
     json: Json = False,
 ) -> None:

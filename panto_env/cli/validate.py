@@ -76,13 +76,29 @@ def _convergence() -> list[dict[str, float]]:
 
 def _print_convergence(rows: list[dict[str, float]]) -> None:
     table = Table(title="Convergence; σ relative to the finest")
-    for heading in ("km/h", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "σ (%)", "max (N)", "min (N)"):
+    for heading in (
+        "km/h",
+        "grid (m)",
+        "step (ms)",
+        "F_m (N)",
+        "σ (N)",
+        "σ (%)",
+        "max (N)",
+        "min (N)",
+    ):
         table.add_column(heading, justify="right")
     table.add_column("uplift (mm)", justify="right")
     finest = {row["speed_kmh"]: row["std"] for row in rows}  # the last row of a speed is the finest
     for row in sorted(rows, key=lambda row: row["speed_kmh"]):
         relative = 100 * (row["std"] / finest[row["speed_kmh"]] - 1)
-        values = (row["mean"], row["std"], relative, row["max"], row["min"], 1e3 * row["max_uplift"])
+        values = (
+            row["mean"],
+            row["std"],
+            relative,
+            row["max"],
+            row["min"],
+            1e3 * row["max_uplift"],
+        )
         table.add_row(
             f"{row['speed_kmh']:g}",
             f"{row['spacing']:g}",

@@ -94,7 +94,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     * v0: first version.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(self, render_mode: str | None = None, **settings: Any) -> None:
         """See the class. Raises InputError for an argument that is unknown or not valid."""
@@ -173,7 +173,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             info,
         )
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
         if self.render_mode is None:
             return None

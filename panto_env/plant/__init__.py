@@ -1,0 +1,1 @@
+"""The physics: knows nothing of Gymnasium, rewards or policies."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ..arrays import Array
 from ..settings import NonNegative, Positive, Settings
 from .jit import kernel
 
-Array = NDArray[np.float64]
 FRAME, HEAD = 0, 1  # the two places a force can act, columns of every (lanes, 2) array below
 
 

@@ -19,7 +19,5 @@ def contact_force(stiffness_0, gap_0, stiffness_1, gap_free, damping, compliance
     ``lowest`` is 0 for a contact that can only push, -inf for papers that let it pull.
     """
     mean_gap = 0.5 * (stiffness_0 * gap_0 + stiffness_1 * gap_free)
-    force = (mean_gap + damping * (gap_free - gap_0)) / (
-        1.0 + (0.5 * stiffness_1 + damping) * compliance
-    )
+    force = (mean_gap + damping * (gap_free - gap_0)) / (1.0 + (0.5 * stiffness_1 + damping) * compliance)
     return max(force, lowest)

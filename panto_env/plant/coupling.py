@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from .actuator import FRAME, HEAD, actuate
 from .contact import contact_force
 from .jit import kernel
 from .pantograph import move_free, press
-
-Array = NDArray[np.float64]
 
 # Columns of the samples. Each is the mean over one step, so it belongs to the middle of the step.
 CONTACT_FORCE, HEAD_HEIGHT, FRAME_HEIGHT, WIRE_HEIGHT = 0, 1, 2, 3  # N, m, m, m
@@ -124,9 +123,7 @@ def advance(line, wire, body, drive, run, command, steps, samples):
             row[FRAME_FORCE] = drive.force[lane, FRAME]
             row[HEAD_FORCE] = drive.force[lane, HEAD]
             if recorded:
-                record_wire(
-                    line, wire, lane, samples.uplift[lane, n + 1], samples.tension[lane, n + 1]
-                )
+                record_wire(line, wire, lane, samples.uplift[lane, n + 1], samples.tension[lane, n + 1])
             run.force[lane] = force
             run.gap[lane] = gap_1
             run.stiffness[lane] = stiffness

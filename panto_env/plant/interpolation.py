@@ -25,5 +25,5 @@ def stencil(positions: ArrayLike, spacing: float) -> tuple[NDArray[np.int64], ND
     ratio = np.asarray(positions, dtype=float) / spacing
     # A point on a node but for rounding is on the node.
     left = np.floor(ratio + 1e-9).astype(np.int64)
-    weights = np.array(cubic_weights.py_func(ratio - left)).T
+    weights = np.array(cubic_weights.py_func(ratio - left)).T  # type: ignore[attr-defined]
     return left - 1, weights

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from ..arrays import Array
 from ..catalog.schema import PantographData
 from .jit import kernel
-
-Array = NDArray[np.float64]
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
@@ -84,7 +82,7 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
     The point stands at height ``wire`` (m) and yields ``compliance`` (m/N), contact spring included.
     """
     n = len(pantograph.masses)
-    a, b = matrices(pantograph)
+    a, _ = matrices(pantograph)
     stiffness = -a[n:, :n] * np.array(pantograph.masses)[:, None]
     stiffness[0, 0] += 1 / compliance
     load = np.zeros(n)

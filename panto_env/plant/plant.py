@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..catalog.schema import CatenaryData, PantographData, PeriodicStiffnessData
 from ..errors import InputError
 from . import actuator as actuators
 from . import coupling, pantograph
 from .catenary import MODELS
 from .coupling import CHANNELS, Run, Samples
-
-Array = NDArray[np.float64]
 
 TIME_STEP = 1e-3
 """Time step (s). With SPACING, sigma is within 0.5 % of the converged value: docs/convergence.md."""
@@ -96,8 +94,10 @@ class Plant:
         """Raise InputError unless a train can run at this speed (m/s) under this line."""
         limit = self.model.wave_speed(self.catenary)
         if not (np.isfinite(speed) and 0 < speed < limit):
-            bound = "" if np.isinf(limit) else (
-                f" and below the wave speed of the contact wire, {3.6 * limit:.0f} km/h"
+            bound = (
+                ""
+                if np.isinf(limit)
+                else (f" and below the wave speed of the contact wire, {3.6 * limit:.0f} km/h")
             )
             raise InputError(
                 f"The speed must lie above 0{bound} on line '{self.catenary.name}', "
@@ -141,6 +141,4 @@ class Plant:
 
         The sample of a lane's step n (counted from 0) is recorded in row n + 1.
         """
-        coupling.advance(
-            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples
-        )
+        coupling.advance(self.line, self.wire, self.body, self.drive, self.run, command, steps, samples)

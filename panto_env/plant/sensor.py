@@ -25,7 +25,5 @@ SENSORS = {
     "ideal": Sensors(),
     # Force and displacement as published; the velocity's is an own choice: an accelerometer of
     # 0.01 m/s^2 integrated over some seconds.
-    "realistic": Sensors(
-        force_noise=2.0, displacement_noise=2e-5, velocity_noise=5e-3, delay=0.005
-    ),
+    "realistic": Sensors(force_noise=2.0, displacement_noise=2e-5, velocity_noise=5e-3, delay=0.005),
 }

@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..catalog.schema import PantographData
 from ..plant import coupling
 from ..plant.actuator import Actuator
 from ..plant.jit import kernel
 from ..plant.sensor import Sensors
-
-Array = NDArray[np.float64]
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""

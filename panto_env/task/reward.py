@@ -16,7 +16,8 @@ TERMS = ("cost_function", "contact_loss", "effort", "rate")  # N m, %, -, -
 
 class Reward(Settings):
     """Weights of the terms. A control step costs 1 for each term at: a mean deviation as large as
-    the nominal force; contact lost all along; full force; full force reversed within the step."""
+    the nominal force; contact lost all along; full force; full force reversed within the step.
+    """
 
     cost_function: NonNegative = Field(1.0, description="weight of CF, Eq. 14 of paper 1 (-)")
     contact_loss: NonNegative = Field(1.0, description="weight of CL, Eq. 13 of paper 1 (-)")

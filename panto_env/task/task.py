@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..catalog import load_catenary, load_pantograph
 from ..errors import InputError
 from ..plant import coupling
@@ -20,8 +21,6 @@ from ..trajectory import Trajectory
 from . import observation as obs
 from .policy import Context
 from .reward import TERMS, Reward, judge, weights
-
-Array = NDArray[np.float64]
 
 CONTROL_INTERVAL = 0.01
 """Time between actions (s): published active pantographs are controlled at 50-100 Hz."""
@@ -165,9 +164,7 @@ class Task:
         self.speed[lane] = speed
         self.nominal[lane] = self.plant.body.lift[lane]
         self.episode_steps[lane] = self._steps(speed)
-        self.episode_distance[lane] = (
-            self.episode_steps[lane] * self.plant.run.stride[lane]
-        )
+        self.episode_distance[lane] = self.episode_steps[lane] * self.plant.run.stride[lane]
         rows = self.episode_steps[lane] + 1
         if rows > self.samples.channels.shape[1]:  # slower than any speed of the range
             self.samples = self.plant.samples(int(rows), tension=self._record_droppers)

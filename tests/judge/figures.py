@@ -44,9 +44,7 @@ def figures(result: Run, span_length: float, spans: tuple[int, int] = (5, 6)) ->
     """Figures over spans first..last; span n lies from (n - 1) to n span lengths (m)."""
     first, last = spans
     force = low_passed(result.contact_force, float(result.time[1] - result.time[0]))
-    inside = (result.position >= (first - 1) * span_length) & (
-        result.position <= last * span_length
-    )
+    inside = (result.position >= (first - 1) * span_length) & (result.position <= last * span_length)
     # Column j of support_uplift is the support at (j + 1) spans; line ends have none.
     uplift = result.support_uplift[:, max(first - 2, 0) : last]
     mean, std = float(force[inside].mean()), float(force[inside].std())

@@ -106,9 +106,7 @@ def simulate(
 class _Contact:
     """Joins wires, slack droppers and pantograph in one step."""
 
-    def __init__(
-        self, system: LineSystem, wires: Newmark, pantograph: PantographData, speed: float
-    ) -> None:
+    def __init__(self, system: LineSystem, wires: Newmark, pantograph: PantographData, speed: float) -> None:
         if pantograph.contact_stiffness == "rigid":
             raise NotImplementedError("the finite-element judge needs an elastic contact")
         self.system, self.wires, self.speed = system, wires, speed

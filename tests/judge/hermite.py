@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,7 @@ def span_nodes(span_length: float, droppers: Sequence[float], element: float) ->
     """
     breaks = np.array([0.0, *droppers, span_length])
     pieces = [
-        np.linspace(a, b, int(np.ceil((b - a) / element - 1e-9)), endpoint=False)
-        for a, b in zip(breaks[:-1], breaks[1:], strict=True)
+        np.linspace(a, b, int(np.ceil((b - a) / element - 1e-9)), endpoint=False) for a, b in pairwise(breaks)
     ]
     return np.append(np.concatenate(pieces), span_length)
 

@@ -56,9 +56,7 @@ def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
     data = line.droppers
     per_span, count = shape.x.size - 1, (shape.x.size - 1) * spans + 1
     offsets = np.arange(spans)
-    nodes = np.append(
-        (offsets[:, None] * line.span_length + shape.x[:-1]).ravel(), spans * line.span_length
-    )
+    nodes = np.append((offsets[:, None] * line.span_length + shape.x[:-1]).ravel(), spans * line.span_length)
     static = np.stack([shape.contact, shape.contact_slope], axis=1)
     static = np.concatenate([np.tile(static[:-1], (spans, 1)), static[-1:]])
     at = np.searchsorted(shape.x, np.array(data.positions) - 1e-9)

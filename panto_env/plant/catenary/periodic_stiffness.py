@@ -37,9 +37,7 @@ def line_end(data: PeriodicStiffnessData, spans: int) -> float:
     return spans * data.span_length
 
 
-def build(
-    data: PeriodicStiffnessData, spans: int, spacing: float, time_step: float
-) -> PeriodicLine:
+def build(data: PeriodicStiffnessData, spans: int, spacing: float, time_step: float) -> PeriodicLine:
     """Constants of the line; there is no grid, and any time step will do."""
     return PeriodicLine(data.mean_stiffness, data.stiffness_variation, 2 * np.pi / data.span_length)
 
@@ -75,25 +73,25 @@ def stiffness(line, x):
 
 
 @overload(coupling.move_wire)
-def _move_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+def _move_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None
 
-    def move(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+    def move(line, wire, lane, x0, x1, force):
         return 0.0, 0.0, 1.0 / stiffness(line, x1)
 
     return move
 
 
 @overload(coupling.load_wire)
-def _load_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+def _load_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None
     return lambda line, wire, lane, x0, x1, force: None
 
 
 @overload(coupling.record_wire)
-def _record_wire(line, wire, lane, uplift, tension):  # type: ignore[no-untyped-def]
+def _record_wire(line, wire, lane, uplift, tension):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None
     return lambda line, wire, lane, uplift, tension: None

@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...catalog.schema import FlexibleCatenaryData, Wire
 
 GRAVITY = 9.81  # m/s^2
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,7 @@ def green(wire: Wire, span: float, x: Array, points: Array) -> Array:
     if wire.bending_stiffness > 0:
         kappa = np.sqrt(wire.tension / wire.bending_stiffness)
         # cosh(kappa (L/2 - d)) / sinh(kappa L/2), written so that large arguments don't overflow
-        decay = (np.exp(-kappa * distance) + np.exp(-kappa * (span - distance))) / (
-            1 - np.exp(-kappa * span)
-        )
+        decay = (np.exp(-kappa * distance) + np.exp(-kappa * (span - distance))) / (1 - np.exp(-kappa * span))
         result -= (decay / (2 * kappa) - 1 / (span * kappa**2)) / wire.tension
     return result
 
@@ -65,7 +62,8 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
     """Static shape whose contact wire has the catalogue's sag at the droppers.
 
     The contact wire hangs from the droppers, and from the steady arm where that holds it at height 0
-    (any arm balances its own weight). The messenger's support, unloaded, stands ``encumbrance`` above height 0 and yields under the load.
+    (any arm balances its own weight). The messenger's support, unloaded, stands ``encumbrance`` above
+    height 0 and yields under the load.
     """
     droppers = line.droppers
     x = np.array(droppers.positions)

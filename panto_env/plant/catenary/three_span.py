@@ -14,11 +14,10 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...catalog.schema import ThreeSpanData
 from .. import coupling
 from ..jit import kernel
-
-Array = NDArray[np.float64]
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
@@ -163,11 +162,11 @@ def read_shape(line, wire, lane, x, out):
 
 
 @overload(coupling.move_wire)
-def _move_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+def _move_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
 
-    def move(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+    def move(line, wire, lane, x0, x1, force):
         q, v = wire.modal[lane, 0], wire.modal[lane, 1]
         for m in range(q.size):
             position, rate = q[m], v[m]
@@ -186,11 +185,11 @@ def _move_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
 
 
 @overload(coupling.load_wire)
-def _load_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+def _load_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
 
-    def load(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
+    def load(line, wire, lane, x0, x1, force):
         modal, shape = wire.modal[lane], wire.shape_0[lane]
         for m in range(shape.size):
             modal[0, m] += line.impulse[0, m] * shape[m] * force
@@ -210,11 +209,11 @@ def _load_wire(line, wire, lane, x0, x1, force):  # type: ignore[no-untyped-def]
 
 
 @overload(coupling.record_wire)
-def _record_wire(line, wire, lane, uplift, tension):  # type: ignore[no-untyped-def]
+def _record_wire(line, wire, lane, uplift, tension):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
 
-    def record(line, wire, lane, uplift, tension):  # type: ignore[no-untyped-def]
+    def record(line, wire, lane, uplift, tension):
         for side in range(2):
             support = wire.span_now[lane] - 1 + side
             if 0 <= support < uplift.size:

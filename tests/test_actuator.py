@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.plant.actuator import ACTUATORS, Actuator, actuate, drive
+from panto_env.settings import parse
+
+STEP = 1e-3
+
+
+def response(actuator, command, steps=200):
+    state = drive(actuator, STEP, 1)
+    forces = []
+    for _ in range(steps):
+        actuate(state, 0, command, 0.0)
+        forces.append(state.force[0, 0])
+    return np.array(forces)
+
+
+def test_ideal_actuator_follows_at_once_within_its_limit():
+    assert response(Actuator(), 60.0, 3).tolist() == [60.0] * 3
+    assert response(Actuator(), 500.0, 1).tolist() == [100.0]
+
+
+def test_delay_and_lag_are_those_of_the_closed_form():
+    forces = response(Actuator(delay=0.005, lag=0.015), 60.0)
+    time = STEP * (np.arange(200) + 1)
+    expected = 60 * (1 - np.exp(-np.maximum(time - 0.005, 0) / 0.015))
+    np.testing.assert_allclose(forces, expected, atol=1e-9)
+
+
+def test_rate_limit():
+    forces = response(Actuator(rate_limit=2500.0), 100.0)
+    assert np.diff(forces, prepend=0.0).max() == pytest.approx(2.5)
+    assert forces[-1] == 100.0
+
+
+def test_presets_and_errors():
+    assert parse(Actuator, "realistic", "actuator", ACTUATORS).delay == 0.005
+    with pytest.raises(InputError, match=r"actuator is not valid: key 'lag'"):
+        parse(Actuator, {"lag": -1}, "actuator", ACTUATORS)
+    with pytest.raises(InputError, match="actuator must be 'ideal' or 'realistic'"):
+        parse(Actuator, "perfect", "actuator", ACTUATORS)
+
+
+class Constant:
+    """Pushes with all its force."""
+
+    def reset(self, context):
+        self.actions = context.actions
+
+    def act(self, observation):
+        return np.ones(self.actions)
+
+
+def test_steady_frame_force_adds_to_the_mean_contact_force():
+    passive = simulate("periodic-stiffness", "three-mass", 200)
+    pushed = simulate("periodic-stiffness", "three-mass", 200, Constant(), actuator={"force_limit": 20.0})
+    gain = pushed.contact_force[3000:].mean() - passive.contact_force[3000:].mean()
+    assert gain == pytest.approx(20.0, rel=0.05)
+    assert pushed.frame_force.max() == 20.0
+    assert pushed.head_force.max() == 0.0
+
+
+def test_head_and_both_places_reach_the_plant():
+    head = simulate("periodic-stiffness", "three-mass", 200, Constant(), actuator={"place": "head"})
+    assert head.frame_force.max() == 0.0
+    assert head.head_force.min() == 100.0
+    both = simulate("periodic-stiffness", "three-mass", 200, Constant(), actuator={"place": "both"})
+    assert both.frame_force.min() == both.head_force.min() == 100.0

@@ -1,0 +1,284 @@
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import panto_env
+from panto_env import InputError
+from panto_env.envs import IDS
+
+
+@pytest.fixture(autouse=True)
+def _warnings_are_errors():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def run_episode(env, seed=0):
+    env.reset(seed=seed)
+    env.action_space.seed(seed)
+    rewards, infos = [], []
+    while True:
+        _, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        rewards.append(reward)
+        infos.append(info)
+        if terminated or truncated:
+            return rewards, infos, terminated
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("settings", [{}, {"actuator": {"place": "both"}, "observation": "full"}])
+def test_gymnasium_and_stable_baselines_find_no_fault(name, settings):
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
+    env = gymnasium.make(name, **settings)
+    check_env(env.unwrapped, skip_render_check=False)
+    sb3.check_env(env.unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
+    env = gymnasium.make(name, speed_kmh=320)
+    _, infos, terminated = run_episode(env)
+    assert not terminated
+    run = env.unwrapped.trajectory
+    figures = run.summary()
+    sums = {key: sum(info["reward_terms"][key] for info in infos) for key in infos[0]["reward_terms"]}
+    assert sums["cost_function"] == pytest.approx(figures.cost_function, rel=1e-9)
+    assert sums["contact_loss"] == pytest.approx(figures.contact_loss, rel=1e-9, abs=1e-9)
+    # Eq. 14 once more, by NumPy on the raw force
+    stride = run.speed_kmh / 3.6 * run.time_step
+    assert figures.cost_function == pytest.approx(
+        np.trapezoid(np.abs(run.contact_force - run.nominal_force), dx=stride), rel=1e-9
+    )
+    np.testing.assert_equal(infos[-1]["figures"], figures.as_dict())
+    assert "figures" not in infos[0]
+
+
+def test_weights_scale_the_reward():
+    unweighted, _, _ = run_episode(gymnasium.make("PantographStiffness-v0"))
+    reward = {"cost_function": 2.0, "contact_loss": 2.0}
+    weighted, _, _ = run_episode(gymnasium.make("PantographStiffness-v0", reward=reward))
+    assert weighted == pytest.approx([2 * r for r in unweighted])
+    effort, _, _ = run_episode(gymnasium.make("PantographStiffness-v0", reward={"effort": 1.0}))
+    assert sum(effort) < sum(unweighted)
+
+
+SCRIPT = """
+import gymnasium, hashlib, panto_env
+env = gymnasium.make("{name}", sensors="realistic", actuator="realistic", line_condition="worn",
+                     speed_kmh=(250, 300))
+observation, _ = env.reset(seed=7)
+env.action_space.seed(7)
+digest = hashlib.sha256(observation.tobytes())
+for _ in range(200):
+    observation, reward, *_ = env.step(env.action_space.sample())
+    digest.update(observation.tobytes() + repr(reward).encode())
+digest.update(env.unwrapped.trajectory.contact_force.tobytes())
+print(digest.hexdigest())
+"""
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_same_seed_same_run_in_two_processes(name):
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT.format(name=name)],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for _ in range(2)
+    }
+    assert len(outputs) == 1
+
+
+def test_seed_changes_noise_speed_and_line():
+    env = gymnasium.make("Pantograph-v0", speed_kmh=(200, 300), sensors="realistic", line_condition="fair")
+    first, info_1 = env.reset(seed=1)
+    second, info_2 = env.reset(seed=2)
+    assert info_1["speed_kmh"] != info_2["speed_kmh"]
+    assert 200 <= info_1["speed_kmh"] <= 300
+    assert not np.array_equal(first[:5], second[:5])
+
+
+def test_id_works_in_a_fresh_process_by_module_name():
+    code = "import gymnasium; print(gymnasium.make('panto_env:Pantograph-v0').reset(seed=0)[0].shape)"
+    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert result.stdout.strip() == "(9,)"
+
+
+def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
+    code = (
+        "import sys, panto_env; from panto_env.plant import coupling;"
+        "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'pyarrow', 'scipy.signal'};"
+        "print(len(coupling.advance.signatures), sorted(heavy & set(sys.modules)))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert result.stdout.strip() == "0 []"
+
+
+def test_observation_shows_what_it_says():
+    env = gymnasium.make("Pantograph-v0").unwrapped
+    env.reset(seed=0)
+    observation, _, _, _, info = env.step(np.array([0.5], dtype=np.float32))
+    layout = env.context.layout
+    assert layout.read(observation, "contact force") == pytest.approx(info["contact_force"], rel=1e-5)
+    assert layout.read(observation, "head displacement") == pytest.approx(info["head"], abs=1e-6)
+    assert layout.read(observation, "speed") == pytest.approx(300 / 3.6, rel=1e-6)
+    assert layout.read(observation, "last frame action") == 0.5
+    angle = 2 * np.pi * info["position"] / 60
+    assert layout.read(observation, "sine of span position") == pytest.approx(np.sin(angle), abs=1e-6)
+    assert info["frame_force"] == pytest.approx(50.0)
+
+
+def test_sensor_delay_and_noise():
+    quiet, late = (gymnasium.make("Pantograph-v0", sensors={"delay": delay}) for delay in (0.0, 0.01))
+    quiet.reset(seed=0)
+    late.reset(seed=0)
+    before = None
+    for _ in range(20):
+        now = quiet.step(np.zeros(1, np.float32))[0]
+        delayed = late.step(np.zeros(1, np.float32))[0]
+        if before is not None:
+            np.testing.assert_array_equal(delayed[:5], before[:5])
+        before = now
+    noisy = gymnasium.make("Pantograph-v0", sensors={"force_noise": 2.0})
+    noisy.reset(seed=0)
+    quiet.reset(seed=0)
+    errors = [
+        (noisy.step(np.zeros(1, np.float32))[0] - quiet.step(np.zeros(1, np.float32))[0])[4] * 100
+        for _ in range(400)
+    ]
+    assert np.std(errors) == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.array([np.nan]),
+        np.array([np.inf]),
+        np.zeros(2),
+        np.zeros((1, 1)),
+        np.float32(0.0),
+        "push",
+        None,
+    ],
+)
+def test_bad_action_is_refused_and_changes_nothing(action):
+    env, twin = (gymnasium.make("Pantograph-v0").unwrapped for _ in range(2))
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    good = np.array([0.3], dtype=np.float32)
+    env.step(good)
+    twin.step(good)
+    with pytest.raises(InputError, match="action must"):
+        env.step(action)
+    np.testing.assert_array_equal(env.step(good)[0], twin.step(good)[0])
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"speed_kmh": 0}, "The speed must lie above 0 and below the wave speed"),
+        ({"speed_kmh": -10}, "must lie above 0"),
+        ({"speed_kmh": 440}, "below the wave speed of the contact wire, 438 km/h"),
+        ({"speed_kmh": float("nan")}, "not at nan km/h"),
+        ({"speed_kmh": (300, 200)}, "must not fall"),
+        ({"speed_kmh": "fast"}, "must be a number or a range of two"),
+        ({"catenary": "en50318"}, "did you mean 'en50318-2002'"),
+        ({"pantograph": "missing.toml"}, "missing.toml does not exist"),
+        ({"actuator": "strong"}, "actuator must be 'ideal' or 'realistic' or a table"),
+        ({"sensors": {"noise": 1}}, "sensors is not valid: key 'noise'"),
+        ({"reward": {"cost_function": -1}}, "reward is not valid: key 'cost_function'"),
+        ({"observation": "everything"}, "observation must be one of measured, full"),
+        ({"distance": -5}, "distance must be a positive number"),
+        ({"distance": 1e9}, "spans"),
+        ({"control_interval": 0.0015}, "whole number of time steps"),
+        ({"time_step": 0}, "time_step must be a positive number"),
+        ({"spans": 1}, "spans must be a whole number from 3 to 1000"),
+        ({"velocity": 300}, "Unknown argument 'velocity'"),
+        ({"render_mode": "human"}, "render_mode must be None or 'rgb_array'"),
+    ],
+)
+def test_bad_arguments_are_refused_in_one_sentence(settings, message):
+    with pytest.raises(InputError, match=message) as caught:
+        panto_env.envs.PantographEnv(**settings)
+    assert "\n" not in str(caught.value)
+
+
+def test_options_hold_for_one_episode():
+    env = gymnasium.make("Pantograph-v0").unwrapped
+    _, info = env.reset(seed=0, options={"speed_kmh": 250})
+    assert info["speed_kmh"] == pytest.approx(250)
+    _, info = env.reset()
+    assert info["speed_kmh"] == pytest.approx(300)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"speed": 250}, "Unknown option 'speed'"),
+        ({"actuator": {"place": "both"}}, "would change the observation or action space"),
+        ({"speed_kmh": 0}, "must lie above 0"),
+    ],
+)
+def test_bad_options_leave_the_episode_as_it_was(options, message):
+    env = gymnasium.make("Pantograph-v0").unwrapped
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    with pytest.raises(InputError, match=message):
+        env.reset(options=options)
+    assert env.step(np.zeros(1, np.float32))[4]["position"] == pytest.approx(2 * 0.01 * 300 / 3.6)
+
+
+def test_step_outside_an_episode_is_refused():
+    env = panto_env.envs.PantographEnv(distance=20)
+    with pytest.raises(InputError, match="call reset before step"):
+        env.step(np.zeros(1))
+    _, _, terminated = run_episode(env)
+    assert not terminated
+    with pytest.raises(InputError, match="call reset before step"):
+        env.step(np.zeros(1))
+
+
+def test_losing_contact_for_long_ends_the_episode_and_is_no_way_out():
+    env = gymnasium.make("Pantograph-v0", actuator={"force_limit": 400.0})
+    env.reset(seed=0)
+    total, steps = 0.0, 0
+    while True:
+        _, reward, terminated, truncated, info = env.step(np.array([-1.0], np.float32))
+        total += reward
+        steps += 1
+        if terminated or truncated:
+            break
+    assert terminated
+    assert not truncated
+    assert info["figures"]["contact_loss"] > 50
+    passive, _, _ = run_episode(gymnasium.make("Pantograph-v0"))
+    assert total < sum(passive)
+
+
+def test_renders_a_picture():
+    env = gymnasium.make("Pantograph-v0", render_mode="rgb_array")
+    env.reset(seed=0)
+    for _ in range(50):
+        env.step(np.zeros(1, np.float32))
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        picture = env.render()
+    assert picture.shape[2] == 3
+    assert picture.std() > 5
+
+
+def test_user_s_own_toml_works_as_a_catalogue_name_does(tmp_path):
+    text = (panto_env.catalog.loader.FOLDERS["catenary"] / "en50318-2002.toml").read_text()
+    mine = tmp_path / "mine.toml"
+    mine.write_text(text)
+    run = panto_env.simulate(str(mine), distance=60)
+    assert run.catenary == "mine"
+    np.testing.assert_array_equal(run.contact_force, panto_env.simulate(distance=60).contact_force)

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from panto_env.catalog import available, load_pantograph
+from panto_env.plant import pantograph
+
+
+@pytest.mark.parametrize("name", available("pantograph"))
+def test_discretisation_is_exact_for_held_forces(name):
+    """Against SciPy's solver, for forces held over each step."""
+    data = load_pantograph(name)
+    step, random = 5e-3, np.random.default_rng(0)
+    a, b = pantograph.matrices(data)
+    transition, inputs = pantograph.discretise(data, step)
+    state = exact = np.zeros(len(a))
+    for _ in range(10):
+        forces = random.normal(scale=100.0, size=3)
+        state = transition @ state + inputs @ forces
+        solution = solve_ivp(lambda t, x, f=forces: a @ x + b @ f, (0, step), exact, rtol=1e-11, atol=1e-14)
+        exact = solution.y[:, -1]
+    np.testing.assert_allclose(state, exact, rtol=1e-7, atol=1e-11)
+
+
+def test_matrices_of_two_masses_as_written_out():
+    """Equations of motion of the two-mass model, term by term."""
+    data = load_pantograph("en50318-2002")
+    a, b = pantograph.matrices(data)
+    (m1, m2), (k1, k2), (c1, c2) = data.masses, data.stiffnesses, data.dampings
+    z1, z2, v1, v2, contact, frame, head = np.random.default_rng(1).normal(size=7)
+    rates = a @ [z1, z2, v1, v2] + b @ [contact, frame, head]
+    spring = k1 * (z2 - z1) + c1 * (v2 - v1)
+    assert rates == pytest.approx(
+        [v1, v2, (spring - contact + head) / m1, (-spring - k2 * z2 - c2 * v2 + frame - head) / m2]
+    )
+
+
+def test_rest_is_in_equilibrium_and_carries_the_lift_less_the_lowest_spring():
+    data = load_pantograph("identified-2dof")
+    compliance = 1 / 33e3
+    state = pantograph.rest(data, 54.0, 0.01, compliance)
+    force = (state[0] - 0.01) / compliance
+    assert force == pytest.approx(54.0 - data.stiffnesses[-1] * state[1])
+    a, b = pantograph.matrices(data)
+    assert a @ state + b @ [force, 54.0, 0.0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_head_actuator_is_a_pair_of_forces():
+    """Inside forces cannot move the centre of mass of a pantograph without ground springs."""
+    data = load_pantograph("three-mass")
+    _, b = pantograph.matrices(data)
+    n = len(data.masses)
+    assert b[n:, 2] @ np.array(data.masses) == pytest.approx(0.0)

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from panto_env import InputError, Trajectory, simulate
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(distance=180.0)
+
+
+def test_arrays_fit_together(run):
+    n = len(run.time)
+    assert run.position == pytest.approx(run.time * run.speed_kmh / 3.6)
+    assert run.uplift.shape == (n, len(run.support_position))
+    assert run.dropper_force.shape == (n, len(run.dropper_position))
+    assert run.dropper_force.min() >= 0
+
+
+def test_where_there_is_contact_the_head_presses_into_the_wire(run):
+    """The strip's spring of 50 kN/m joins force and heights."""
+    touching = run.contact_force > 1.0
+    pressed = 50e3 * (run.head - run.wire)
+    np.testing.assert_allclose(pressed[touching], run.contact_force[touching], atol=1e-6)
+
+
+def test_parquet_round_trip_is_exact(run, tmp_path):
+    path = tmp_path / "run.parquet"
+    run.save(path)
+    again = Trajectory.load(path)
+    for name, value in vars(run).items():
+        np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)
+    assert again.summary() == run.summary()
+
+
+def test_line_without_supports_or_droppers_survives_parquet(tmp_path):
+    run = simulate("periodic-stiffness", "three-mass", 200, distance=100)
+    run.save(tmp_path / "run.parquet")
+    again = Trajectory.load(tmp_path / "run.parquet")
+    assert again.dropper_force.shape == run.dropper_force.shape
+    assert np.isnan(again.summary().max_uplift)
+
+
+def test_half_written_file_is_refused_in_one_sentence(run, tmp_path):
+    path = tmp_path / "run.parquet"
+    run.save(path)
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(InputError, match="is not a whole trajectory file"):
+        Trajectory.load(path)
+
+
+def test_other_parquet_files_and_missing_files_are_refused(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"a": [1]}), tmp_path / "other.parquet")
+    with pytest.raises(InputError, match="is not a whole trajectory file"):
+        Trajectory.load(tmp_path / "other.parquet")
+    with pytest.raises(InputError, match="does not exist"):
+        Trajectory.load(tmp_path / "missing.parquet")
+
+
+def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "run.parquet"
+    run.save(path)
+    before = path.read_bytes()
+    monkeypatch.setattr(pq, "write_table", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run.save(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("spans", [(0, 1), (3, 2), (1.0, 2), (4, 9)])
+def test_spans_outside_the_run_are_refused(run, spans):
+    with pytest.raises(InputError, match="spans"):
+        run.summary(spans)
