@@ -13,7 +13,7 @@ from .catenary import MODELS
 from .coupling import CHANNELS, Run, Samples
 
 TIME_STEP = 1e-3
-"""Time step (s). With SPACING, sigma is within 0.5 % of the converged value: docs/convergence.md."""
+"""Time step (s). With SPACING, sigma is within 0.5 % of the converged value: docs/validation.md."""
 SPACING = 0.25
 """Grid of the flexible catenary (m)."""
 

@@ -1,0 +1,41 @@
+"""The flexible catenary beside its judge: ``python -m tests.judge``."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+
+from panto_env import simulate
+from panto_env.catalog import load_catenary, load_pantograph
+
+from . import finite_element
+
+NAME = "en50318-2002"
+OURS = ((0.25, 1e-3), (0.125, 2.5e-4))  # grid (m), time step (s)
+JUDGE = ((1.0, 1e-3), (0.5, 5e-4), (0.25, 2.5e-4))  # element (m), time step (s)
+
+
+def main() -> None:
+    """Print the figures of spans 5 and 6 at 250 and 300 km/h."""
+    line, pantograph = load_catenary(NAME), load_pantograph(NAME)
+    table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
+    for speed in (250.0, 300.0):
+        for spacing, step in OURS:
+            figures = simulate(NAME, NAME, speed, spacing=spacing, time_step=step).summary((5, 6))
+            values = (figures.mean, figures.std, figures.max, figures.min)
+            row = (f"{value:.2f}" for value in values)
+            table.add_row(f"{speed:g}", "finite differences", f"{spacing:g}", f"{1e3 * step:g}", *row)
+        for element, step in JUDGE:
+            result = finite_element.simulate(
+                line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length
+            )
+            judged = finite_element.figures(result, line.span_length)
+            values = (judged.mean, judged.std, judged.maximum, judged.minimum)
+            row = (f"{value:.2f}" for value in values)
+            table.add_row(f"{speed:g}", "finite elements", f"{element:g}", f"{1e3 * step:g}", *row)
+        table.add_section()
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from panto_env import Trajectory, validation
+
+PANTO = Path(sys.executable).with_name("panto")
+
+
+def panto(*arguments, cwd=None):
+    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+
+
+def test_validate_prints_the_table_and_passes():
+    result = panto("validate", "--json")
+    assert result.returncode == 0
+    told = json.loads(result.stdout)
+    assert told["passed"]
+    assert len(told["checks"]) == 2 * len(validation.ACCEPTED)
+    assert all(check["lowest"] <= check["value"] <= check["highest"] for check in told["checks"])
+    table = panto("validate")
+    assert "All figures inside." in table.stdout
+
+
+def test_validate_fails_where_a_figure_lies_outside(monkeypatch, capsys):
+    import typer
+
+    from panto_env.cli import validate
+
+    unit, label, *_ = validation.ACCEPTED["std"]
+    monkeypatch.setitem(validation.ACCEPTED, "std", (unit, label, (0, 1), (0, 1)))
+    with pytest.raises(typer.Exit) as caught:
+        validate.validate()
+    assert caught.value.exit_code == 1
+    assert "Not all figures are inside." in capsys.readouterr().out
+
+
+def test_simulate_writes_run_plot_and_figures(tmp_path):
+    result = panto(
+        "simulate", "--speed", 250, "--distance", 180, "--spans", "2-3", "--json",
+        "--output", tmp_path / "run.parquet", "--plot", tmp_path / "run.png",
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    run = Trajectory.load(tmp_path / "run.parquet")
+    assert told["figures"]["std"] == run.summary((2, 3)).std
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_simulate_takes_a_policy_and_prints_a_table():
+    result = panto("simulate", "--policy", "p", "--distance", 120)
+    assert result.returncode == 0, result.stderr
+    assert "policy p" in result.stdout
+    assert "standard deviation" in result.stdout
+
+
+def test_list_shows_entries_sources_and_policies():
+    result = panto("list", "--json")
+    told = json.loads(result.stdout)
+    assert {entry["name"] for entry in told["pantograph"]} > {"en50318-2002", "dsa380"}
+    assert {"passive", "p", "pd", "fb+ff"} <= set(told["policy"])
+    entry = panto("list", "benchmark-2015")
+    assert entry.returncode == 0
+    assert "droppers" in entry.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["simulate", "--speed", "0"], "The speed must lie above 0"),
+        (["simulate", "--speed", "500"], "below the wave speed"),
+        (["simulate", "--catenary", "nowhere"], "Unknown catenary 'nowhere'"),
+        (["simulate", "--catenary", "broken.toml"], "broken.toml is not valid TOML"),
+        (["simulate", "--policy", "best"], "Unknown policy 'best'"),
+        (["simulate", "--policy", "p:gain=much"], "Policy 'p:gain=much'"),
+        (["simulate", "--policy", "half.zip"], "half.zip"),
+        (["simulate", "--spans", "five"], "--spans must read first-last"),
+        (["simulate", "--spans", "5-60"], "but the run ends at"),
+        (["simulate", "--plot", "run.doc"], "must end in one of"),
+        (["list", "unknown"], "Unknown"),
+        (["train", "missing.toml"], "missing.toml"),
+        (["benchmark", "--config", "broken.toml"], "broken.toml"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(arguments, message, tmp_path):
+    (tmp_path / "broken.toml").write_text("kind = [")
+    (tmp_path / "half.zip").write_bytes(b"PK\x03\x04half")
+    before = sorted(tmp_path.iterdir())
+    result = panto(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stderr.startswith("panto: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_unwritable_output_is_refused(tmp_path):
+    target = tmp_path / "file"
+    target.write_text("mine")
+    result = panto("simulate", "--distance", 60, "--output", target / "run.parquet")
+    assert result.returncode == 2
+    assert "cannot be written" in result.stderr
+    assert target.read_text() == "mine"
+
+
+def test_speed_reports_every_plant_and_environment():
+    told = json.loads(panto("speed", "--repeats", 1, "--json").stdout)
+    assert {row["catenary"] for row in told["plants"]} == {
+        "en50318-2002",
+        "periodic-stiffness",
+        "ohl-three-span",
+    }
+    assert all(row["times_real_time"] > 1 for row in told["plants"])
+    assert "Pendulum-v1" in {row["id"] for row in told["environments"]}
