@@ -1,0 +1,220 @@
+"""Reference policies: the force for a known observation, and what they do on the line."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from panto_baselines.fb_ff import FeedbackFeedforward
+from panto_baselines.passive import Passive
+from panto_baselines.pd import ProportionalDerivative
+from panto_baselines.proportional import Proportional
+from panto_env import InputError, simulate
+from panto_env.task import Context, Policy, Task
+from panto_env.task.policy import find_policy
+
+SPEED_KMH = 300.0
+POLICIES = {
+    "passive": Passive,
+    "p": Proportional,
+    "pd": ProportionalDerivative,
+    "fb+ff": FeedbackFeedforward,
+}
+
+
+def a_context(**settings: Any) -> Context:
+    task = Task(speed_kmh=SPEED_KMH, **settings)
+    task.reset(0, np.random.default_rng(0))
+    return task.context(0)
+
+
+CONTEXT = a_context()
+NOMINAL = CONTEXT.nominal_force
+
+
+def seen(context: Context = CONTEXT, **values: float) -> NDArray[np.float32]:
+    """An observation with these physical values (spaces as underscores) and 0 elsewhere."""
+    observation = np.zeros(len(context.layout.entries), dtype=np.float32)
+    for name, value in ({"cosine_of_span_position": 1.0} | values).items():
+        place = context.layout.index(name.replace("_", " "))
+        observation[place] = value / context.layout.entries[place].scale
+    return observation
+
+
+def force(policy: Policy, context: Context = CONTEXT, **values: float) -> float:
+    """Force (N) of the first action for an observation."""
+    return float(policy.act(seen(context, **values))[0]) * context.force_limit
+
+
+def ready(policy: Policy, context: Context = CONTEXT) -> Policy:
+    policy.reset(context)
+    return policy
+
+
+# --- all of them ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_each_is_found_by_its_name(name: str) -> None:
+    assert type(find_policy(name)) is POLICIES[name]
+
+
+@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("place", ["frame", "head", "both"])
+def test_actions_fit_any_actuator_and_only_the_first_one_acts(name: str, place: str) -> None:
+    context = a_context(actuator={"place": place})
+    action = ready(find_policy(name), context).act(seen(context, contact_force=NOMINAL - 20))
+    assert action.shape == (context.actions,)
+    assert (action[0] > 0) == (name != "passive")
+    assert not action[1:].any()
+
+
+@pytest.mark.parametrize("name", ["p", "pd", "fb+ff"])
+def test_actions_stay_within_the_actuators_limit(name: str) -> None:
+    context = a_context(actuator={"force_limit": 10.0})
+    policy = ready(find_policy(name), context)
+    assert policy.act(seen(context, contact_force=0))[0] == 1
+    policy.reset(context)
+    assert policy.act(seen(context, contact_force=NOMINAL + 50))[0] == -1
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_reset_forgets_the_last_episode(name: str) -> None:
+    policy = find_policy(name)
+    runs = []
+    for _ in range(2):
+        policy.reset(CONTEXT)
+        runs.append([force(policy, contact_force=NOMINAL - 5 * k) for k in range(4)])
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("p:gain=-1", "gain must be a finite number of at least 0, not -1"),
+        ("p:gain=high", "gain must be a finite number"),
+        ("p:gain=True", "gain must be a finite number"),
+        ("pd:damping=1e999", "damping must be a finite number"),
+        ("pd:derivative=None", "derivative must be a finite number"),
+        ("fb+ff:dead_zone=-2", "dead_zone must be"),
+        ("fb+ff:theta=late", "theta must be a finite number"),
+        ("fb+ff:reading=loud", "reading must be one of span, printed"),
+        ("fb+ff:speed_unit=mph", "speed_unit must be one of km/h, m/s"),
+        ("fb+ff:gain={}", "gain must hold at least one speed"),
+        ("p:gian=1", "gian"),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        find_policy(source)
+    assert words in str(caught.value)
+    assert f"'{source}'" in str(caught.value)
+
+
+# --- each law ------------------------------------------------------------------------------------
+
+
+def test_p_is_the_gain_times_what_the_force_lacks() -> None:
+    policy = ready(Proportional(gain=0.5))
+    assert force(policy, contact_force=NOMINAL - 40) == pytest.approx(20, rel=1e-5)
+    assert force(policy, contact_force=NOMINAL + 30) == pytest.approx(-15, rel=1e-5)
+
+
+def test_pd_adds_the_change_of_the_force_and_damps_the_frame() -> None:
+    policy = ready(ProportionalDerivative(gain=0.5, derivative=0.01, damping=100))
+    assert force(policy, contact_force=NOMINAL - 20) == pytest.approx(10, rel=1e-5)
+    # The force fell by 5 N within 10 ms: 0.01 s x 500 N/s more.
+    assert force(policy, contact_force=NOMINAL - 25) == pytest.approx(12.5 + 5, rel=1e-5)
+    steady = force(policy, contact_force=NOMINAL - 25, frame_velocity=0.1)
+    assert steady == pytest.approx(12.5 - 10, rel=1e-5)
+
+
+def test_feedback_is_zero_in_the_dead_zone_and_counts_from_its_edge() -> None:
+    policy = ready(FeedbackFeedforward(gain=2, amplitude=0, dead_zone=6))
+    for lacking, expected in ((0, 0), (6, 0), (-6, 0), (10, 8), (-10, -8)):
+        got = force(policy, contact_force=NOMINAL - lacking)
+        assert got == pytest.approx(expected, abs=1e-4)
+
+
+def test_feedback_takes_the_contact_force_in_from_0_to_300_newtons() -> None:
+    context = a_context(actuator={"force_limit": 1000.0})
+    policy = ready(FeedbackFeedforward(amplitude=0), context)
+    at_the_end = force(policy, context, contact_force=300)
+    assert at_the_end == pytest.approx(NOMINAL - 300, rel=1e-5)
+    assert force(policy, context, contact_force=450) == pytest.approx(at_the_end, rel=1e-5)
+    assert force(policy, context, contact_force=-50) == pytest.approx(NOMINAL, rel=1e-5)
+
+
+@pytest.mark.parametrize(("speed", "gain"), [(200, 0.4), (275, 0.55), (300, 0.6), (400, 0.8)])
+def test_feedback_gain_depends_on_speed(speed: float, gain: float) -> None:
+    task = Task(speed_kmh=speed)
+    task.reset(0, np.random.default_rng(0))
+    policy = FeedbackFeedforward(gain={400: 0.8, 200: 0.4}, amplitude=0)
+    policy.reset(task.context(0))
+    got = force(policy, task.context(0), contact_force=NOMINAL - 10)
+    assert got == pytest.approx(10 * gain, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "turns_a_metre"),
+    [
+        ({}, 1 / 60),
+        ({"reading": "printed"}, 2 * 300 / 60 / (4 * 60)),
+        ({"reading": "printed", "speed_unit": "m/s"}, 2 * (300 / 3.6) / 60 / (4 * 60)),
+    ],
+)
+@pytest.mark.parametrize("theta", [math.pi / 6, -1.0])
+def test_feedforward_follows_the_equation_along_the_line(
+    parameters: dict[str, Any], turns_a_metre: float, theta: float
+) -> None:
+    task = Task(speed_kmh=SPEED_KMH)
+    task.reset(0, np.random.default_rng(0))
+    policy = FeedbackFeedforward(gain=0, theta=theta, **parameters)
+    policy.reset(task.context(0))
+    for _ in range(100):
+        x = task.plant.run.step[0] * task.plant.run.stride[0]
+        action = policy.act(task.observation[0])
+        expected = 10 * math.sin(2 * math.pi * turns_a_metre * x - theta)
+        assert 100 * action[0] == pytest.approx(expected, abs=1e-6)
+        task.step(action[None])
+
+
+def test_feedforward_is_in_step_with_the_spans_wherever_the_run_begins() -> None:
+    policy = ready(FeedbackFeedforward(gain=0, theta=0.3))
+    angle = 2.0
+    got = force(
+        policy,
+        sine_of_span_position=math.sin(angle),
+        cosine_of_span_position=math.cos(angle),
+    )
+    assert got == pytest.approx(10 * math.sin(angle - 0.3), abs=1e-4)
+
+
+# --- on the line ---------------------------------------------------------------------------------
+
+
+def test_each_calms_the_contact_force_without_pressing_less() -> None:
+    figures = {name: simulate(policy=name, speed_kmh=SPEED_KMH).summary((4, 8)) for name in POLICIES}
+    passive = figures["passive"]
+    for name in ("p", "pd", "fb+ff"):
+        assert figures[name].std < 0.97 * passive.std
+        assert figures[name].cost_function < passive.cost_function
+        assert passive.mean < figures[name].mean < NOMINAL
+
+
+def test_the_passive_policy_is_no_policy() -> None:
+    none, passive = simulate(distance=200.0), simulate(distance=200.0, policy="passive")
+    assert np.array_equal(none.contact_force, passive.contact_force)
+
+
+def test_pd_stays_stable_under_a_real_actuator() -> None:
+    for line in (("en50318-2002",) * 2, ("shinkansen-simple", "identified-2dof")):
+        passive, pd = (
+            simulate(*line, policy=p, actuator="realistic", sensors="realistic").summary((4, 8))
+            for p in (None, "pd")
+        )
+        assert pd.std < passive.std

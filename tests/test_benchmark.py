@@ -1,0 +1,360 @@
+"""The benchmark: paired passes, statistics, the rule of the mean force, and its command."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from panto_baselines import benchmark, command, plot, statistics
+from panto_baselines.benchmark import Benchmark
+from panto_baselines.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.single_pass import Row
+from panto_env import InputError, simulate
+from panto_env.settings import parse
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
+PLUGIN = """
+import numpy as np
+from panto_baselines.force_law import ForceLaw
+
+class Half(ForceLaw):
+    "Presses with half of the nominal force."
+    def force(self, observation):
+        return -0.5 * self.context.nominal_force
+
+class Bad(ForceLaw):
+    def force(self, observation):
+        raise ArithmeticError("no idea")
+
+class Lost(ForceLaw):
+    def force(self, observation):
+        return -1e9
+
+class Nan:
+    def reset(self, context): pass
+    def act(self, observation): return np.array([float("nan")])
+"""
+
+
+def settings(**given: Any) -> BenchmarkSettings:
+    table = {"policies": ["p"], "lines": [LINE], "seeds": 2} | given
+    return parse(BenchmarkSettings, table, "the benchmark")
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Benchmark:
+    return benchmark.run(settings(), workers=1)
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody's installed package with policies of their own."""
+    info = tmp_path / "site" / "plugin-1.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
+    names = ("Half", "Bad", "Lost", "Nan")
+    points = "".join(f"{name.lower()} = panto_test_plugin:{name}\n" for name in names)
+    (info / "entry_points.txt").write_text(f"[panto_env.policies]\n{points}")
+    (tmp_path / "site" / "panto_test_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+
+
+def called(*arguments: str) -> Any:
+    """The command's result, run as a program would run it."""
+    app = typer.Typer()
+    app.command()(command.benchmark)
+    short = ("--seeds", "1", "--workers", "1", "--speed", "300", *arguments)
+    return CliRunner().invoke(app, short, env={"COLUMNS": "120"})
+
+
+# --- passes --------------------------------------------------------------------------------------
+
+
+def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Benchmark) -> None:
+    assert [(row.policy, row.seed) for row in outcome.rows] == [
+        *(("passive", 0), ("passive", 1)),
+        *(("p", 0), ("p", 1)),
+    ]
+    assert outcome.spans == ((3, 5),)
+    run = simulate(policy="p", seed=1, distance=310.0, line_condition="fair", record_droppers=False)
+    assert outcome.rows[3].figures == run.summary((3, 5))
+    steps = np.diff(run.frame_force[run.position > 120][4::10])  # once a control interval
+    assert outcome.rows[3].action_rate == pytest.approx(np.sqrt(np.mean((steps / 0.01) ** 2)), 0.03)
+    assert outcome.rows[0].action_rate == outcome.rows[0].figures.effort == 0
+
+
+def test_outcome_does_not_depend_on_workers_and_repeats(outcome: Benchmark) -> None:
+    again = benchmark.run(settings(), workers=2)
+    assert again == outcome
+    assert json.dumps(again.as_dict()) == json.dumps(outcome.as_dict())
+
+
+def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome: Benchmark) -> None:
+    assert outcome.rows[0].figures.std != outcome.rows[1].figures.std
+    assert outcome.cells[1].std_interval is not None
+    assert outcome.cells[0].std_interval is None  # passive less itself
+    new = benchmark.run(settings(line_condition="new"), workers=1)
+    assert new.rows[0].figures == new.rows[1].figures
+    assert new.cells[1].std_interval is None
+
+
+def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
+    lines = [
+        {"speeds_kmh": [300]},
+        {"speeds_kmh": [250], "catenary": "periodic-stiffness", "pantograph": "three-mass"},
+    ]
+    done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
+    assert done.spans[0] == (4, 8)
+    assert done.spans[1][0] == 4
+    # That line has no supports: the uplift is nan, which JSON does not know.
+    assert math.isnan(done.cells[1].figures["max_uplift"])
+    assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
+
+
+def test_progress_counts_all_passes() -> None:
+    told: list[tuple[int, int]] = []
+    benchmark.run(settings(), workers=1, progress=lambda done, total: told.append((done, total)))
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+# --- statistics ----------------------------------------------------------------------------------
+
+
+def test_interquartile_mean_leaves_out_the_ends() -> None:
+    assert statistics.interquartile_mean(np.array([0.0, 1.0, 3.0, 100.0])) == 2
+    assert statistics.interquartile_mean(np.array([1.0, 3.0, 8.0])) == 4
+    assert math.isnan(statistics.interquartile_mean(np.array([1.0, 3.0, np.nan, 3.0, 3.0])))
+
+
+def test_interval_holds_the_mean_and_is_honest_where_it_knows_nothing() -> None:
+    values = np.random.default_rng(3).normal(5.0, 1.0, 40)
+    low, high = statistics.bootstrap_interval(values) or (0, 0)
+    assert low < 5 < high
+    assert 0.4 < high - low < 1.2  # 2 x 1.96 x 1.2 / sqrt(40) for a mean without the ends
+    assert statistics.bootstrap_interval(values) == (low, high)
+    for nothing in ([1.0], [2.0, 2.0, 2.0], [1.0, np.nan]):
+        assert statistics.bootstrap_interval(np.array(nothing)) is None
+
+
+def test_mean_force_lies_between_passive_and_nominal_widened() -> None:
+    assert statistics.mean_range(44.0, 54.0) == pytest.approx((0.975 * 44, 1.025 * 54))
+    assert statistics.mean_range(130.0, 120.0) == pytest.approx((0.975 * 120, 1.025 * 130))
+
+
+def with_figures(row: Row, policy: str, **figures: float) -> Row:
+    return replace(row, policy=policy, figures=replace(row.figures, **figures))
+
+
+def test_the_qualified_are_ranked_by_cost_and_the_others_are_not(outcome: Benchmark) -> None:
+    passive = replace(outcome.rows[0], nominal_force=120.0)
+    rows = [
+        with_figures(passive, "passive", mean=110.0, cost_function=9.0),
+        with_figures(passive, "pressing less", mean=107.0, cost_function=1.0),
+        with_figures(passive, "just enough", mean=107.5, cost_function=8.0),
+        with_figures(passive, "as much as allowed", mean=122.9, cost_function=7.0),
+        with_figures(passive, "pressing more", mean=123.1, cost_function=2.0),
+        replace(with_figures(passive, "off the wire", mean=np.nan), terminated=True),
+    ]
+    cells = statistics.compare(rows)
+    assert [cell.rank for cell in cells] == [3, None, 2, 1, None, None]
+    assert "107.0 N, outside 107.2 to 123.0 N" in cells[1].disqualified
+    assert "1 of 1 runs ended early" in cells[5].disqualified
+
+
+def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> None:
+    given = settings(policies=["half", "lost"], seeds=1, actuator={"force_limit": 300.0})
+    done = benchmark.run(given, workers=2)
+    passive, half, lost = done.cells
+    assert half.figures["std"] < passive.figures["std"]
+    assert half.rank is None
+    assert "mean force" in half.disqualified
+    assert lost.rank is None
+    assert "ended early" in lost.disqualified
+    assert passive.rank == 1
+
+
+# --- what is not valid ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"policies": ["pp"]}, "Unknown policy 'pp'"),
+        ({"policies": ["p:gain=-1"]}, "'p:gain=-1' cannot be made"),
+        ({"policies": ["p", "p"]}, "key 'policies': 'p' is given twice"),
+        ({"policies": ["model.zip"]}, "model.zip does not exist"),
+        ({"seeds": 0}, "key 'seeds'"),
+        ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
+        ({"seeds": [-1]}, "key 'seeds.0'"),
+        ({"lines": []}, "key 'lines'"),
+        ({"lines": [LINE, LINE]}, "is given twice"),
+        ({"lines": [{"speeds_kmh": [300, 300]}]}, "300.0 is given twice"),
+        ({"lines": [{"speeds_kmh": [500]}]}, "below the wave speed"),
+        ({"lines": [{"catenary": "nowhere"}]}, "Unknown catenary 'nowhere'"),
+        ({"lines": [{"distance": 200.0}]}, "no spans 4 to 3 to evaluate"),
+        ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
+        ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
+        ({"actuator": "strong"}, "key 'actuator': it must be 'ideal' or 'realistic'"),
+        ({"sensors": {"noise": 1}}, "key 'noise'"),
+        ({"control_interval": 0.0015}, "whole number of time steps"),
+    ],
+)
+def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("policy", "workers", "words"),
+    [
+        ("bad", 1, "The policy 'bad' failed: ArithmeticError: no idea."),
+        ("bad", 2, "The policy 'bad' failed: ArithmeticError: no idea."),
+        ("nan", 1, "The policy 'nan' failed: its action must be finite numbers of shape (1,)"),
+    ],
+)
+def test_a_policy_that_fails_is_named(plugin: None, policy: str, workers: int, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        benchmark.run(settings(policies=[policy], seeds=1), workers=workers)
+    assert words in str(caught.value)
+
+
+def test_workers_must_be_some() -> None:
+    with pytest.raises(InputError, match="workers must be 1 or more"):
+        benchmark.run(settings(), workers=0)
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("benchmark*.toml")), ids=lambda path: path.stem)
+def test_shipped_benchmarks_load(path: Path) -> None:
+    loaded = load_benchmark(path)
+    assert len(loaded.policies) >= 4
+    assert len(loaded.seeds) >= 5
+    assert {line.catenary for line in loaded.lines} >= {"en50318-2002", "shinkansen-simple"}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seeds = ", "is not valid TOML"),
+        ("seed = 3", "key 'seed'"),
+        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.0.speeds_kmh.0'"),
+        (None, "could not be read"),
+    ],
+)
+def test_a_bad_file_is_named_with_its_key(tmp_path: Path, text: str | None, words: str) -> None:
+    path = tmp_path / "mine.toml"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_benchmark(path)
+    assert str(path) in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_json_holds_everything_and_the_settings_that_make_it_again(
+    outcome: Benchmark, tmp_path: Path
+) -> None:
+    outcome.save(tmp_path / "out.json")
+    table = json.loads((tmp_path / "out.json").read_text())
+    assert table == outcome.as_dict()
+    assert parse(BenchmarkSettings, table["settings"], "it") == outcome.settings
+    assert len(table["rows"]) == 4
+    assert table["cells"][1]["rank"] in (1, 2)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffix: str) -> None:
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    path = tmp_path / f"out{suffix}"
+    outcome.save(path)
+    read = pyarrow.csv.read_csv if suffix == ".csv" else pyarrow.parquet.read_table
+    assert read(path)["std"].to_pylist() == pytest.approx([r.figures.std for r in outcome.rows])
+
+
+def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
+    forces, sigmas = plot.plot(outcome).axes
+    assert forces.get_legend_handles_labels()[1] == ["passive", "p", "nominal force"]
+    assert forces.get_xlim() == (180, 300)  # the last two spans evaluated
+    assert sigmas.get_legend_handles_labels()[1] == ["passive", "p"]
+    assert "(N)" in forces.get_ylabel()
+    assert "(km/h)" in sigmas.get_xlabel()
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def test_command_prints_a_table_for_people() -> None:
+    result = called("p:gain=0.5")
+    assert result.exit_code == 0, result.output
+    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 4–8"):
+        assert words in result.stdout
+
+
+def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
+    files = (tmp_path / "out.csv", tmp_path / "out.png")
+    result = called("p", "--json", "--output", str(files[0]), "--plot", str(files[1]))
+    assert result.exit_code == 0, result.output
+    assert [cell["policy"] for cell in json.loads(result.stdout)["cells"]] == ["passive", "p"]
+    assert all(path.stat().st_size > 100 for path in files)
+    assert files[1].read_bytes().startswith(b"\x89PNG")
+
+
+def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('policies = ["p"]\n[[lines]]\ncatenary = "benchmark-2015"\ndistance = 350\n')
+    result = called("--config", str(path), "--json", "--line-condition", "new")
+    assert result.exit_code == 0, result.output
+    used = json.loads(result.stdout)["settings"]
+    assert used["policies"] == ["passive", "p"]
+    assert used["seeds"] == [0]
+    assert used["line_condition"]["irregularity"] == 0
+    assert used["lines"] == [
+        Line(catenary="benchmark-2015", speeds_kmh=(300,), distance=350).model_dump(mode="json")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["q"], "Unknown policy 'q'"),
+        (["p", "--catenary", "nowhere"], "Unknown catenary"),
+        (["p", "--actuator", "strong"], "key 'actuator'"),
+        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .parquet"),
+        (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
+    ],
+)
+def test_command_raises_one_sentence_and_overwrites_nothing(
+    tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    kept = tmp_path / "out.json"
+    kept.write_text("kept")
+    result = called("--output", str(kept), *arguments)
+    assert isinstance(result.exception, InputError)
+    assert words in str(result.exception)
+    assert "\n" not in str(result.exception)
+    assert kept.read_text() == "kept"
+
+
+def test_the_command_is_looked_up_fast() -> None:
+    code = (
+        "import sys, panto_baselines.command; "
+        "print({'torch', 'matplotlib', 'pyarrow', 'scipy.stats'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
