@@ -83,14 +83,14 @@ def run(
     workers = cores() if workers is None else workers
     if workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
-    for policy in settings.policies:
+    for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy)
     spans = tuple(_check(settings, line) for line in settings.lines)
     jobs: list[Job] = [
         (settings, line, covered, policy, speed, seed)
         for line, covered in zip(settings.lines, spans, strict=True)
         for speed in line.speeds_kmh
-        for policy in settings.policies
+        for policy in settings.policies_on(line)
         for seed in settings.seeds
     ]
     rows = tuple(_passes(jobs, min(workers, len(jobs)), progress or (lambda done, total: None)))

@@ -44,7 +44,7 @@ def benchmark(
     """Compare policies on the same lines, at the same speeds, under the same seeds.
 
     Ranks them by paper 1's cost function CF; one that buys calm by pressing less is disqualified. The
-    plot shows the contact force of the first line at its highest speed, and σ over speed.
+    plot shows the contact force of every line at its highest speed, and σ over speed.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn

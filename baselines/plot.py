@@ -30,20 +30,21 @@ def check_picture(path: str | Path) -> None:
 
 
 def plot(outcome: Benchmark) -> Figure:
-    """Contact force along two spans, and sigma over speed on every line.
+    """Contact force along two spans of every line, and sigma over speed.
 
-    The force is that of the first line at its highest speed under the first seed, in the last two
-    spans evaluated: one more pass for each policy. ``panto_env.figures.save`` writes the figure.
+    The force is that at a line's highest speed under the first seed, in the last two spans evaluated:
+    one more pass for each policy. ``panto_env.figures.save`` writes the figure.
     """
     from matplotlib.figure import Figure
 
-    lines = outcome.settings.lines
-    figure = Figure(figsize=(11, 8), layout="constrained")
-    grid = figure.add_gridspec(2, len(lines), height_ratios=(1, 1.1))
-    colours = {policy: f"C{k % 10}" for k, policy in enumerate(outcome.settings.policies)}
-    _forces(figure.add_subplot(grid[0, :]), outcome, colours)
+    settings = outcome.settings
+    lines = settings.lines
+    figure = Figure(figsize=(11, 3.6 * len(lines) + 4.2), layout="constrained")
+    grid = figure.add_gridspec(len(lines) + 1, len(lines))
     for k, line in enumerate(lines):
-        _sigmas(figure.add_subplot(grid[1, k]), line, _of(outcome, line), colours)
+        colours = {policy: f"C{k % 10}" for k, policy in enumerate(settings.policies_on(line))}
+        _forces(figure.add_subplot(grid[k, :]), outcome, k, colours)
+        _sigmas(figure.add_subplot(grid[len(lines), k]), line, _of(outcome, line), colours)
     return figure
 
 
@@ -52,8 +53,8 @@ def _of(outcome: Benchmark, line: Line) -> list[Cell]:
     return [cell for cell in outcome.cells if (cell.catenary, cell.pantograph) == names]
 
 
-def _forces(axes: Axes, outcome: Benchmark, colours: dict[str, str]) -> None:
-    settings, line, (first, last) = outcome.settings, outcome.settings.lines[0], outcome.spans[0]
+def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str]) -> None:
+    settings, line, (first, last) = outcome.settings, outcome.settings.lines[place], outcome.spans[place]
     speed, seed = max(line.speeds_kmh), settings.seeds[0]
     first = max(first, last - 1)
     for policy, colour in colours.items():

@@ -46,7 +46,9 @@ class Line(Settings):
         "the fourth (the run-in is left out) to the last that every run covers whole",
     )
 
-    @field_validator("speeds_kmh")
+    policies: tuple[str, ...] = Field((), description="policies that run on this line alone, added to all's")
+
+    @field_validator("speeds_kmh", "policies")
     @classmethod
     def _each_once(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
         return _distinct(value)
@@ -70,6 +72,10 @@ class BenchmarkSettings(Settings):
         Field(LINE_CONDITIONS["fair"], description="on a new line all seeds are alike")
     )
     control_interval: Positive = Field(CONTROL_INTERVAL, description="time between actions (s)")
+
+    def policies_on(self, line: Line) -> tuple[str, ...]:
+        """Policies that run on a line."""
+        return tuple(dict.fromkeys((*self.policies, *line.policies)))
 
     @field_validator("seeds", mode="before")
     @classmethod

@@ -358,3 +358,13 @@ def test_the_command_is_looked_up_fast() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_a_line_can_have_policies_of_its_own():
+    lines = [LINE, {**LINE, "catenary": "ln2", "speeds_kmh": [200], "policies": ["p"]}]
+    done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
+    assert [(row.catenary, row.policy) for row in done.rows] == [
+        ("en50318-2002", "passive"),
+        ("ln2", "passive"),
+        ("ln2", "p"),
+    ]
