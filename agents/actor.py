@@ -1,0 +1,45 @@
+"""A trained network as arrays: it acts without torch, and fast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.task import Context
+
+Weights = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Deterministic policy: a multilayer perceptron from an observation to an action.
+
+    It is a policy itself (``panto_env.task.Policy``), for any context of the right shape.
+    """
+
+    weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)
+    biases: tuple[Weights, ...]  # of each layer, (outputs,)
+    activation: Literal["tanh", "relu"]  # of the hidden layers
+    squashed: bool = False  # whether the last layer goes through tanh; it is clipped otherwise
+
+    def squash(self) -> Actor:
+        """The same with tanh at its end."""
+        return replace(self, squashed=True)
+
+    def reset(self, context: Context) -> None:
+        """Nothing: it remembers nothing."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        values = observation
+        last = len(self.weights) - 1
+        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            values = weight @ values + bias
+            if k < last:
+                values = np.tanh(values) if self.activation == "tanh" else np.maximum(values, 0)
+        if self.squashed:
+            values = np.tanh(values)
+        return np.clip(values, -1.0, 1.0).astype(np.float64)

@@ -1,0 +1,116 @@
+"""A policy beside the passive pantograph, paired by line, speed and seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from panto_baselines.benchmark import FIRST_SPAN
+from panto_baselines.statistics import mean_range
+from panto_env import Trajectory, simulate
+from panto_env.metrics import Figures
+
+DROPPED = ("speed_kmh", "reward")  # arguments of an environment that a pass has not, or its own
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One pass under a policy and the same without; figures leave out the run-in, if that can be."""
+
+    speed_kmh: float
+    seed: int
+    policy: Figures
+    passive: Figures
+    nominal_force: float  # N
+    terminated: bool  # whether the policy's pass ended early
+
+    @property
+    def ratio(self) -> float:
+        """Sigma over the passive pantograph's; infinite where the pass ended early."""
+        return math.inf if self.terminated else self.policy.std / self.passive.std
+
+    @property
+    def mean_range(self) -> tuple[float, float]:
+        """Lowest and highest mean force (N) that qualifies."""
+        allowed: tuple[float, float] = mean_range(self.passive.mean, self.nominal_force)
+        return allowed
+
+    @property
+    def qualified(self) -> bool:
+        """Whether the pass was whole and its mean force within the range."""
+        low, high = self.mean_range
+        return not self.terminated and low <= self.policy.mean <= high
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        return {
+            "speed_kmh": self.speed_kmh,
+            "seed": self.seed,
+            "std_change_percent": 100 * (self.ratio - 1),
+            "qualified": self.qualified,
+            "mean_range": self.mean_range,
+            "terminated": self.terminated,
+            "policy": self.policy.as_dict(),
+            "passive": self.passive.as_dict(),
+        }
+
+
+@dataclass
+class Comparison:
+    """Passes along one line, given by the environment's arguments; passive ones are made once."""
+
+    arguments: Mapping[str, Any]
+    speeds_kmh: Sequence[float]
+    seeds: int
+    _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
+
+    def run(self, policy: Any) -> list[Pair]:
+        """Pairs at every speed and seed. Raises InputError where the policy does not fit."""
+        return [
+            pair(*self.passes(policy, speed, seed)) for speed in self.speeds_kmh for seed in range(self.seeds)
+        ]
+
+    def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
+        """Records of one pass under the policy and of one without."""
+        given = {key: value for key, value in self.arguments.items() if key not in DROPPED}
+        given |= {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
+        if (speed_kmh, seed) not in self._passive:
+            self._passive[speed_kmh, seed] = simulate(**given)
+        return simulate(**given, policy=policy), self._passive[speed_kmh, seed]
+
+
+def pair(active: Trajectory, passive: Trajectory) -> Pair:
+    """Figures of two passes over the spans that the benchmark takes too."""
+    spans = None if active.terminated else evaluated_spans(passive)
+    return Pair(
+        speed_kmh=round(active.speed_kmh, 6),  # went through m/s
+        seed=active.seed,
+        policy=active.summary(spans),
+        passive=passive.summary(spans),
+        nominal_force=active.nominal_force,
+        terminated=active.terminated,
+    )
+
+
+def evaluated_spans(run: Trajectory) -> tuple[int, int] | None:
+    """First and last span behind the run-in, counted from 1; None (all) where a run has none."""
+    covered = run.position[-1] + run.position[0]  # positions are those of the steps' middles
+    last = math.floor(covered / run.span_length + 1e-9)
+    return (FIRST_SPAN, last) if last >= FIRST_SPAN else None
+
+
+def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
+    """Mean ratio of sigma, and whether every pass qualified."""
+    return float(np.mean([pair.ratio for pair in pairs])), all(pair.qualified for pair in pairs)
+
+
+def in_words(pairs: Sequence[Pair]) -> str:
+    """The verdict as a clause."""
+    ratio, qualified = verdict(pairs)
+    if math.isinf(ratio):
+        return "a run ended early"
+    return f"σ {100 * (ratio - 1):+.1f} % of passive" + ("" if qualified else ", F_m out of range")

@@ -1,0 +1,159 @@
+"""The model file: a Stable-Baselines3 zip with what a policy and a resumed training need besides.
+
+``panto.json`` holds the facts below, ``actor.npz`` the deterministic policy, and ``replay.npz``, in a
+checkpoint of SAC, the replay buffer. A policy is read from the first two alone, so that running a
+model file needs no torch and unpickles nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+from panto_env import __version__
+from panto_env.errors import InputError
+from panto_env.files import write_whole
+from panto_env.settings import Settings
+from panto_env.task import Context
+
+from .actor import Actor
+
+FACTS, ACTOR, REPLAY = "panto.json", "actor.npz", "replay.npz"
+REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+BROKEN = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, ValueError)
+# What reading a damaged zip, JSON or array can raise (pydantic's and JSON's errors are ValueErrors).
+
+
+class Needs(Settings):
+    """What a policy was trained with and must find again."""
+
+    observation: str  # kind of the layout
+    entries: tuple[tuple[str, float], ...]  # name and scale of each observation
+    channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
+    force_limit: float  # N
+    control_interval: float  # s
+
+    @classmethod
+    def of(cls, context: Context) -> Needs:
+        """What an episode offers."""
+        return cls(
+            observation=context.layout.kind,
+            entries=tuple((entry.name, entry.scale) for entry in context.layout.entries),
+            channels=context.channels,
+            force_limit=context.force_limit,
+            control_interval=context.control_interval,
+        )
+
+
+class Facts(Settings):
+    """What a model file says of itself."""
+
+    format: Literal[1] = 1
+    version: str = __version__  # of panto_env
+    algorithm: str
+    seed: int
+    steps: int  # environment steps it has learnt from
+    updates: int  # of the networks, as Stable-Baselines3 counts them
+    environment: dict[str, Any]  # of its training: id and arguments
+    needs: Needs
+    ratio: float | None = None  # at its evaluation: sigma over the passive pantograph's, mean
+    qualified: bool = False  # at its evaluation: whether the mean force kept its range
+    activation: Literal["tanh", "relu"]
+    squashed: bool
+
+
+def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
+    """Write a model file, whole or not at all; with the replay buffer if asked."""
+    with write_whole(path) as temporary:
+        model.save(temporary)
+        with zipfile.ZipFile(temporary, "a") as archive:
+            archive.writestr(FACTS, facts.model_dump_json(indent=1))
+            _store(archive, ACTOR, _flat(actor))
+            if replay:
+                buffer = model.replay_buffer
+                used = buffer.buffer_size if buffer.full else buffer.pos
+                arrays = {name: getattr(buffer, name)[:used] for name in REPLAYED}
+                _store(archive, REPLAY, arrays | {"position": np.array([buffer.pos, buffer.full])})
+
+
+def read_model(path: Path) -> tuple[Facts, Actor]:
+    """What a policy needs of a model file.
+
+    Raises InputError, naming the file, where it is broken or none of ours.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            damaged = archive.testzip()
+            if damaged is not None:
+                raise ValueError(f"its part {damaged} is damaged")
+            if FACTS not in archive.namelist():
+                raise ValueError(f"it holds no {FACTS}, so `panto train` has not written it")
+            facts = Facts.model_validate(json.loads(archive.read(FACTS)))
+            arrays = _load(archive, ACTOR)
+        layers = range(len(arrays) // 2)
+        shape = (len(facts.needs.channels), len(facts.needs.entries))
+        if (arrays[f"bias_{layers[-1]}"].shape[0], arrays["weight_0"].shape[1]) != shape:
+            raise ValueError("its network has another shape than it says")
+        actor = Actor(
+            weights=tuple(arrays[f"weight_{k}"] for k in layers),
+            biases=tuple(arrays[f"bias_{k}"] for k in layers),
+            activation=facts.activation,
+            squashed=facts.squashed,
+        )
+    except FileNotFoundError as error:
+        raise InputError(f"The model file {path} does not exist; check the path.") from error
+    except BROKEN as error:
+        reason = f"its {FACTS} is not valid" if isinstance(error, ValidationError) else str(error)
+        raise InputError(
+            f"{path} is not a whole model file ({reason}); take another, such as an earlier "
+            "checkpoint, or train anew with `panto train`."
+        ) from error
+    return facts, actor
+
+
+def restore(path: Path, model: Any) -> Facts:
+    """Put a checkpoint's networks, optimisers, counts and replay buffer into a new learner.
+
+    Raises InputError where the file is broken or of another algorithm or shape.
+    """
+    from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
+
+    facts, _ = read_model(path)
+    _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
+    try:
+        model.set_parameters(parameters)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"{path} does not fit the training's settings: {error}") from error
+    for name, value in (variables or {}).items():
+        recursive_setattr(model, f"{name}.data", value.data)
+    model.num_timesteps, model._n_updates = facts.steps, facts.updates
+    with zipfile.ZipFile(path) as archive:
+        if REPLAY in archive.namelist():
+            arrays = _load(archive, REPLAY)
+            buffer = model.replay_buffer
+            for name in REPLAYED:
+                getattr(buffer, name)[: len(arrays[name])] = arrays[name]
+            buffer.pos, buffer.full = int(arrays["position"][0]), bool(arrays["position"][1])
+    return facts
+
+
+def _flat(actor: Actor) -> dict[str, Any]:
+    weights = {f"weight_{k}": weight for k, weight in enumerate(actor.weights)}
+    return weights | {f"bias_{k}": bias for k, bias in enumerate(actor.biases)}
+
+
+def _store(archive: zipfile.ZipFile, name: str, arrays: dict[str, Any]) -> None:
+    with archive.open(name, "w", force_zip64=True) as member:
+        np.savez(member, **arrays)
+
+
+def _load(archive: zipfile.ZipFile, name: str) -> dict[str, Any]:
+    with np.load(io.BytesIO(archive.read(name)), allow_pickle=False) as arrays:
+        return dict(arrays)

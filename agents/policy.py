@@ -1,0 +1,73 @@
+"""A trained model as a policy of the benchmark."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.errors import InputError
+from panto_env.task import Context
+
+from .actor import Actor
+from .model_file import Facts, Needs, read_model
+
+PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
+
+
+class TrainedPolicy:
+    """Deterministic policy of a model file; it runs only where it finds what it was trained with."""
+
+    def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
+        """path: named in errors."""
+        self.path, self.facts, self._actor = path, facts, actor
+
+    def reset(self, context: Context) -> None:
+        """Raises InputError where the episode's observation, actuator or interval is another."""
+        needs, offered = self.facts.needs, Needs.of(context)
+        if offered == needs:
+            return
+        raise InputError(f"The model {self.path} does not fit this task: {_difference(needs, offered)}.")
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        return self._actor.act(observation)
+
+
+def load(path: str | Path) -> TrainedPolicy:
+    """Policy of a model file. Raises InputError, naming the file, where it is not a whole one."""
+    return TrainedPolicy(Path(path), *read_model(Path(path)))
+
+
+def _difference(needs: Needs, offered: Needs) -> str:
+    """The first thing that differs, and what to do."""
+    if needs.observation != offered.observation:
+        return (
+            f"it was trained with observation='{needs.observation}', this is "
+            f"'{offered.observation}'; set it so"
+        )
+    if needs.channels != offered.channels:
+        return (
+            f"it was trained with an actuator on place '{PLACES[needs.channels]}', this is on "
+            f"'{PLACES[offered.channels]}'; set actuator={{'place': '{PLACES[needs.channels]}'}}"
+        )
+    if needs.force_limit != offered.force_limit:
+        return (
+            f"its actuator had a force_limit of {needs.force_limit:g} N, this has "
+            f"{offered.force_limit:g} N; set the actuator's force_limit to {needs.force_limit:g}"
+        )
+    if needs.control_interval != offered.control_interval:
+        return (
+            f"it was trained with a control_interval of {needs.control_interval:g} s, this is "
+            f"{offered.control_interval:g} s; set it so"
+        )
+    return (
+        f"it was trained with other observations ({len(needs.entries)}: {_names(needs)}) than this "
+        f"task has ({len(offered.entries)}: {_names(offered)}); take the pantograph of its training "
+        "or train it anew"
+    )
+
+
+def _names(needs: Needs) -> str:
+    return ", ".join(f"{name} / {scale:g}" for name, scale in needs.entries)

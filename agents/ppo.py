@@ -1,0 +1,62 @@
+"""Proximal policy optimisation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from panto_env.errors import InputError
+from panto_env.settings import NonNegative, Positive
+
+from .actor import Actor
+from .algorithm import Algorithm, Count, Share
+
+
+class PPO(Algorithm):
+    """Hyperparameters of PPO."""
+
+    n_steps: Count = Field(512, description="steps of each lane between two updates")
+    n_epochs: Count = Field(10, description="passes over these steps in an update")
+    gae_lambda: Share = Field(0.95, description="bias against variance of the advantage")
+    clip_range: Positive = Field(0.2, description="largest change of an action's probability")
+    ent_coef: NonNegative = Field(0.0, description="weight of the entropy")
+    vf_coef: NonNegative = Field(0.5, description="weight of the value's loss")
+    max_grad_norm: Positive = Field(0.5, description="clip of the gradient")
+    target_kl: Positive | None = Field(None, description="divergence that ends an update early")
+    log_std_init: float = Field(-1.0, description="log of the action's first standard deviation")
+
+    def check(self, lanes: int, total_steps: int) -> None:
+        """Raise InputError where minibatches don't fill the steps of an update exactly."""
+        if lanes * self.n_steps % self.batch_size or lanes * self.n_steps == 1:
+            raise InputError(
+                f"lanes x n_steps = {lanes * self.n_steps} must be a multiple of batch_size = "
+                f"{self.batch_size}, and more than 1"
+            )
+
+    def make(self, lanes: Any, seed: int) -> Any:
+        """Learner for a ``VecEnv``."""
+        import stable_baselines3
+
+        return stable_baselines3.PPO(
+            "MlpPolicy",
+            lanes,
+            learning_rate=self.schedule(),
+            n_steps=self.n_steps,
+            batch_size=self.batch_size,
+            n_epochs=self.n_epochs,
+            gamma=self.gamma,
+            gae_lambda=self.gae_lambda,
+            clip_range=self.clip_range,
+            ent_coef=self.ent_coef,
+            vf_coef=self.vf_coef,
+            max_grad_norm=self.max_grad_norm,
+            target_kl=self.target_kl,
+            policy_kwargs=self.network() | {"log_std_init": self.log_std_init},
+            seed=seed,
+            device="cpu",
+        )
+
+    def actor(self, model: Any) -> Actor:
+        """The mean of the action, which is clipped."""
+        return self.layers(model.policy.mlp_extractor.policy_net, model.policy.action_net)

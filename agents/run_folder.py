@@ -1,0 +1,146 @@
+"""The folder of a training run: what lies where, and what a resumed run finds."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from panto_env.errors import InputError
+from panto_env.files import write_whole
+
+from .evaluation import Pair
+from .model_file import read_model
+from .settings import Training, parse_training
+
+KEPT = 3  # checkpoints; older ones are removed, since those of SAC carry the replay buffer
+EXTENDABLE = "total_steps"  # the one setting that a resumed run may change, upwards
+
+
+class RunFolder:
+    """Paths of a run, and the files that are neither models nor TensorBoard's."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.settings = self.path / "settings.json"
+        self.model = self.path / "model.zip"  # at the end of the training
+        self.best = self.path / "best.zip"  # at the best evaluation
+        self.evaluations = self.path / "evaluations.csv"
+        self.tensorboard = self.path / "tensorboard"
+        self.checkpoints = self.path / "checkpoints"
+
+    def begin(self, training: Training) -> None:
+        """Make the folder of a new run. Raises InputError where there is already something."""
+        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+            raise InputError(
+                f"{self.path} exists already; go on with it by --resume, or give another --output."
+            )
+        self._write_settings(training)
+
+    def resume(self, training: Training) -> None:
+        """Check that a run is there and is this one. Raises InputError where it is not."""
+        if not self.settings.is_file():
+            raise InputError(
+                f"{self.path} holds no run to resume (no {self.settings.name}); train without --resume."
+            )
+        before = self.read_settings()
+        old, new = (_leaves(settings.model_dump(mode="json")) for settings in (before, training))
+        differing = [
+            f"{key} is {new.get(key)!r}, was {old.get(key)!r}"
+            for key in sorted(old.keys() | new.keys())
+            if key != EXTENDABLE and new.get(key) != old.get(key)
+        ]
+        if differing:
+            raise InputError(
+                f"The settings differ from those of the run in {self.path}: {'; '.join(differing)}. "
+                "Take the run's settings, or train into another --output."
+            )
+        if training.total_steps < before.total_steps:
+            raise InputError(
+                f"The run in {self.path} has total_steps = {before.total_steps}; a resumed run may have "
+                f"more, but not fewer ({training.total_steps})."
+            )
+        self._write_settings(training)
+
+    def read_settings(self) -> Training:
+        """Settings of the run. Raises InputError where the file is not whole."""
+        try:
+            table = json.loads(self.settings.read_text(encoding="utf-8"))
+            if not isinstance(table, dict):
+                raise ValueError("it holds no table")
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"{self.settings} could not be read ({error}); train into another --output."
+            ) from error
+        return parse_training(table, str(self.settings))
+
+    def _write_settings(self, training: Training) -> None:
+        with write_whole(self.settings) as temporary:
+            temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
+
+    def checkpoint(self, steps: int) -> Path:
+        """Path of the checkpoint at ``steps``."""
+        return self.checkpoints / f"step-{steps:09d}.zip"
+
+    def newest_checkpoint(self) -> Path | None:
+        """Newest checkpoint that is whole, if there is any."""
+        for path in sorted(self.checkpoints.glob("step-*.zip"), reverse=True):
+            try:
+                read_model(path)
+            except InputError:
+                continue
+            return path
+        return None
+
+    def drop_old_checkpoints(self) -> None:
+        """Keep the newest few."""
+        for path in sorted(self.checkpoints.glob("step-*.zip"))[:-KEPT]:
+            path.unlink()
+
+    def add_evaluation(self, steps: int, pairs: list[Pair]) -> None:
+        """Add an evaluation's rows to the CSV, which is written whole."""
+        rows = self._rows()
+        for pair in pairs:
+            row = {
+                "steps": steps,
+                "speed_kmh": pair.speed_kmh,
+                "seed": pair.seed,
+                "qualified": pair.qualified,
+            }
+            row |= {f"policy_{key}": value for key, value in pair.policy.as_dict().items()}
+            row |= {f"passive_{key}": value for key, value in pair.passive.as_dict().items()}
+            rows.append({key: str(value) for key, value in row.items()})
+        self._write_rows(rows)
+
+    def drop_evaluations_after(self, steps: int) -> None:
+        """Forget evaluations that a resumed run, at ``steps``, makes again."""
+        if self.evaluations.is_file():
+            self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
+
+    def _rows(self) -> list[dict[str, str]]:
+        if not self.evaluations.is_file():
+            return []
+        with self.evaluations.open(newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+    def _write_rows(self, rows: list[dict[str, str]]) -> None:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, fieldnames=list(rows[0]) if rows else ["steps"])
+        writer.writeheader()
+        writer.writerows(rows)
+        with write_whole(self.evaluations) as temporary:
+            temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
+
+
+def _leaves(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested tables under dotted keys."""
+    leaves: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            leaves |= _leaves(value, f"{prefix}{key}.")
+        else:
+            leaves[prefix + key] = value
+    return leaves

@@ -1,0 +1,61 @@
+"""Soft actor-critic."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from panto_env.errors import InputError
+from panto_env.settings import NonNegative
+
+from .actor import Actor
+from .algorithm import Algorithm, Count, Share
+
+
+class SAC(Algorithm):
+    """Hyperparameters of SAC."""
+
+    activation: Literal["tanh", "relu"] = Field("relu", description="of the hidden layers")
+    buffer_size: Count = Field(200_000, description="transitions that the replay buffer holds")
+    learning_starts: Annotated[int, Field(ge=0, strict=True)] = Field(
+        2_000, description="steps with random actions before learning starts"
+    )
+    tau: Share = Field(0.005, description="share of the critic its target takes over in an update")
+    train_freq: Count = Field(1, description="steps of each lane between two updates")
+    gradient_steps: Count = Field(1, description="minibatches in an update")
+    ent_coef: NonNegative | Literal["auto", "auto_0.1", "auto_0.01"] = Field(
+        "auto", description="weight of the entropy; auto: adapted, from 1 or the number behind"
+    )
+
+    def check(self, lanes: int, total_steps: int) -> None:
+        """Raise InputError where learning would never start."""
+        if self.learning_starts >= total_steps:
+            raise InputError(
+                f"learning_starts = {self.learning_starts} must be less than total_steps = {total_steps}"
+            )
+
+    def make(self, lanes: Any, seed: int) -> Any:
+        """Learner for a ``VecEnv``."""
+        import stable_baselines3
+
+        return stable_baselines3.SAC(
+            "MlpPolicy",
+            lanes,
+            learning_rate=self.schedule(),
+            buffer_size=self.buffer_size,
+            learning_starts=self.learning_starts,
+            batch_size=self.batch_size,
+            tau=self.tau,
+            gamma=self.gamma,
+            train_freq=self.train_freq,
+            gradient_steps=self.gradient_steps,
+            ent_coef=self.ent_coef,
+            policy_kwargs=self.network(),
+            seed=seed,
+            device="cpu",
+        )
+
+    def actor(self, model: Any) -> Actor:
+        """The mode of the action, squashed by tanh."""
+        return self.layers(model.actor.latent_pi, model.actor.mu).squash()

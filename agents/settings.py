@@ -1,0 +1,127 @@
+"""A training as TOML, validated."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, SerializeAsAny
+
+from panto_env.envs import IDS
+from panto_env.envs.single import SETTINGS
+from panto_env.errors import InputError
+from panto_env.settings import Positive, Settings, parse, suggest
+from panto_env.task import Task
+
+from .algorithm import Algorithm, Count
+from .ppo import PPO
+from .sac import SAC
+
+ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}
+
+
+class Evaluation(Settings):
+    """How often the policy, without its exploration, is compared with the passive pantograph."""
+
+    interval_steps: Count = Field(description="training steps between evaluations")
+    speeds_kmh: tuple[Positive, ...] | None = Field(
+        None, description="speeds (km/h); the ends and the middle of the training's by default"
+    )
+    seeds: Count = Field(1, description="runs at each speed, with seeds 0, 1, ...")
+
+
+class Training(Settings):
+    """All that defines a training."""
+
+    algorithm: str = Field(description="one of ALGORITHMS")
+    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of everything random")
+    total_steps: Count = Field(description="environment steps, of all lanes together")
+    lanes: Count = Field(8, description="environments side by side")
+    checkpoint_steps: Count = Field(description="training steps between checkpoints")
+    environment: dict[str, Any] = Field(description="id, and arguments of PantographEnv")
+    evaluation: Evaluation
+    hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the environment, those of its id among them."""
+        return arguments(self.environment)
+
+    @property
+    def speeds_kmh(self) -> tuple[float, ...]:
+        """Speeds of the evaluation (km/h)."""
+        return self.evaluation.speeds_kmh or speeds(self.environment)
+
+
+def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of an environment given as a table with its id.
+
+    Raises InputError where the id or the name of an argument is unknown.
+    """
+    name = environment.get("id")
+    if name not in IDS:
+        raise InputError(f"[environment]: unknown id {name!r}: {suggest(str(name), list(IDS))}")
+    given = {key: value for key, value in environment.items() if key != "id"}
+    _check_keys(given, SETTINGS, "[environment]")
+    return {**IDS[name], **given}
+
+
+def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
+    """Ends and middle of an environment's range of speeds, or its one speed (km/h)."""
+    low, high = Task(**arguments(environment)).speed_range
+    return tuple(sorted({round(3.6 * v, 6) for v in (low, (low + high) / 2, high)}))
+
+
+def load_training(path: str | Path, **changes: Any) -> Training:
+    """Read a training from a TOML file; ``changes`` (seed, total_steps) that aren't None win.
+
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    """
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(f"The training file {path} does not exist; give a TOML file's path.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} could not be read: {error}.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
+    given = {key: value for key, value in changes.items() if value is not None}
+    return parse_training(table | given, str(path))
+
+
+def parse_training(table: Mapping[str, Any], name: str) -> Training:
+    """Training from a table. Raises InputError, beginning with ``name``, where it is not valid."""
+    try:
+        _check_keys(table, tuple(Training.model_fields), "the top level")
+        algorithm = table.get("algorithm")
+        if algorithm not in ALGORITHMS:
+            raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
+        kind = ALGORITHMS[str(algorithm)]
+        for key, fields in (("hyperparameters", kind), ("evaluation", Evaluation)):
+            if isinstance(table.get(key), Mapping):
+                _check_keys(table[key], tuple(fields.model_fields), f"[{key}] of {algorithm}")
+        hyperparameters = parse(kind, table.get("hyperparameters", {}), "[hyperparameters]")
+        training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
+        hyperparameters.check(training.lanes, training.total_steps)
+        _check_environment(training)
+    except InputError as error:
+        raise InputError(f"{name}: {str(error).removesuffix('.')}.") from error
+    return training
+
+
+def _check_environment(training: Training) -> None:
+    given = training.arguments
+    try:
+        task = Task(**given)
+        for speed in training.evaluation.speeds_kmh or ():
+            task.check_speeds(speed)
+    except InputError as error:
+        raise InputError(f"[environment]: {error}") from error
+
+
+def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in known:
+            raise InputError(f"unknown key '{key}' in {where}: {suggest(key, known)}")

@@ -1,0 +1,145 @@
+"""Training: from validated settings to a model file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3.common.callbacks import CallbackList
+from stable_baselines3.common.logger import configure
+
+from panto_env.task import Task
+
+from .callbacks import Bar, EpisodeLog, Regular
+from .evaluation import Comparison, Pair, verdict
+from .lanes import make_lanes
+from .model_file import Facts, Needs, read_model, restore, write_model
+from .run_folder import RunFolder
+from .settings import Training
+
+LOGGED = ("mean", "std", "contact_loss", "cost_function")  # figures in the log
+
+
+def train(
+    training: Training, output: str | Path, *, resume: bool = False, progress: bool = True
+) -> RunFolder:
+    """Train a model into the folder ``output``; returns the folder's paths.
+
+    resume: go on from the newest whole checkpoint of the run in ``output`` (from the beginning, if
+    there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
+    episodes are not, so a resumed run is as good as an uninterrupted one, but not the same.
+    progress: show a bar on stderr. Raises InputError where the run exists (or, to resume, does
+    not) or has other settings.
+    """
+    with _one_thread(), ExitStack() as stack:
+        lanes = make_lanes(training)
+        stack.callback(lanes.close)
+        run = Run(training, RunFolder(output), lanes)
+        if resume:
+            run.folder.resume(training)
+            run.restore()
+        else:
+            run.folder.begin(training)
+        run.learn(stack, progress)
+    return run.folder
+
+
+class Run:
+    """A learner, its folder, and what is done with both between two rollouts."""
+
+    def __init__(self, training: Training, folder: RunFolder, lanes: Any) -> None:
+        """lanes: ``VecEnv`` to learn from."""
+        self.training, self.folder = training, folder
+        self.model = training.hyperparameters.make(lanes, training.seed)
+        self.pairs: list[Pair] = []  # of the last evaluation
+        self._needs = Needs.of(Task(**training.arguments).context(0))
+        self._best = (False, -math.inf)  # evaluation of the best model: qualified, minus the ratio
+        self._comparison = Comparison(training.arguments, training.speeds_kmh, training.evaluation.seeds)
+
+    def restore(self) -> None:
+        """Take up the newest whole checkpoint, if there is one."""
+        newest = self.folder.newest_checkpoint()
+        if newest is not None:
+            restore(newest, self.model)
+            # Else lanes and exploration would begin again with the first random numbers.
+            self.model.set_random_seed(self.training.seed + self.model.num_timesteps)
+        if self.folder.best.is_file():
+            facts, _ = read_model(self.folder.best)
+            self._best = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
+        self.folder.drop_evaluations_after(self.model.num_timesteps)
+
+    def learn(self, stack: ExitStack, progress: bool) -> None:
+        """Learn the steps that are left, and write the final model."""
+        left = self.training.total_steps - self.model.num_timesteps
+        if left <= 0 and self.folder.model.is_file():
+            return
+        self.model.set_logger(configure(str(self.folder.tensorboard), ["tensorboard"]))
+        stack.callback(self.model.logger.close)
+        # Evaluations first: then no checkpoint lies behind the table of evaluations.
+        callbacks: list[Any] = [
+            EpisodeLog(LOGGED),
+            Regular(self.training.evaluation.interval_steps, self.evaluate),
+            Regular(self.training.checkpoint_steps, self.checkpoint),
+        ]
+        if progress:
+            bar = Bar(self.training.total_steps, lambda: self.pairs)
+            callbacks.append(stack.enter_context(bar))
+        if left > 0:
+            self.model.learn(
+                left, callback=CallbackList(callbacks), log_interval=1, reset_num_timesteps=False
+            )
+        self._save(self.folder.model)
+
+    def evaluate(self) -> None:
+        """Compare the policy with the passive pantograph; add to table and log; keep the best."""
+        steps, logger = self.model.num_timesteps, self.model.logger
+        self.pairs = self._comparison.run(self.training.hyperparameters.actor(self.model))
+        ratio, qualified = verdict(self.pairs)
+        self.folder.add_evaluation(steps, self.pairs)
+        logger.record("evaluation/std_ratio", ratio)
+        for pair in self.pairs:
+            for name in LOGGED:
+                value = pair.policy.as_dict()[name]
+                logger.record_mean(f"evaluation/{name}_{pair.speed_kmh:g}_kmh", value)
+        logger.dump(steps)
+        if (qualified, -ratio) > self._best or not self.folder.best.is_file():
+            self._best = (qualified, -ratio)
+            self._save(self.folder.best)
+
+    def checkpoint(self) -> None:
+        """Write a checkpoint; drop the oldest."""
+        replay = hasattr(self.model, "replay_buffer")
+        self._save(self.folder.checkpoint(self.model.num_timesteps), replay)
+        self.folder.drop_old_checkpoints()
+
+    def _save(self, path: Path, replay: bool = False) -> None:
+        actor = self.training.hyperparameters.actor(self.model)
+        ratio, qualified = verdict(self.pairs) if self.pairs else (math.inf, False)
+        facts = Facts(
+            algorithm=self.training.algorithm,
+            seed=self.training.seed,
+            steps=self.model.num_timesteps,
+            updates=self.model._n_updates,
+            environment=self.training.environment,
+            needs=self._needs,
+            ratio=None if math.isinf(ratio) else ratio,
+            qualified=qualified,
+            activation=actor.activation,
+            squashed=actor.squashed,
+        )
+        write_model(path, self.model, actor, facts, replay)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """More threads gain networks this small nothing, and cost much where the cores are shared."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
