@@ -15,8 +15,15 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[agents,dev]'
 	@touch $@
 
+# Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
+DEMO := runs/demo
 demo: $(READY)
-	$(BIN)/python -m panto_baselines.demo
+	rm -rf $(DEMO)
+	$(BIN)/panto validate
+	$(BIN)/panto train configs/ppo-quick.toml --output $(DEMO)/ppo-en50318
+	$(BIN)/panto train configs/ppo-quick-shinkansen.toml --output $(DEMO)/ppo-shinkansen
+	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --plot $(DEMO)/benchmark.png
+	@echo "The picture is $(DEMO)/benchmark.png, every figure is in $(DEMO)/benchmark.json."
 
 lint: $(READY)
 	$(BIN)/ruff check .
