@@ -122,9 +122,7 @@ def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
         distance=line.distance,
         control_interval=settings.control_interval,
     )
-    # A run is whole control steps: the fastest can end almost one before the end.
-    surely = task.distance - task.speed_range[1] * settings.control_interval
-    last = math.floor(surely / task.plant.catenary.span_length)
+    last = math.floor(task.distance / task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SPAN, last)
     where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
     if not 1 <= first <= last:
@@ -132,7 +130,7 @@ def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
             f"There are no spans {first} to {last} to evaluate {where}; "
             "give a longer distance, or spans of your own."
         )
-    if last * task.plant.catenary.span_length > surely:
+    if last * task.plant.catenary.span_length > task.distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
     return first, last
 

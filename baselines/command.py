@@ -49,10 +49,9 @@ def benchmark(
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    from panto_env.figures import save
+    from panto_env.figures import check_picture, save
 
     from .benchmark import check_format, run
-    from .plot import check_picture
     from .plot import plot as draw
     from .report import WIDTH, tables
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from panto_env.errors import InputError
 from panto_env.figures import mark_supports
 from panto_env.metrics import low_pass
 
@@ -19,14 +17,6 @@ from .statistics import Cell
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-SUFFIXES = (".png", ".svg", ".pdf")
-
-
-def check_picture(path: str | Path) -> None:
-    """Raise InputError unless a picture can be written under this name."""
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path} must end in one of {', '.join(SUFFIXES)}.")
 
 
 def plot(outcome: Benchmark) -> Figure:

@@ -16,13 +16,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure, whole or not at all. Raises InputError for a suffix that is not a picture's."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+SUFFIXES = (".png", ".svg", ".pdf")
 
-    known = FigureCanvasAgg(figure).get_supported_filetypes()
-    if Path(path).suffix[1:].lower() not in known:
-        raise InputError(f"The plot {path} must end in one of .{', .'.join(sorted(known))}; .png will do.")
+
+def check_picture(path: str | Path) -> None:
+    """Raise InputError unless a picture can be written under this name."""
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InputError(f"The plot {path} must end in one of {', '.join(SUFFIXES)}.")
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure, whole or not at all. Raises InputError for a name that is not a picture's."""
+    check_picture(path)
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
 

@@ -115,7 +115,7 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
         {"speeds_kmh": [250], "catenary": "periodic-stiffness", "pantograph": "three-mass"},
     ]
     done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
-    assert done.spans[0] == (4, 8)
+    assert done.spans[0] == (4, 9)
     assert done.spans[1][0] == 4
     # That line has no supports: the uplift is nan, which JSON does not know.
     assert math.isnan(done.cells[1].figures["max_uplift"])
@@ -302,7 +302,7 @@ def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> 
 def test_command_prints_a_table_for_people() -> None:
     result = called("p:gain=0.5")
     assert result.exit_code == 0, result.output
-    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 4–8"):
+    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 4–9"):
         assert words in result.stdout
 
 

@@ -68,7 +68,13 @@ def simulate(
     if spacing is not None:
         settings["spacing"] = spacing
     chosen = parse_spans(spans)
-    with Progress(console=progress_console, transient=True) as progress:
+    if plot is not None:
+        from ..figures import check_picture, plot_run, save
+
+        check_picture(plot)
+    with Progress(
+        console=progress_console, transient=True, disable=not progress_console.is_terminal
+    ) as progress:
         bar = progress.add_task("simulating", total=1.0)
         trajectory = run(
             catenary,
@@ -83,9 +89,7 @@ def simulate(
     if output is not None:
         trajectory.save(output)
     if plot is not None:
-        from .. import figures as figures_module
-
-        figures_module.save(figures_module.plot_run(trajectory, chosen), plot)
+        save(plot_run(trajectory, chosen), plot)
     if json:
         print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
         return

@@ -20,11 +20,13 @@ def validate(
     json: Json = False,
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
-    runs = validation.reference_runs()
-    checks = validation.check(runs)
     if plot is not None:
         from .. import figures
 
+        figures.check_picture(plot)
+    runs = validation.reference_runs()
+    checks = validation.check(runs)
+    if plot is not None:
         labels = [f"{run.speed_kmh:g} km/h" for run in runs]
         title = "Reference model of EN 50318:2002, spans 5 and 6"
         figures.save(figures.plot_forces(runs, labels, validation.SPANS, title), plot)

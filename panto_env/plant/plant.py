@@ -88,7 +88,7 @@ class Plant:
     @property
     def line_length(self) -> float:
         """How far a run can go (m)."""
-        return self.spans * self.catenary.span_length
+        return float(self.model.line_length(self.catenary, self.spans))
 
     def check_speed(self, speed: float) -> None:
         """Raise InputError unless a train can run at this speed (m/s) under this line."""

@@ -150,9 +150,11 @@ class Task:
         return low, high
 
     def _steps(self, speed: float) -> int:
-        """Plant steps of an episode, whole control steps (at least one)."""
-        seconds = self.distance / speed
-        return max(1, math.floor(seconds / self.control_interval + 1e-9)) * self.control_steps
+        """Plant steps of an episode: whole control steps that cover the distance and stay on the line."""
+        stride = speed * self.control_interval
+        wanted = math.ceil(self.distance / stride - 1e-9)
+        possible = self.plant.line_length / stride + 1e-9
+        return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
     def reset(self, lane: int, random: np.random.Generator, speed: float | None = None) -> None:
         """Start an episode in one lane: draw its speed (m/s, unless given) and its line."""

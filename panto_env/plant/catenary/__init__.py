@@ -1,6 +1,8 @@
-"""The catenaries: one model a file. Each module provides the functions that ``Plant`` calls
-(``wave_speed``, ``line_end``, ``build``, ``at_rest``, ``start_point``, ``settle``, ``supports``,
-``droppers``) and overloads those of ``coupling`` for its own type of line.
+"""The catenaries: one model a file.
+
+Each module provides the functions that ``Plant`` calls (``wave_speed``, ``line_length``, ``line_end``,
+``build``, ``at_rest``, ``start_point``, ``settle``, ``supports``, ``droppers``) and overloads those of
+``coupling`` for its own type of line.
 """
 
 from types import ModuleType

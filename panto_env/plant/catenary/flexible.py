@@ -27,6 +27,11 @@ def wave_speed(data: FlexibleCatenaryData) -> float:
     return float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
 
 
+def line_length(data: FlexibleCatenaryData, spans: int) -> float:
+    """How far a run can go (m): to the far anchor."""
+    return spans * data.span_length
+
+
 def line_end(data: FlexibleCatenaryData, spans: int) -> float:
     """How far a run goes unless told otherwise (m): to the last span, whose anchor reflects waves."""
     return (spans - 1) * data.span_length

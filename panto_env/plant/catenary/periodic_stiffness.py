@@ -32,6 +32,11 @@ def wave_speed(data: PeriodicStiffnessData) -> float:
     return np.inf
 
 
+def line_length(data: PeriodicStiffnessData, spans: int) -> float:
+    """How far a run can go (m): the line has no end."""
+    return np.inf
+
+
 def line_end(data: PeriodicStiffnessData, spans: int) -> float:
     """How far a run goes unless told otherwise (m)."""
     return spans * data.span_length

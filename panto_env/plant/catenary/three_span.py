@@ -50,6 +50,11 @@ def wave_speed(data: ThreeSpanData) -> float:
     return float(np.sqrt(data.wire.tension / data.wire.mass))
 
 
+def line_length(data: ThreeSpanData, spans: int) -> float:
+    """How far a run can go (m): the line has no end."""
+    return np.inf
+
+
 def line_end(data: ThreeSpanData, spans: int) -> float:
     """How far a run goes unless told otherwise (m)."""
     return spans * data.span_length
