@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from .plant.numerics import Numerics
 from .simulation import simulate
 from .trajectory import Trajectory
 
@@ -53,7 +54,7 @@ class Check:
 
 
 def reference_runs(**numerics: Any) -> list[Trajectory]:
-    """The reference model's run at each speed; numerics: ``time_step`` (s), ``spacing`` (m)."""
+    """The reference model's run at each speed; numerics: keys of ``Numerics``."""
     return [simulate(REFERENCE_MODEL, REFERENCE_MODEL, speed, **numerics) for speed in SPEEDS_KMH]
 
 
@@ -68,5 +69,15 @@ def check(runs: list[Trajectory]) -> list[Check]:
     return checks
 
 
-GRIDS = ((0.5, 2e-3), (0.5, 1e-3), (0.25, 1e-3), (0.25, 5e-4), (0.125, 2.5e-4))
-"""Grid (m) and time step (s) of the convergence table, the last taken as converged."""
+WHOLE = 0
+DISCRETISATIONS = (
+    Numerics(spacing=0.125, time_step=2.5e-4, window=WHOLE, precision="double"),
+    Numerics(spacing=0.25, time_step=5e-4, window=WHOLE, precision="double"),
+    Numerics(spacing=0.25, time_step=1e-3, window=WHOLE, precision="double"),
+    Numerics(spacing=0.5, time_step=2e-3, window=WHOLE, precision="double"),
+    Numerics(spacing=1 / 3, time_step=2e-3, window=WHOLE, precision="double"),
+    Numerics(spacing=1 / 3, time_step=2e-3, window=WHOLE, precision="single"),
+    Numerics(),
+    Numerics(window=5),
+)
+"""Rows of the convergence table; the first is taken as converged."""

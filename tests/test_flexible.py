@@ -7,21 +7,23 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.schema import Rayleigh, Support
 from panto_env.plant import coupling
 from panto_env.plant.catenary import flexible
+from panto_env.plant.jit import OPTIONS
+from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 
 from .judge import finite_element
 
+WHOLE = {"window": 0, "precision": "double"}
 
-@numba.njit
-def travel(line, wire, start, stride, force, steps):
+
+@numba.njit(**OPTIONS)
+def travel(line, wire, start, stride, force, heights):
     """Move a constant force along the line; heights of the wire under it."""
-    heights = np.zeros(steps)
-    for n in range(steps):
+    for n in range(heights.size):
         x0, x1 = start + stride * n, start + stride * (n + 1)
         height, compliance, _ = coupling.move_wire(line, wire, 0, x0, x1, force)
         coupling.load_wire(line, wire, 0, x0, x1, force)
         heights[n] = height + compliance * force
-    return heights
 
 
 def undamped(line):
@@ -30,18 +32,20 @@ def undamped(line):
     )
 
 
-def test_force_travelling_along_a_string_matches_the_closed_form():
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     """From an anchor, d'Alembert and one image give w(vt, t) = F v t / (m c (c + v))."""
     line = undamped(load_catenary("en50318-2002"))
     string = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
     limp = line.droppers.model_copy(update={"stiffness": 1e-6})
     alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
     step, speed, force = 1e-3, 300 / 3.6, 100.0
-    built = flexible.build(alone, 10, 0.25, step)
+    built = flexible.build(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
     bare = built._replace(shape=np.zeros_like(built.shape))
     wire = flexible.at_rest(bare, 1)
     steps = 3000  # before the far anchor's reflection
-    heights = travel(bare, wire, 0.0, speed * step, force, steps)
+    heights = np.zeros(steps)
+    travel(bare, wire, 0.0, speed * step, force, heights)
     time = step * (np.arange(steps) + 1)
     wave = np.sqrt(string.tension / string.mass)
     exact = force * speed * time / (string.mass * wave * (wave + speed))
@@ -50,23 +54,20 @@ def test_force_travelling_along_a_string_matches_the_closed_form():
 
 def energy(line, wire, step):
     """Energy (J) of the discrete line at mid-step: kinetic, of the wires, springs and droppers."""
-    now, old = wire.displacement[0, wire.now[0]], wire.displacement[0, 1 - wire.now[0]]
-    middle = (now + old) / 2
+    now, move = wire.displacement[0], wire.increment[0]
+    old, middle = now - move, now - move / 2
     total = 0.0
     for w in range(2):
-        inner = slice(flexible.PAD + 1, -flexible.PAD - 1)
-        mass = step**2 / line.mobility[w, inner]
-        total += (mass * (now[w, inner] - old[w, inner]) ** 2).sum() / (2 * step**2)
-        bare = mass[0] if line.inertia[w, inner].min() == 1 else np.nan
-        c0, c1, c2 = line.inner[w]
+        mass = step**2 / line.mobility[w, 10]  # of a node; all are alike on this line
+        total += mass * (move[w, 3:-3] ** 2).sum() / (2 * step**2)
+        near, far = line.stencil[w, :2]
         u = old[w]
-        pull = c0 * u[2:-2] + c1 * (u[1:-3] + u[3:-1]) + c2 * (u[:-4] + u[4:])
-        total -= (now[w, 2:-2] * pull).sum() * bare / (2 * step**2)
-    total += (line.support_spring.sum(axis=1) * middle[:, line.support_node].T ** 2).sum() / 2
-    extension = sum(
-        line.dropper_weight[:, k] * (middle[1, line.dropper_node + k] - middle[0, line.dropper_node + k])
-        for k in range(4)
-    )
+        pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
+        total -= (now[w, 2:-2] * pull).sum() * mass / (2 * step**2)
+    springs = line.support_spring.sum(axis=2)
+    total += (springs * middle[:, line.support_node].T ** 2).sum() / 2
+    relative = middle[1] - middle[0]
+    extension = sum(line.dropper_weight[:, k] * relative[line.dropper_node + k] for k in range(4))
     stiffness, static = line.dropper_stiffness, line.dropper_static
     taut = stiffness * extension**2 / 2
     slack = -static * extension - static**2 / stiffness / 2
@@ -74,19 +75,22 @@ def energy(line, wire, step):
 
 
 @pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
-def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
+@pytest.mark.parametrize(("precision", "bar"), [("double", 1e-6), ("single", 2e-3)])
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, bar):
     step = 1e-3
-    line = flexible.build(undamped(load_catenary("en50318-2002")), 10, 0.25, step)
+    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
+    line = flexible.build(undamped(load_catenary("en50318-2002")), 10, numerics)
     wire = flexible.at_rest(line, 1)
-    x = line.spacing * np.arange(line.inertia.shape[1])
+    x = line.spacing * np.arange(line.mobility.shape[1])
     wire.displacement[0] = height * np.exp(-(((x - 300) / 4) ** 2))
-    travel(line, wire, 300.0, 0.0, 0.0, 1)
+    steps = np.zeros(100)
+    travel(line, wire, 300.0, 0.0, 0.0, steps[:1])
     first, largest, slack = energy(line, wire, step), 0.0, False
     for _ in range(100):
-        travel(line, wire, 300.0, 0.0, 0.0, 100)
+        travel(line, wire, 300.0, 0.0, 0.0, steps)
         largest = max(largest, abs(energy(line, wire, step) / first - 1))
-        slack |= bool((wire.tension == 0).any())
-    assert largest < 1e-6
+        slack |= bool((wire.change[0] <= -line.dropper_static).any())
+    assert largest < bar
     assert slack == goes_slack
 
 
@@ -94,7 +98,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
 def test_agrees_with_the_finite_element_judge(speed):
     """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
-    run = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4)
+    run = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4, **WHOLE)
     ours = run.summary((5, 6))
     judged = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
     judge = finite_element.figures(judged, line.span_length)
@@ -119,7 +123,7 @@ def test_agrees_with_the_finite_element_judge(speed):
 )
 def test_agrees_with_the_judge_on_other_lines(line, pantograph, speed):
     data, panto = load_catenary(line), load_pantograph(pantograph)
-    ours = simulate(line, pantograph, speed, spacing=0.125, time_step=1.25e-4).summary((5, 6))
+    ours = simulate(line, pantograph, speed, spacing=0.125, time_step=1.25e-4, **WHOLE).summary((5, 6))
     judged = finite_element.simulate(
         data, panto, speed, element=0.25, time_step=2.5e-4, distance=6.1 * data.span_length
     )
@@ -129,7 +133,7 @@ def test_agrees_with_the_judge_on_other_lines(line, pantograph, speed):
 @pytest.mark.parametrize("speed", [250.0, 300.0])
 def test_default_grid_and_step_are_converged(speed):
     run = simulate("en50318-2002", "en50318-2002", speed)
-    fine = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4)
+    fine = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4, **WHOLE)
     assert run.summary((5, 6)).std == pytest.approx(fine.summary((5, 6)).std, rel=0.01)
 
 
@@ -140,11 +144,11 @@ def test_droppers_go_slack_under_the_pantograph(reference_run):
 
 def test_slackening_matters(monkeypatch):
     """With droppers that push, sigma is far off: the model would fail EN 50318."""
-    stiff = flexible.build
+    honest = flexible.build
 
     def never_slack(*arguments):
-        line = stiff(*arguments)
-        return line._replace(dropper_static=line.dropper_static + 1e6)
+        line = honest(*arguments)
+        return line._replace(dropper_static=line.dropper_static + np.float32(1e6))
 
     monkeypatch.setattr(flexible, "build", never_slack)
     assert simulate().summary((5, 6)).std > 45

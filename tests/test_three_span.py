@@ -4,6 +4,7 @@ import pytest
 from panto_env import simulate
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary import three_span
+from panto_env.plant.numerics import Numerics
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def test_static_compliance_is_the_string_s_between_springs(data):
     stringy = data.model_copy(
         update={"wire": data.wire.model_copy(update={"bending_stiffness": 0.0}), "modes": 400}
     )
-    line = three_span.build(stringy, 10, 0.0, 1e-3)
+    line = three_span.build(stringy, 10, Numerics())
     _, compliance, _ = three_span.start_point(line)
     a, tension, spring = data.span_length, data.wire.tension, data.suspension_stiffness
     system = np.array([[2 * tension / a + spring, -tension / a], [-tension / a, 2 * tension / a + spring]])
@@ -52,7 +53,7 @@ def test_modes_propagate_exactly(data):
 
 
 def test_projection_moves_the_deflection_back_by_one_span(data):
-    line = three_span.build(data, 10, 0.0, 1e-3)
+    line = three_span.build(data, 10, Numerics())
     _, vectors = three_span.modes(data)
     x = np.linspace(0, 3 * data.span_length, 721)
     # A smooth bump in the second and third span that ends at rest.
@@ -77,6 +78,6 @@ def test_steady_run_is_periodic_in_the_span():
 def test_converges_in_the_time_step():
     fine, coarse = (
         simulate("ohl-three-span", "dsa350", 250.0, time_step=step).summary((5, 6)).std
-        for step in (2.5e-4, 1e-3)
+        for step in (2.5e-4, 2e-3)
     )
     assert coarse == pytest.approx(fine, rel=0.01)

@@ -46,6 +46,9 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of irregularity and noise.")] = 0,
     time_step: Annotated[float | None, typer.Option(help="Time step (ms).")] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid of the flexible line (m).")] = None,
+    window: Annotated[
+        int | None, typer.Option(help="Spans computed about the train, odd; 0: the whole line.")
+    ] = None,
     bilateral: Annotated[
         bool, typer.Option("--bilateral", help="Let the contact pull, as paper 3 does.")
     ] = False,
@@ -67,6 +70,8 @@ def simulate(
         settings["time_step"] = 1e-3 * time_step
     if spacing is not None:
         settings["spacing"] = spacing
+    if window is not None:
+        settings["window"] = window
     chosen = parse_spans(spans)
     if plot is not None:
         from ..figures import check_picture, plot_run, save

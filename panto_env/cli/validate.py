@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
 from .. import validation
-from ..plant.plant import SPACING, TIME_STEP
 from .output import Json, Plot, console, number, print_json, progress_console
 
 
@@ -60,51 +59,41 @@ def _print_checks(checks: list[validation.Check]) -> None:
         table.add_row(*cells)
     console.print(table)
     console.print(
-        f"Grid {SPACING:g} m, time step {1e3 * TIME_STEP:g} ms. The catalogue entry en50318-2002 says "
-        "which open values were chosen, and how: `panto list en50318-2002`."
+        "The catalogue entry en50318-2002 says which open values were chosen, and how: "
+        "`panto list en50318-2002`."
     )
 
 
-def _convergence() -> list[dict[str, float]]:
+def _convergence() -> list[dict[str, Any]]:
     rows = []
-    for spacing, step in validation.GRIDS:
-        with progress_console.status(f"grid {spacing:g} m, step {1e3 * step:g} ms"):
-            runs = validation.reference_runs(spacing=spacing, time_step=step)
+    for numerics in validation.DISCRETISATIONS:
+        keys = numerics.model_dump()
+        with progress_console.status(str(numerics)):
+            runs = validation.reference_runs(**keys)
         for run in runs:
             figures = run.summary(validation.SPANS).as_dict()
-            rows.append({"spacing": spacing, "time_step": step, "speed_kmh": run.speed_kmh} | figures)
+            rows.append(keys | {"speed_kmh": run.speed_kmh} | figures)
     return rows
 
 
-def _print_convergence(rows: list[dict[str, float]]) -> None:
-    table = Table(title="Convergence; σ relative to the finest")
-    for heading in (
-        "km/h",
-        "grid (m)",
-        "step (ms)",
-        "F_m (N)",
-        "σ (N)",
-        "σ (%)",
-        "max (N)",
-        "min (N)",
-    ):
+def _print_convergence(rows: list[dict[str, Any]]) -> None:
+    table = Table(title="Convergence; σ relative to the first row of its speed")
+    for heading in ("km/h", "grid\n(m)", "step\n(ms)", "window\n(spans)", "precision", "F_m\n(N)", "σ\n(N)"):
         table.add_column(heading, justify="right")
-    table.add_column("uplift (mm)", justify="right")
-    finest = {row["speed_kmh"]: row["std"] for row in rows}  # the last row of a speed is the finest
-    for row in sorted(rows, key=lambda row: row["speed_kmh"]):
-        relative = 100 * (row["std"] / finest[row["speed_kmh"]] - 1)
-        values = (
-            row["mean"],
-            row["std"],
-            relative,
-            row["max"],
-            row["min"],
-            1e3 * row["max_uplift"],
-        )
-        table.add_row(
-            f"{row['speed_kmh']:g}",
-            f"{row['spacing']:g}",
-            f"{1e3 * row['time_step']:g}",
-            *(number(value, 2) for value in values),
-        )
+    for heading in ("σ\n(%)", "max\n(N)", "min\n(N)", "uplift\n(mm)"):
+        table.add_column(heading, justify="right")
+    for speed in validation.SPEEDS_KMH:
+        own = [row for row in rows if row["speed_kmh"] == speed]
+        for row in own:
+            relative = 100 * (row["std"] / own[0]["std"] - 1)
+            values = (row["mean"], row["std"], relative, row["max"], row["min"], 1e3 * row["max_uplift"])
+            table.add_row(
+                f"{speed:g}",
+                "auto" if row["spacing"] is None else f"{row['spacing']:.3g}",
+                f"{1e3 * row['time_step']:g}",
+                str(row["window"] or "all"),
+                row["precision"],
+                *(number(value, 2) for value in values),
+            )
+        table.add_section()
     console.print(table)

@@ -30,6 +30,8 @@ SETTINGS = (
     "control_interval",
     "time_step",
     "spacing",
+    "window",
+    "precision",
     "bilateral",
 )
 
@@ -86,7 +88,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     `catenary`, `pantograph` (catalogue names or TOML files), `speed_kmh` (a number or a range to draw
     from), `actuator` ("ideal", "realistic" or a table), `sensors` (likewise), `line_condition` ("new",
     "fair", "worn" or a table), `observation` ("measured" or "full"), `reward` (a table of weights),
-    `distance` (m), `spans`, `control_interval` (s), `time_step` (s), `spacing` (grid, m), `bilateral`
+    `distance` (m), `spans`, `control_interval` (s), `time_step` (s), `spacing` (grid, m),
+    `window` (spans computed about the train), `precision`, `bilateral`
     (let the contact pull, as paper 3's equations do), `render_mode` (None or "rgb_array").
     `reset(options=...)` takes the same for one episode, but those that change a space.
 

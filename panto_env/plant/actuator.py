@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..arrays import Array
 from ..settings import NonNegative, Positive, Settings
-from .jit import kernel
+from .jit import part
 
 FRAME, HEAD = 0, 1  # the two places a force can act, columns of every (lanes, 2) array below
 
@@ -70,7 +70,7 @@ def release(drive: Drive, lane: int) -> None:
     drive.cursor[lane] = 0
 
 
-@kernel
+@part
 def actuate(drive, lane, frame_command, head_command):
     """Move one lane's actuators one step towards their commands (N); forces into ``drive.force``."""
     depth = drive.delayed.shape[2]

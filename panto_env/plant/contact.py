@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .jit import kernel
+from .jit import part
 
 
-@kernel
+@part
 def contact_force(stiffness_0, gap_0, stiffness_1, gap_free, damping, compliance, lowest):
     """Mean contact force over one step (N), implicit and without sub-iteration.
 

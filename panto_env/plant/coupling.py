@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from .actuator import FRAME, HEAD, actuate
 from .contact import contact_force
-from .jit import kernel
+from .jit import kernel, part
 from .pantograph import move_free, press
 
 # Columns of the samples. Each is the mean over one step, so it belongs to the middle of the step.
@@ -68,7 +68,7 @@ def record_wire(line: Any, wire: Any, lane: int, uplift: Array, tension: Array) 
     raise NotImplementedError("a catenary overloads this for its type of line")
 
 
-@kernel
+@part
 def irregularity(waves, x):
     """Height of the contact wire's irregularity (m) at x (m): a sum of cosines."""
     total = 0.0

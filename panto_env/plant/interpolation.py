@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .jit import kernel
+from .jit import part
 
 
-@kernel
+@part
 def cubic_weights(fraction):
     """Lagrange weights of the nodes at -1, 0, 1, 2 for a point at ``fraction`` in [0, 1)."""
     s = fraction

@@ -19,6 +19,13 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGE = Path(__file__).resolve().parents[1]
 
+# "contract" lets multiply and add fuse; it leaves the order of operations alone. Kernels allocate
+# nothing, so without Numba's run-time they need not count references to the arrays they are given.
+OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
+PART: dict[str, Any] = OPTIONS | {"forceinline": True}
+"""Options of a part of a kernel: always inlined, since passing tuples of arrays by value costs more
+than most parts do."""
+
 
 @cache
 def source_hash() -> str:
@@ -50,12 +57,32 @@ def cache_folder() -> Path:
 
 
 def kernel(function: F) -> F:
-    """Compile ``function`` with Numba on its first call; keep the result on disk."""
+    """Compile ``function`` with Numba on its first call; keep the result on disk.
+
+    A kernel runs without Python's lock, so that threads can share the lanes of a batch.
+    """
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder())  # read by Numba when it decorates
     try:
-        # "contract" lets multiply and add fuse; it leaves the order of operations alone.
-        compiled: F = numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")(function)
+        compiled: F = numba.njit(cache=True, nogil=True, **OPTIONS)(function)
         return compiled
     finally:
         numba.config.CACHE_DIR = previous
+
+
+def part(function: F) -> F:
+    """Compile a part of kernels with Numba, inlined where it is called."""
+    compiled: F = numba.njit(**PART)(function)
+    return compiled
+
+
+def bind(compiled: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
+    """A kernel's entry for arguments of these types, to be called with such arguments alone.
+
+    It skips Numba's look at the type of every argument, which takes microseconds where tuples hold
+    fifty arrays, and more than the kernel itself.
+    """
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    compiled.compile(signature)  # type: ignore[attr-defined]
+    entry: Callable[..., Any] = compiled.overloads[signature].entry_point  # type: ignore[attr-defined]
+    return entry

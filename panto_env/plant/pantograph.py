@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from ..arrays import Array
 from ..catalog.schema import PantographData
-from .jit import kernel
+from .jit import part
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
@@ -53,6 +52,8 @@ def matrices(pantograph: PantographData) -> tuple[Array, Array]:
 
 def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Array]:
     """Exact transition, (2n, 2n), and inputs, (2n, 3), for forces held over ``time_step`` (s)."""
+    from scipy.linalg import expm  # slow to import
+
     a, b = matrices(pantograph)
     n, m = b.shape
     block = np.zeros((n + m, n + m))
@@ -91,7 +92,7 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
     return np.concatenate([np.linalg.solve(stiffness, load), np.zeros(n)])
 
 
-@kernel
+@part
 def move_free(body, lane, frame_force, head_force):
     """State of one lane after a step without contact force, into ``body.free``; the head's height."""
     state, free = body.state[lane], body.free[lane]
@@ -104,7 +105,7 @@ def move_free(body, lane, frame_force, head_force):
     return free[0]
 
 
-@kernel
+@part
 def press(body, lane, contact_force):
     """End the step of one lane: the free motion and what the contact force adds to it."""
     state, free = body.state[lane], body.free[lane]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from ..arrays import Array
@@ -11,11 +14,8 @@ from . import actuator as actuators
 from . import coupling, pantograph
 from .catenary import MODELS
 from .coupling import CHANNELS, Run, Samples
-
-TIME_STEP = 1e-3
-"""Time step (s). With SPACING, sigma is within 0.5 % of the converged value: docs/validation.md."""
-SPACING = 0.25
-"""Grid of the flexible catenary (m)."""
+from .jit import bind
+from .numerics import Numerics
 
 
 class Plant:
@@ -28,8 +28,7 @@ class Plant:
         *,
         lanes: int = 1,
         spans: int | None = None,
-        time_step: float = TIME_STEP,
-        spacing: float = SPACING,
+        numerics: Numerics | None = None,
         actuator: actuators.Actuator | None = None,
         waves: int = 0,
         bilateral: bool = False,
@@ -37,24 +36,24 @@ class Plant:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
         waves: cosines of irregularity a lane may have. bilateral: let the contact pull, as paper 3's
-        equations do. Raises InputError where the step (s) or grid (m) is not usable.
+        equations do. Raises InputError where grid and step are not usable.
         """
-        for name, value in (("time_step", time_step), ("spacing", spacing)):
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"{name} must be a positive number, not {value!r}.")
+        numerics = numerics or Numerics()
         if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
             raise InputError(f"spans must be a whole number from 3 to 1000, not {spans!r}.")
         self.catenary, self.pantograph = catenary, pantograph_data
         self.spans = spans or catenary.spans
-        self.time_step = time_step
+        self.time_step = time_step = numerics.time_step
         self.model = MODELS[catenary.kind]  # type: ignore[attr-defined]
-        self.line = self.model.build(catenary, self.spans, spacing, time_step)
+        self.line = self.model.build(catenary, self.spans, numerics)
         self.wire = self.model.at_rest(self.line, lanes)
         self.body = pantograph.body(pantograph_data, time_step, lanes)
         self.actuator = actuator or actuators.Actuator()
         self.drive = actuators.drive(self.actuator, time_step, lanes)
         self.supports = self.model.supports(catenary, self.spans)
         self.droppers = self.model.droppers(catenary, self.spans)
+        self._static_tension = self.model.static_tension(catenary, self.spans)
+        self._advance: Callable[..., Any] | None = None
 
         stiffness = pantograph_data.contact_stiffness
         if stiffness == "rigid":
@@ -136,9 +135,20 @@ class Plant:
             tension=np.zeros((self.lanes, rows, len(self.droppers) if tension else 0)),
         )
 
+    def clear(self, samples: Samples, lane: int) -> None:
+        """Forget a lane's earlier run: what lies beyond the window is not written, but at rest."""
+        samples.uplift[lane] = 0.0
+        if samples.tension.shape[2]:
+            samples.tension[lane] = self._static_tension
+
     def advance(self, command: Array, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` under commands (lanes, 2) (N: frame, head).
 
         The sample of a lane's step n (counted from 0) is recorded in row n + 1.
         """
-        coupling.advance(self.line, self.wire, self.body, self.drive, self.run, command, steps, samples)
+        arguments = (
+            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples
+        )  # fmt: skip
+        if self._advance is None:
+            self._advance = bind(coupling.advance, *arguments)
+        self._advance(*arguments)

@@ -14,7 +14,8 @@ from ..errors import InputError
 from ..plant import coupling
 from ..plant.actuator import ACTUATORS, Actuator
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, draw
-from ..plant.plant import SPACING, TIME_STEP, Plant
+from ..plant.numerics import Numerics
+from ..plant.plant import Plant
 from ..plant.sensor import SENSORS, Sensors
 from ..settings import parse
 from ..trajectory import Trajectory
@@ -49,8 +50,10 @@ class Task:
         distance: float | None = None,
         spans: int | None = None,
         control_interval: float = CONTROL_INTERVAL,
-        time_step: float = TIME_STEP,
-        spacing: float = SPACING,
+        time_step: float | None = None,
+        spacing: float | None = None,
+        window: int | None = None,
+        precision: str | None = None,
         bilateral: bool = False,
         lanes: int = 1,
         record_droppers: bool = False,
@@ -60,7 +63,8 @@ class Task:
         catenary, pantograph: catalogue names, TOML files or entries. speed_kmh: a number or a range
         to draw from. actuator, sensors, line_condition, reward: a preset's name, a table, or the
         settings. distance: of an episode (m), to the end of the line by default; a line too short
-        for it gets more spans. bilateral: let the contact pull, as paper 3's equations do.
+        for it gets more spans. time_step (s), spacing (m), window, precision: see ``Numerics``.
+        bilateral: let the contact pull, as paper 3's equations do.
         Raises InputError for what is not valid.
         """
         line, panto = load_catenary(catenary), load_pantograph(pantograph)
@@ -77,13 +81,15 @@ class Task:
                 raise InputError(f"distance must be a positive number (m), not {distance!r}.")
             if spans is None:
                 spans = max(line.spans, math.ceil(distance / line.span_length) + 1)
+        given = {"time_step": time_step, "spacing": spacing, "window": window, "precision": precision}
+        numerics = parse(Numerics, {k: v for k, v in given.items() if v is not None}, "the discretisation")
+        time_step = numerics.time_step
         self.plant = Plant(
             line,
             panto,
             lanes=lanes,
             spans=spans,
-            time_step=time_step,
-            spacing=spacing,
+            numerics=numerics,
             actuator=self.actuator,
             waves=self.condition.waves,
             bilateral=bilateral,
@@ -170,6 +176,7 @@ class Task:
         rows = self.episode_steps[lane] + 1
         if rows > self.samples.channels.shape[1]:  # slower than any speed of the range
             self.samples = self.plant.samples(int(rows), tension=self._record_droppers)
+        self.plant.clear(self.samples, lane)
         self._random[lane] = random
         self.action[lane] = self._last_action[lane] = 0.0
         self._lost[lane] = 0

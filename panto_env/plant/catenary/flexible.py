@@ -6,9 +6,14 @@ delta2 u - (1 - C^2)/12 delta4 u (C: Courant number), whose five points bending 
 Point loads and droppers act through four nodes by cubic interpolation. Local springs (droppers,
 supports, steady arms, contact) act by the mean of two half-steps, which is (1/4, 1/2, 1/4) over three
 time levels, each implicitly on its own: they conserve energy and do not bound the step.
+
+The grid covers a window that travels with the train a span at a time, as paper 2's model does. Its ends
+are anchors where the line ends and absorb waves elsewhere. A window of all spans is the whole line.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +21,16 @@ from ...arrays import Array
 from ...catalog.schema import FlexibleCatenaryData, Wire
 from ...errors import InputError
 from ..interpolation import stencil
+from ..numerics import Numerics
 from .flexible_motion import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
-from .static_shape import solve
+from .static_shape import StaticShape, solve
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
+FINEST = 1 / 3
+"""Grid (m) unless told otherwise, where it is stable: docs/validation.md."""
+QUIET = 1e-25
+"""Load (m a step) that keeps quiet wires away from subnormal numbers; it moves a wire by less than
+1e-15 m."""
 
 
 def wave_speed(data: FlexibleCatenaryData) -> float:
@@ -48,78 +59,117 @@ def droppers(data: FlexibleCatenaryData, spans: int) -> Array:
     return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
 
 
-def grid(data: FlexibleCatenaryData, spacing: float) -> tuple[int, float]:
-    """Nodes a span and their distance (m), the largest up to ``spacing`` that divides the span."""
-    nodes = int(np.ceil(data.span_length / spacing - 1e-9))
-    return nodes, data.span_length / nodes
+def static_tension(data: FlexibleCatenaryData, spans: int) -> Array:
+    """Static tension (N) of the droppers."""
+    return np.tile(solve(data).dropper_tension, spans)
 
 
-def build(data: FlexibleCatenaryData, spans: int, spacing: float, time_step: float) -> FlexibleLine:
+def build(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> FlexibleLine:
     """Constants of a line of ``spans`` spans.
 
-    Raises InputError where the time step (s) is too long for the grid (m) to be stable.
+    Raises InputError where the time step is too long for the grid to be stable.
     """
     shape = solve(data)
-    per_span, dx = grid(data, spacing)
-    nodes = spans * per_span + 1 + 2 * PAD
-    alpha, beta = data.damping.alpha, data.damping.beta
-    settle = 1.0 + alpha * time_step / 2
+    window = min(numerics.window or spans, spans)
+    step, beta = numerics.time_step, data.damping.beta
+    per_span = nodes_per_span(data, numerics)
+    dx = data.span_length / per_span
+    nodes = window * per_span + 1 + 2 * PAD
+    settle = 1.0 + data.damping.alpha * step / 2
     wires = (data.contact_wire, data.messenger_wire)
-
-    added = np.zeros((2, nodes))  # mass of clamps, droppers and steady arms at the nodes (kg)
-    first, weights = stencil(droppers(data, spans), dx)
+    first, weights = stencil(droppers(data, window), dx)
     first = first + PAD
-    half_dropper = np.tile(shape.dropper_mass / 2, spans)
-    for k in range(4):
-        np.add.at(
-            added[CONTACT],
-            first + k,
-            weights[:, k] * (half_dropper + data.droppers.contact_clamp_mass),
-        )
-        np.add.at(
-            added[MESSENGER],
-            first + k,
-            weights[:, k] * (half_dropper + data.droppers.messenger_clamp_mass),
-        )
-    masts = PAD + per_span * np.arange(1, spans)
-    added[CONTACT, masts] += data.steady_arm.mass
+    four = first[:, None] + np.arange(4)
+    masts = PAD + per_span * np.arange(1, window)
 
     own = np.array([[wire.mass * dx] for wire in wires])
-    inertia = own / (own + added)
-    mobility = time_step**2 / (own + added) / settle
-    inertia[:, : PAD + 1] = inertia[:, -PAD - 1 :] = 0.0
-    mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # the ends are anchored
+    mass = own + _added_mass(data, shape, window, nodes, four, weights, masts)
+    mobility = step**2 / mass / settle
+    mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
+    inertia = own / mass
 
-    stiffness = np.tile(shape.dropper_stiffness, spans)
-    squares = np.zeros(len(first))
-    for k in range(4):
-        squares += weights[:, k] ** 2 * (mobility[0, first + k] + mobility[1, first + k])
+    stiffness = np.tile(shape.dropper_stiffness, window)
+    move = np.stack([mobility[w][four] * weights for w in (CONTACT, MESSENGER)], axis=1)
+    relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
+    early, late = (0.5 + sign * beta / step for sign in (-1, 1))
+    support = np.zeros((len(masts), 2, 3))
+    support[:, CONTACT] = levels(data.steady_arm.stiffness, 0.0, step)
+    support[:, MESSENGER] = levels(data.support.stiffness, data.support.damping, step)
 
-    support = np.zeros((len(masts), 3, 2))
-    support[:, :, CONTACT] = levels(data.steady_arm.stiffness, 0.0, time_step)
-    support[:, :, MESSENGER] = levels(data.support.stiffness, data.support.damping, time_step)
-
+    real = np.float32 if numerics.precision == "single" else np.float64
+    keep = (1.0 - data.damping.alpha * step / 2) / settle
+    rows = [[*weights_of(wire, dx, step) / settle, keep, beta / step, QUIET] for wire in wires]
+    courant = np.array([np.sqrt(wire.tension / wire.mass) for wire in wires]) * step / dx
     table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
-    line = FlexibleLine(
+    return FlexibleLine(
         spacing=dx,
         span=data.span_length,
+        spans=spans,
+        window=window,
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),
-        level=np.tile([2.0 / settle, (1.0 - alpha * time_step / 2) / settle], (2, 1)),
-        inner=np.array([_stencil(wire, dx, time_step) for wire in wires]) / settle,
-        lag=beta / time_step,
-        inertia=inertia,
+        stencil=np.array(rows, dtype=real),
+        leave=(courant - 1) / (courant + 1),
+        inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
         mobility=mobility,
         support_node=masts.astype(np.int64),
         support_spring=support,
         dropper_node=first,
-        dropper_weight=weights,
-        dropper_stiffness=stiffness,
-        dropper_damping=beta * stiffness / time_step,
-        dropper_yield=squares,
-        dropper_static=np.tile(shape.dropper_tension, spans),
+        half=np.array([0.5], dtype=real),
+        dropper_weight=weights.astype(real),
+        dropper_move=move.astype(real),
+        dropper_linear=(
+            np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None]
+        ).astype(real),
+        dropper_yield=relative.astype(real),
+        dropper_stiffness=stiffness.astype(real),
+        dropper_static=np.tile(shape.dropper_tension, window).astype(real),
     )
-    _check_stable(line, dx, time_step, data.name)
-    return line
+
+
+def _added_mass(
+    data: FlexibleCatenaryData,
+    shape: StaticShape,
+    window: int,
+    nodes: int,
+    four: Any,
+    weights: Any,
+    masts: Any,
+) -> Array:
+    """Mass (kg) of clamps, halved droppers and steady arms on the nodes, (2, nodes)."""
+    added = np.zeros((2, nodes))
+    half = np.tile(shape.dropper_mass / 2, window)
+    clamps = (data.droppers.contact_clamp_mass, data.droppers.messenger_clamp_mass)
+    for w, clamp in zip((CONTACT, MESSENGER), clamps, strict=True):
+        np.add.at(added[w], four, weights * (half + clamp)[:, None])
+    added[CONTACT, masts] += data.steady_arm.mass
+    return added
+
+
+def nodes_per_span(data: FlexibleCatenaryData, numerics: Numerics) -> int:
+    """Nodes a span of the grid asked for, or of the finest up to FINEST that is stable."""
+    if numerics.spacing is not None:
+        nodes = int(np.ceil(data.span_length / numerics.spacing - 1e-9))
+        if not stable(data, data.span_length / nodes, numerics.time_step):
+            raise InputError(
+                f"A time step of {1e3 * numerics.time_step:g} ms is unstable on a grid of "
+                f"{data.span_length / nodes:g} m for line '{data.name}'; take a shorter step or a "
+                "coarser grid."
+            )
+        return nodes
+    for nodes in range(int(np.ceil(data.span_length / FINEST - 1e-9)), 7, -1):
+        if stable(data, data.span_length / nodes, numerics.time_step):
+            return nodes
+    raise InputError(
+        f"A time step of {1e3 * numerics.time_step:g} ms is too long for line '{data.name}' on any grid."
+    )
+
+
+def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
+    """Whether the shortest wave of the grid (m) does not grow: omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
+    for wire in (data.contact_wire, data.messenger_wire):
+        if 4 * weights_of(wire, dx, step)[0] * (1 + 2 * data.damping.beta / step) > 4:
+            return False
+    return True
 
 
 def levels(stiffness: float, damping: float, time_step: float) -> Array:
@@ -128,36 +178,26 @@ def levels(stiffness: float, damping: float, time_step: float) -> Array:
     return np.asarray(mean + damping / (2 * time_step) * np.array([1.0, 0.0, -1.0]))
 
 
-def _stencil(wire: Wire, dx: float, time_step: float) -> Array:
-    """Weights (centre, neighbours, second neighbours) of the wire's force, as a displacement."""
+def weights_of(wire: Wire, dx: float, time_step: float) -> Array:
+    """Weights of the neighbours and of theirs in the wire's force, as a displacement in a step."""
     courant = np.sqrt(wire.tension / wire.mass) * time_step / dx
     second = wire.tension / dx**2
     fourth = -second * (1 - courant**2) / 12 - wire.bending_stiffness / dx**4
-    weights = np.array([-2 * second + 6 * fourth, second - 4 * fourth, fourth])
+    weights = np.array([second - 4 * fourth, fourth])
     return np.asarray(time_step**2 / wire.mass * weights)
-
-
-def _check_stable(line: FlexibleLine, dx: float, time_step: float, name: str) -> None:
-    """The shortest wave of the grid must not grow: omega^2 dt^2 (1 + 2 lag) <= 4."""
-    for weights in line.inner:
-        shortest = -(weights[0] - 2 * weights[1] + 2 * weights[2]) * line.inertia.max()
-        if shortest * (1 + 2 * line.lag) > 4:
-            raise InputError(
-                f"A time step of {1e3 * time_step:g} ms is unstable on a grid of {dx:g} m for line "
-                f"'{name}'; take a shorter step or a coarser grid."
-            )
 
 
 def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
     """Wires of all lanes in their static shape."""
-    nodes, droppers = line.inertia.shape[1], len(line.dropper_node)
+    nodes, count, real = line.mobility.shape[1], len(line.dropper_node), line.stencil.dtype
     return FlexibleWire(
-        displacement=np.zeros((lanes, 2, 2, nodes)),
-        now=np.zeros(lanes, dtype=np.int64),
-        blend=np.zeros((lanes, 2, nodes)),
+        displacement=np.zeros((lanes, 2, nodes), dtype=real),
+        increment=np.zeros((lanes, 2, nodes), dtype=real),
+        blend=np.zeros((lanes, nodes), dtype=real),
+        shifted=np.zeros(lanes, dtype=np.int64),
         support_past=np.zeros((lanes, len(line.support_node), 2)),
-        extension_past=np.zeros((lanes, droppers)),
-        tension=np.tile(line.dropper_static, (lanes, 1)),
+        extension=np.zeros((lanes, 2, count), dtype=real),
+        change=np.zeros((lanes, count), dtype=real),
     )
 
 
@@ -171,7 +211,6 @@ def start_point(line: FlexibleLine) -> tuple[float, float, float]:
 
 def settle(line: FlexibleLine, wire: FlexibleWire, lane: int, force: float) -> None:
     """Put one lane's wires back at rest; a force (N) at the anchor does not move them."""
-    wire.displacement[lane] = 0.0
-    wire.support_past[lane] = 0.0
-    wire.extension_past[lane] = 0.0
-    wire.tension[lane] = line.dropper_static
+    for array in (wire.displacement, wire.increment, wire.extension, wire.change):
+        array[lane] = 0.0
+    wire.shifted[lane] = 0

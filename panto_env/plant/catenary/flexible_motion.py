@@ -1,4 +1,9 @@
-"""Kernels of the flexible catenary: one step of the wires and all that hangs on them."""
+"""Kernels of the flexible catenary: one step of the wires and all that hangs on them.
+
+The state of a wire is its displacement u and its increment over the last step d. A step is
+d <- b d + S (u + lag d), u <- u + d: the leapfrog, with the stencil S, damping b in proportion to the
+mass and lag in proportion to the stiffness. Forces at points then move both by mobility times force.
+"""
 
 from __future__ import annotations
 
@@ -10,126 +15,164 @@ from numba.extending import overload
 from ...arrays import Array, Index
 from .. import coupling
 from ..interpolation import cubic_weights
-from ..jit import kernel
+from ..jit import PART, part
 
-PAD = 2  # ghost nodes beyond each end, for the five-point stencil
+PAD = 2  # nodes beyond each end, for the five-point stencil
 CONTACT, MESSENGER = 0, 1
+FORWARD = 0xFFFFFFF
+"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
 
 
 class FlexibleLine(NamedTuple):
-    """Constants of a line on its grid; the first axis of a pair is contact wire, messenger."""
+    """Constants of a line on its grid; the first axis of a pair is contact wire, messenger.
+
+    The grid covers a window of the line that travels with the train, or all of it.
+    """
 
     spacing: float  # of the grid (m)
     span: float  # m
+    spans: int  # of the whole line
+    window: int  # spans that the grid covers
     shape: Array  # static height of the contact wire over one span, every span/(n - 1) m (m)
-    level: Array  # (2, 2): weights of the present and the previous displacement
-    inner: Array  # (2, 3): stencil weights of a node, its neighbours, and theirs
-    lag: float  # stiffness-proportional damping over the time step (-)
-    inertia: Array  # (2, nodes): mass of the bare wire over the mass of the node (-)
+    stencil: Array  # (2, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
+    leave: Array  # (2,): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
+    inertia: Array  # (2, nodes): mass of the bare wire over that of the node, or (2, 0) where all are 1
     mobility: Array  # (2, nodes): displacement in one step by 1 N at the node (m/N)
     support_node: Index  # (supports,)
-    support_spring: Array  # (supports, 3, 2): weights of the three time levels, newest first (N/m)
+    support_spring: Array  # (supports, 2 wires, 3): weights of three time levels, newest first (N/m)
+    half: Array  # (1,): 0.5, in the precision of the wires
     dropper_node: Index  # (droppers,): first of four nodes
     dropper_weight: Array  # (droppers, 4)
+    dropper_move: Array  # (droppers, 2 wires, 4): displacement of the nodes in a step by 1 N (m/N)
+    dropper_linear: Array  # (droppers, 2): change of tension by mean extension before and after (N/m)
+    dropper_yield: Array  # (droppers,): mean relative displacement of the ends over a step by 1 N (m/N)
     dropper_stiffness: Array  # (droppers,): in tension (N/m)
-    dropper_damping: Array  # (droppers,): in tension, over the time step (N/m)
-    dropper_yield: Array  # (droppers,): relative displacement of the ends by 1 N (m/N)
     dropper_static: Array  # (droppers,): static tension (N)
 
 
 class FlexibleWire(NamedTuple):
     """Moving state of all lanes."""
 
-    displacement: Array  # (lanes, 2 times, 2 wires, nodes): about the static shape (m)
-    now: Index  # (lanes,): which of the two times is the present
-    blend: Array  # (lanes, 2 wires, nodes): what the stencil acts on, scratch (m)
-    support_past: Array  # (lanes, supports, 2 wires): displacement a step ago (m)
-    extension_past: Array  # (lanes, droppers): extension about the static one a step ago (m)
-    tension: Array  # (lanes, droppers): dropper tension over the last step (N)
+    displacement: Array  # (lanes, 2 wires, nodes): u, about the static shape (m)
+    increment: Array  # (lanes, 2 wires, nodes): d, over the last step (m)
+    blend: Array  # (lanes, nodes): what the stencil acts on, scratch (m)
+    shifted: Index  # (lanes,): spans that the window has travelled
+    support_past: Array  # (lanes, supports, 2 wires): increment before the step, scratch (m)
+    extension: Array  # (lanes, 2 times, droppers): before the step and at its start, about static (m)
+    change: Array  # (lanes, droppers): of the tension about the static one, over the last step (N)
 
 
-@kernel
-def static_height(line, x):
+@part
+def static_height(shape, span, x):
     """Static height (m) of the contact wire at x (m)."""
-    intervals = line.shape.size - 1
-    ratio = (x / line.span - np.floor(x / line.span)) * intervals
+    intervals = shape.size - 1
+    ratio = (x / span - np.floor(x / span)) * intervals
     k = min(int(ratio), intervals - 1)
-    return line.shape[k] + (ratio - k) * (line.shape[k + 1] - line.shape[k])
+    return shape[k] + (ratio - k) * (shape[k + 1] - shape[k])
 
 
-@kernel
-def locate(line, x):
-    """First of the four nodes around x (m), kept on the line, and their weights."""
-    ratio = x / line.spacing
-    left = min(max(int(np.floor(ratio)), 0), line.inertia.shape[1] - 2 * PAD - 2)
-    return left - 1 + PAD, cubic_weights(ratio - left)
+@part
+def locate(x, spacing, nodes):
+    """First of the four nodes around x (m from the grid's start), and their weights."""
+    ratio = x / spacing
+    left = min(max(int(np.floor(ratio)), 0), nodes - 2 * PAD - 2)
+    return (left - 1 + PAD) & FORWARD, cubic_weights(ratio - left)
 
 
-@kernel
-def swing(line, wire, lane):
-    """Leapfrog of both bare wires: the next displacement takes the place of the previous one."""
-    now = wire.displacement[lane, wire.now[lane]]
-    new = wire.displacement[lane, 1 - wire.now[lane]]
-    for w in range(2):
-        u, p, q, r = now[w], new[w], wire.blend[lane, w], line.inertia[w]
-        a, b = line.level[w, 0], line.level[w, 1]
-        c0, c1, c2 = line.inner[w, 0], line.inner[w, 1], line.inner[w, 2]
-        for i in range(u.size):
-            q[i] = u[i] + line.lag * (u[i] - p[i])
-        # Indices only ever add to i: a negative one would make Numba check for wrap-around, and the
-        # loop would not be vectorised.
+@part
+def sweep(u, d, q, inertia, stencil):
+    """Leapfrog of one bare wire."""
+    near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
+    # The least of loads on every node keeps quiet wires away from subnormal numbers, which are slow.
+    quiet = stencil[4]
+    for i in range(u.size):
+        q[i] = u[i] + lag * d[i]
+    # Differences, not weights that only nearly add up to 0: those would be a spring, in single precision.
+    # Indices only ever add to i: a negative one would make Numba check for wrap-around, and the
+    # loop would not be vectorised.
+    if inertia.size == 0:
         for i in range(u.size - 2 * PAD):
-            force = c0 * q[i + 2] + c1 * (q[i + 1] + q[i + 3]) + c2 * (q[i] + q[i + 4])
-            p[i + 2] = a * u[i + 2] - b * p[i + 2] + r[i + 2] * force
+            c = q[i + 2]
+            force = near * ((q[i + 1] - c) + (q[i + 3] - c)) + far * ((q[i] - c) + (q[i + 4] - c))
+            step = keep * d[i + 2] + force - quiet
+            d[i + 2] = step
+            u[i + 2] += step
+    else:
+        for i in range(u.size - 2 * PAD):
+            c = q[i + 2]
+            force = near * ((q[i + 1] - c) + (q[i + 3] - c)) + far * ((q[i] - c) + (q[i + 4] - c))
+            step = keep * d[i + 2] + inertia[i + 2] * force - quiet
+            d[i + 2] = step
+            u[i + 2] += step
 
 
-@kernel
-def anchor(displacement):
-    """Hold both ends of both wires: no displacement, no moment (odd continuation)."""
-    last = displacement.shape[1] - 1
-    for w in range(2):
-        u = displacement[w]
-        u[0], u[1], u[2] = -u[4], -u[3], 0.0
-        u[last], u[last - 1], u[last - 2] = -u[last - 4], -u[last - 3], 0.0
+@part
+def difference(lower, upper, i, weight):
+    """How far four nodes of the upper wire from i on stand over those of the lower, weighted (m)."""
+    return (
+        weight[0] * (upper[i] - lower[i])
+        + weight[1] * (upper[i + 1] - lower[i + 1])
+        + weight[2] * (upper[i + 2] - lower[i + 2])
+        + weight[3] * (upper[i + 3] - lower[i + 3])
+    )
 
 
-@kernel
-def push(line, new, first, weights, force):
+@part
+def shove(u, d, i, move, force):
+    """Move four nodes from i on by ``move`` times the force (N)."""
+    # All is read before any is written, so that the four become one vector.
+    m0, m1, m2, m3 = move[0] * force, move[1] * force, move[2] * force, move[3] * force
+    d0, d1, d2, d3 = d[i] + m0, d[i + 1] + m1, d[i + 2] + m2, d[i + 3] + m3
+    u0, u1, u2, u3 = u[i] + m0, u[i + 1] + m1, u[i + 2] + m2, u[i + 3] + m3
+    d[i], d[i + 1], d[i + 2], d[i + 3] = d0, d1, d2, d3
+    u[i], u[i + 1], u[i + 2], u[i + 3] = u0, u1, u2, u3
+
+
+@part
+def remember(line, u, d, support_past, past, now):
+    """Keep what the sweep overwrites: increments of the supports, extensions of the droppers (m)."""
+    for s in range(line.support_node.size):
+        for w in range(2):
+            support_past[s, w] = d[w, line.support_node[s] & FORWARD]
+    node, weight = line.dropper_node, line.dropper_weight
+    for k in range(node.size):
+        past[k] = now[k]
+        now[k] = difference(u[CONTACT], u[MESSENGER], node[k] & FORWARD, weight[k])
+
+
+@part
+def push(u, d, mobility, first, weights, force):
     """Add a force (N) on the contact wire, spread over four nodes."""
     for k in range(4):
-        new[CONTACT, first + k] += line.mobility[CONTACT, first + k] * weights[k] * force
+        step = mobility[CONTACT, first + k] * weights[k] * force
+        d[CONTACT, first + k] += step
+        u[CONTACT, first + k] += step
 
 
-@kernel
-def hold_supports(line, wire, lane, now, new):
+@part
+def hold_supports(node, spring, mobility, u, d, past):
     """Springs and dampers of messenger supports and steady arms, each implicit at its node."""
-    for s in range(line.support_node.size):
-        i = line.support_node[s]
+    for s in range(node.size):
+        i = node[s] & FORWARD
         for w in range(2):
-            spring = line.support_spring[s]
-            past = wire.support_past[lane, s, w]
-            mobility = line.mobility[w, i]
-            pull = spring[0, w] * new[w, i] + spring[1, w] * now[w, i] + spring[2, w] * past
-            new[w, i] -= mobility * pull / (1.0 + spring[0, w] * mobility)
-            wire.support_past[lane, s, w] = now[w, i]
+            new, now = u[w, i], u[w, i] - d[w, i]
+            pull = spring[s, w, 0] * new + spring[s, w, 1] * now + spring[s, w, 2] * (now - past[s, w])
+            step = mobility[w, i] * pull / (1.0 + spring[s, w, 0] * mobility[w, i])
+            d[w, i] -= step
+            u[w, i] -= step
 
 
-@kernel
-def dropper_change(stiffness, damping, static, past, free, yielding):
-    """Change of a dropper's tension about the static one (N), over the two half-steps it acts in.
+@part
+def slackening(stiffness, static, past, free, yielding):
+    """Change of tension (N) of a dropper that is slack before or after the step.
 
     Its extension, averaged over a step, goes from ``past`` to ``free - yielding * change`` (m). The
     force is the change of the spring's energy over the change of extension (a discrete gradient), so
-    that going slack and taut again conserves energy: for a taut dropper it is the mean spring force.
+    that going slack and taut again conserves energy.
     """
     slack = static / stiffness  # extensions below -slack carry no tension
     a, b = past + slack, free + slack + yielding * static  # b: were the tension 0
     if a >= 0.0:
-        change = (0.5 * stiffness * (past + free) + damping * (free - past)) / (
-            1.0 + (0.5 * stiffness + damping) * yielding
-        )
-        if free - yielding * change >= -slack:
-            return max(change, -static)
         # from taut to slack: T = k a^2 / (2 (a - b + yielding T))
         fall = a - b
         tension = (np.sqrt(fall * fall + 2 * yielding * stiffness * a * a) - fall) / (2 * yielding)
@@ -142,82 +185,139 @@ def dropper_change(stiffness, damping, static, past, free, yielding):
     return (b - e) / yielding - static
 
 
-@kernel
-def pull_droppers(line, wire, lane, now, new):
+@part
+def pull_droppers(line, u, d, past, now, change):
     """Droppers: each one scalar equation for its tension, which is never negative."""
-    for d in range(line.dropper_node.size):
-        i = line.dropper_node[d]
-        weight, static = line.dropper_weight[d], line.dropper_static[d]
-        present, free = 0.0, 0.0
-        for k in range(4):
-            present += weight[k] * (now[MESSENGER, i + k] - now[CONTACT, i + k])
-            free += weight[k] * (new[MESSENGER, i + k] - new[CONTACT, i + k])
-        change = dropper_change(
-            line.dropper_stiffness[d],
-            line.dropper_damping[d],
-            static,
-            0.5 * (wire.extension_past[lane, d] + present),
-            0.5 * (present + free),
-            0.5 * line.dropper_yield[d],
-        )
-        wire.extension_past[lane, d] = present
-        wire.tension[lane, d] = static + change
-        for k in range(4):
-            new[CONTACT, i + k] += line.mobility[CONTACT, i + k] * weight[k] * change
-            new[MESSENGER, i + k] -= line.mobility[MESSENGER, i + k] * weight[k] * change
+    node, weight, move = line.dropper_node, line.dropper_weight, line.dropper_move
+    linear, yielding = line.dropper_linear, line.dropper_yield
+    static, stiffness, half = line.dropper_static, line.dropper_stiffness, line.half[0]
+    for k in range(node.size):
+        i = node[k] & FORWARD
+        step = difference(d[CONTACT], d[MESSENGER], i, weight[k])
+        before, free = half * (past[k] + now[k]), now[k] + half * step
+        taut = linear[k, 0] * before + linear[k, 1] * free  # the mean spring force
+        change[k] = max(taut, -static[k])
+        if stiffness[k] * min(before, free - yielding[k] * taut) < -static[k]:
+            change[k] = slackening(stiffness[k], static[k], before, free, yielding[k])
+        pull = change[k]  # read back, in the precision of the wires
+        shove(u[CONTACT], d[CONTACT], i, move[k, CONTACT], pull)
+        shove(u[MESSENGER], d[MESSENGER], i, move[k, MESSENGER], -pull)
 
 
-@overload(coupling.move_wire)
+@part
+def anchor(u, end, inward):
+    """No displacement, no moment (odd continuation) at one end of a wire."""
+    middle = end + 2 * inward
+    u[middle] = 0.0
+    u[middle - inward] = -u[middle + inward]
+    u[middle - 2 * inward] = -u[middle + 2 * inward]
+
+
+@part
+def absorb(u, d, leave, end, inward):
+    """Let waves leave at one end of a wire: Mur's one-way wave equation, node by node outward."""
+    for k in range(1, -1, -1):
+        i = end + k * inward
+        inner, inner_step = u[i + inward], d[i + inward]  # already at the new time
+        step = (1.0 + leave) * (inner - inner_step - u[i]) + leave * inner_step
+        d[i] = step
+        u[i] += step
+
+
+@part
+def travel(line, wire, lane):
+    """Let the window travel by one span: fresh wire, at rest, comes in ahead."""
+    wire.shifted[lane] += 1
+    u, d = wire.displacement[lane], wire.increment[lane]
+    nodes = u.shape[1]
+    step = (nodes - 1 - 2 * PAD) // line.window
+    for w in range(2):
+        for i in range(nodes - step):
+            u[w, i] = u[w, i + step]
+            d[w, i] = d[w, i + step]
+        for i in range(nodes - step, nodes):
+            u[w, i] = 0.0
+            d[w, i] = 0.0
+    now = wire.extension[lane, 1]
+    each = now.size // line.window
+    for k in range(now.size - each):
+        now[k] = now[k + each]
+    for k in range(now.size - each, now.size):
+        now[k] = 0.0
+
+
+@overload(coupling.move_wire, jit_options=PART)
 def _move_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not FlexibleLine:
         return None
 
     def move(line, wire, lane, x0, x1, force):
-        now = wire.displacement[lane, wire.now[lane]]
-        new = wire.displacement[lane, 1 - wire.now[lane]]
-        swing(line, wire, lane)
+        ahead = int(x0 / line.span) - wire.shifted[lane]
+        if 2 * ahead > line.window - 1 and wire.shifted[lane] + line.window < line.spans:
+            travel(line, wire, lane)
+        u, d, q = wire.displacement[lane], wire.increment[lane], wire.blend[lane]
+        past, now, support_past = wire.extension[lane, 0], wire.extension[lane, 1], wire.support_past[lane]
+        mobility = line.mobility
+        remember(line, u, d, support_past, past, now)
+        for w in range(2):
+            sweep(u[w], d[w], q, line.inertia[w], line.stencil[w])
         # The wire takes at each time level the mean of the forces before and after it.
-        first_0, weights_0 = locate(line, x0)
-        push(line, new, first_0, weights_0, 0.5 * force)
-        hold_supports(line, wire, lane, now, new)
-        pull_droppers(line, wire, lane, now, new)
-        first_1, weights_1 = locate(line, x1)
-        height = static_height(line, x1)
+        start = wire.shifted[lane] * line.span
+        first_0, weights_0 = locate(x0 - start, line.spacing, u.shape[1])
+        push(u, d, mobility, first_0, weights_0, 0.5 * force)
+        hold_supports(line.support_node, line.support_spring, mobility, u, d, support_past)
+        pull_droppers(line, u, d, past, now, wire.change[lane])
+        first_1, weights_1 = locate(x1 - start, line.spacing, u.shape[1])
+        height = static_height(line.shape, line.span, x1)
         compliance = 0.0
         for k in range(4):
-            height += weights_1[k] * new[CONTACT, first_1 + k]
+            height += weights_1[k] * u[CONTACT, first_1 + k]
             j = first_1 + k - first_0
             if 0 <= j < 4:
-                compliance += 0.5 * weights_1[k] * weights_0[j] * line.mobility[CONTACT, first_1 + k]
+                compliance += 0.5 * weights_1[k] * weights_0[j] * mobility[CONTACT, first_1 + k]
         return height, compliance, 0.0
 
     return move
 
 
-@overload(coupling.load_wire)
+@overload(coupling.load_wire, jit_options=PART)
 def _load_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not FlexibleLine:
         return None
 
     def load(line, wire, lane, x0, x1, force):
-        new = wire.displacement[lane, 1 - wire.now[lane]]
-        first, weights = locate(line, x0)
-        push(line, new, first, weights, 0.5 * force)
-        anchor(new)
-        wire.now[lane] = 1 - wire.now[lane]
+        u, d = wire.displacement[lane], wire.increment[lane]
+        shifted, last = wire.shifted[lane], u.shape[1] - 1
+        first, weights = locate(x0 - shifted * line.span, line.spacing, u.shape[1])
+        push(u, d, line.mobility, first, weights, 0.5 * force)
+        for w in range(2):
+            if shifted == 0:
+                anchor(u[w], 0, 1)
+                anchor(d[w], 0, 1)
+            else:
+                absorb(u[w], d[w], line.leave[w], 0, 1)
+            if shifted + line.window >= line.spans:
+                anchor(u[w], last, -1)
+                anchor(d[w], last, -1)
+            else:
+                absorb(u[w], d[w], line.leave[w], last, -1)
 
     return load
 
 
-@overload(coupling.record_wire)
+@overload(coupling.record_wire, jit_options=PART)
 def _record_wire(line, wire, lane, uplift, tension):
     if getattr(line, "instance_class", None) is not FlexibleLine:
         return None
 
     def record(line, wire, lane, uplift, tension):
-        for s in range(uplift.size):
-            uplift[s] = wire.displacement[lane, wire.now[lane], CONTACT, line.support_node[s]]
-        for d in range(tension.size):
-            tension[d] = wire.tension[lane, d]
+        shifted = wire.shifted[lane]
+        for s in range(line.support_node.size):
+            if shifted + s < uplift.size:
+                uplift[shifted + s] = wire.displacement[lane, CONTACT, line.support_node[s]]
+        if tension.size > 0:
+            first = shifted * (line.dropper_node.size // line.window)
+            for k in range(line.dropper_node.size):
+                tension[first + k] = line.dropper_static[k] + wire.change[lane, k]
 
     return record

@@ -8,9 +8,11 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...catalog.schema import PeriodicStiffnessData
 from .. import coupling
-from ..jit import kernel
+from ..jit import PART, part
+from ..numerics import Numerics
 
 
 class PeriodicLine(NamedTuple):
@@ -42,7 +44,7 @@ def line_end(data: PeriodicStiffnessData, spans: int) -> float:
     return spans * data.span_length
 
 
-def build(data: PeriodicStiffnessData, spans: int, spacing: float, time_step: float) -> PeriodicLine:
+def build(data: PeriodicStiffnessData, spans: int, numerics: Numerics) -> PeriodicLine:
     """Constants of the line; there is no grid, and any time step will do."""
     return PeriodicLine(data.mean_stiffness, data.stiffness_variation, 2 * np.pi / data.span_length)
 
@@ -71,13 +73,18 @@ def droppers(data: PeriodicStiffnessData, spans: int) -> NDArray[np.float64]:
     return np.zeros(0)
 
 
-@kernel
+def static_tension(data: PeriodicStiffnessData, spans: int) -> Array:
+    """Static tension (N) of the droppers."""
+    return np.zeros(0)
+
+
+@part
 def stiffness(line, x):
     """Stiffness k (N/m) at x (m)."""
     return line.mean * (1.0 + line.variation * np.cos(line.wavenumber * x))
 
 
-@overload(coupling.move_wire)
+@overload(coupling.move_wire, jit_options=PART)
 def _move_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None
@@ -88,14 +95,14 @@ def _move_wire(line, wire, lane, x0, x1, force):
     return move
 
 
-@overload(coupling.load_wire)
+@overload(coupling.load_wire, jit_options=PART)
 def _load_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None
     return lambda line, wire, lane, x0, x1, force: None
 
 
-@overload(coupling.record_wire)
+@overload(coupling.record_wire, jit_options=PART)
 def _record_wire(line, wire, lane, uplift, tension):
     if getattr(line, "instance_class", None) is not PeriodicLine:
         return None

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...catalog.schema import ThreeSpanData
 from .. import coupling
-from ..jit import kernel
+from ..jit import PART, part
+from ..numerics import Numerics
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
@@ -86,7 +87,7 @@ def mode_shapes(data: ThreeSpanData, vectors: Array, positions: Array) -> Array:
     return np.asarray(np.sqrt(2 / (data.wire.mass * length)) * sines @ vectors)
 
 
-def build(data: ThreeSpanData, spans: int, spacing: float, time_step: float) -> ThreeSpanLine:
+def build(data: ThreeSpanData, spans: int, numerics: Numerics) -> ThreeSpanLine:
     """Constants of the line; there is no grid, and modes propagate exactly over any time step (s)."""
     frequency, vectors = modes(data)
     span = data.span_length
@@ -98,7 +99,7 @@ def build(data: ThreeSpanData, spans: int, spacing: float, time_step: float) -> 
     moved = mode_shapes(data, vectors, everywhere + span)
     moved[everywhere > 2 * span + 1e-9] = 0.0
     project = np.linalg.lstsq(mode_shapes(data, vectors, everywhere), moved, rcond=None)[0]
-    free, forced = _propagation(frequency, data.damping_ratio, time_step)
+    free, forced = _propagation(frequency, data.damping_ratio, numerics.time_step)
     return ThreeSpanLine(
         span=span,
         shape=mode_shapes(data, vectors, positions),
@@ -156,7 +157,12 @@ def droppers(data: ThreeSpanData, spans: int) -> Array:
     return np.zeros(0)
 
 
-@kernel
+def static_tension(data: ThreeSpanData, spans: int) -> Array:
+    """Static tension (N) of the droppers."""
+    return np.zeros(0)
+
+
+@part
 def read_shape(line, wire, lane, x, out):
     """Mode shapes at x (m along the line), seen from the central span, into ``out``."""
     local = x - wire.span_now[lane] * line.span + MARGIN
@@ -166,7 +172,7 @@ def read_shape(line, wire, lane, x, out):
         out[m] = line.shape[k, m] + (ratio - k) * (line.shape[k + 1, m] - line.shape[k, m])
 
 
-@overload(coupling.move_wire)
+@overload(coupling.move_wire, jit_options=PART)
 def _move_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
@@ -189,7 +195,7 @@ def _move_wire(line, wire, lane, x0, x1, force):
     return move
 
 
-@overload(coupling.load_wire)
+@overload(coupling.load_wire, jit_options=PART)
 def _load_wire(line, wire, lane, x0, x1, force):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
@@ -201,8 +207,9 @@ def _load_wire(line, wire, lane, x0, x1, force):
             modal[1, m] += line.impulse[1, m] * shape[m] * force
         if x1 >= (wire.span_now[lane] + 1) * line.span:
             moved = wire.moved[lane]
-            moved[:] = modal
             for k in range(2):
+                for m in range(shape.size):
+                    moved[k, m] = modal[k, m]
                 for m in range(shape.size):
                     total = 0.0
                     for j in range(shape.size):
@@ -213,7 +220,7 @@ def _load_wire(line, wire, lane, x0, x1, force):
     return load
 
 
-@overload(coupling.record_wire)
+@overload(coupling.record_wire, jit_options=PART)
 def _record_wire(line, wire, lane, uplift, tension):
     if getattr(line, "instance_class", None) is not ThreeSpanLine:
         return None
