@@ -35,13 +35,13 @@ class Figures:
         return asdict(self)
 
 
-def low_pass(force: Array, time_step: float) -> Array:
-    """Contact force (N) as EN 50317 looks at it: a causal 6th-order Butterworth filter at 20 Hz.
+def low_pass_sections(time_step: float) -> tuple[Array, Array]:
+    """EN 50317's filter, a 6th-order Butterworth at 20 Hz, as second-order sections, (3, 6).
 
-    The filter starts settled at the first value. Raises InputError where the samples, ``time_step``
+    The second array, (3, 2), is its state settled at 1. Raises InputError where samples, ``time_step``
     (s) apart, are too far apart to hold 20 Hz.
     """
-    from scipy.signal import butter, sosfilt, sosfilt_zi  # slow to import
+    from scipy.signal import butter, sosfilt_zi  # slow to import
 
     if not time_step < 0.5 / CUTOFF:
         raise InputError(
@@ -49,7 +49,18 @@ def low_pass(force: Array, time_step: float) -> Array:
             f"take a time step below {0.5e3 / CUTOFF:g} ms."
         )
     sections = butter(6, CUTOFF, fs=1 / time_step, output="sos")
-    filtered, _ = sosfilt(sections, force, zi=sosfilt_zi(sections) * force[0])
+    return sections, sosfilt_zi(sections)
+
+
+def low_pass(force: Array, time_step: float) -> Array:
+    """Contact force (N) as EN 50317 looks at it: low-passed causally, settled at its first value.
+
+    Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
+    """
+    from scipy.signal import sosfilt  # slow to import
+
+    sections, settled = low_pass_sections(time_step)
+    filtered, _ = sosfilt(sections, force, zi=settled * force[0])
     return np.asarray(filtered)
 
 

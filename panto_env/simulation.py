@@ -55,13 +55,15 @@ def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | N
     Raises InputError where the policy's action is not finite or not of the right shape.
     """
     policy.reset(task.context(0))
-    while not (task.done[0] or task.terminated[0]):
+    episode = task.episode
+    while not (episode.truncated[0] or episode.terminated[0]):
         # A copy: a policy may keep what it was shown.
-        action = np.asarray(policy.act(task.observation[0].copy()), dtype=float)
-        if action.shape != task.action[0].shape or not np.isfinite(action).all():
+        action = np.asarray(policy.act(episode.observation[0].copy()), dtype=float)
+        if action.shape != episode.action[0].shape or not np.isfinite(action).all():
             raise InputError(
-                f"The policy must return {task.action.shape[1]} finite numbers as its action, not {action!r}."
+                f"The policy must return {episode.action.shape[1]} finite numbers as its action, "
+                f"not {action!r}."
             )
         task.step(action[None])
         if progress is not None:
-            progress(float(task.plant.run.step[0] / task.episode_steps[0]))
+            progress(float(task.plant.run.step[0] / episode.end[0]))

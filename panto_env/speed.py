@@ -49,7 +49,7 @@ def plant_speed(settings: dict[str, Any], repeats: int) -> PlantSpeed:
         task.reset(0, np.random.default_rng(0))
         start = time.perf_counter()
         task.coast()
-        travelled = float(task.episode_steps[0] * task.plant.time_step)
+        travelled = float(task.episode.end[0] * task.plant.time_step)
         return time.perf_counter() - start
 
     first = run()
@@ -65,7 +65,7 @@ def plant_speed(settings: dict[str, Any], repeats: int) -> PlantSpeed:
     )
 
 
-def env_speed(name: str, repeats: int, steps: int = 500) -> EnvSpeed:
+def env_speed(name: str, repeats: int, steps: int = 1000) -> EnvSpeed:
     """Steps a second of a single environment, resets included."""
     env = gymnasium.make(name)
     env.reset(seed=0)

@@ -177,7 +177,7 @@ def test_feedforward_follows_the_equation_along_the_line(
     policy.reset(task.context(0))
     for _ in range(100):
         x = task.plant.run.step[0] * task.plant.run.stride[0]
-        action = policy.act(task.observation[0])
+        action = policy.act(task.episode.observation[0])
         expected = 10 * math.sin(2 * math.pi * turns_a_metre * x - theta)
         assert 100 * action[0] == pytest.approx(expected, abs=1e-6)
         task.step(action[None])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from ..plant import coupling
 from ..settings import suggest
@@ -108,9 +110,9 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._settings = settings
         self._usual = self.task = Task(**settings)
         self._running = False
-        shape = self.task.observation[0].shape
+        shape = self.task.episode.observation[0].shape
         self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.task.action[0].shape, np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.task.episode.action[0].shape, np.float32)
 
     @property
     def context(self) -> Context:
@@ -131,7 +133,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task = task
         task.reset(0, self.np_random)
         self._running = True
-        return task.observation[0].copy(), {"speed_kmh": 3.6 * float(task.speed[0])}
+        return task.episode.observation[0].copy(), {"speed_kmh": 3.6 * float(task.speed[0])}
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
         _check_names(options, "option")
@@ -152,25 +154,26 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
         task = self.task
-        force = _check_action(action, task.action.shape[1])
-        task.step(force[None])
-        terminated, truncated = bool(task.terminated[0]), bool(task.done[0])
-        row = task.samples.channels[0, task.plant.run.step[0]]
+        episode, run = task.episode, task.plant.run
+        task.step(checked(action, episode.action.shape[1:]))
+        terminated, truncated = bool(episode.terminated[0]), bool(episode.truncated[0])
+        steps = int(run.step[0])
+        row = task.samples.channels[0, steps].tolist()
         info: dict[str, Any] = {
-            "contact_force": float(row[coupling.CONTACT_FORCE]),
-            "head": float(row[coupling.HEAD_HEIGHT]),
-            "wire": float(row[coupling.WIRE_HEIGHT]),
-            "frame_force": float(row[coupling.FRAME_FORCE]),
-            "head_force": float(row[coupling.HEAD_FORCE]),
-            "position": float(task.plant.run.step[0] * task.plant.run.stride[0]),
-            "reward_terms": dict(zip(TERMS, task.terms[0].tolist(), strict=True)),
+            "contact_force": row[coupling.CONTACT_FORCE],
+            "head": row[coupling.HEAD_HEIGHT],
+            "wire": row[coupling.WIRE_HEIGHT],
+            "frame_force": row[coupling.FRAME_FORCE],
+            "head_force": row[coupling.HEAD_FORCE],
+            "position": steps * float(run.stride[0]),
+            "reward_terms": dict(zip(TERMS, episode.terms[0].tolist(), strict=True)),
         }
         if terminated or truncated:
             self._running = False
-            info["figures"] = self.trajectory.summary().as_dict()
+            info["figures"] = task.figures(0).as_dict()
         return (
-            task.observation[0].copy(),
-            float(task.reward[0]),
+            episode.observation[0].copy(),
+            float(episode.reward[0]),
             terminated,
             truncated and not terminated,
             info,
@@ -185,14 +188,16 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return picture(self.trajectory)
 
 
-def _check_action(action: Any, size: int) -> NDArray[np.float64]:
+def checked(action: Any, shape: tuple[int, ...]) -> Array:
+    """Action as an array of this shape. Raises InputError where it is of another or not finite."""
     try:
         force = np.asarray(action, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"The action must be {size} numbers in -1..1, not {action!r}.") from error
-    if force.shape != (size,):
-        raise InputError(f"The action must have the shape ({size},), not {force.shape}.")
-    if not np.isfinite(force).all():
+        raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {action!r}.") from error
+    if force.shape != shape:
+        raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
+    # The sum is finite where all are: cheaper than to ask each.
+    if not math.isfinite(force.sum()):
         raise InputError(f"The action must be finite, not {action!r}; check the policy.")
     return force
 

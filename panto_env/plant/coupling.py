@@ -77,54 +77,63 @@ def irregularity(waves, x):
     return total
 
 
-@kernel
-def advance(line, wire, body, drive, run, command, steps, samples):
-    """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N).
+@part
+def advance_lane(line, wire, body, drive, run, lane, frame_command, head_command, steps, samples):
+    """Advance one lane by ``steps`` steps under constant commands (N).
 
-    The sample of a lane's step n (counted from 0) is written to row n + 1: row 0 is the start.
+    The sample of step n (counted from 0) is written to row n + 1, counted round where the arrays have
+    fewer rows than the run has steps; row 0 is the start.
     """
     half = body.state.shape[1] // 2
     recorded = samples.uplift.shape[2] > 0 or samples.tension.shape[2] > 0
+    state, waves = body.state[lane], run.waves[lane]
+    for _ in range(steps):
+        n = run.step[lane]
+        x0 = run.start[lane] + run.stride[lane] * n
+        x1 = run.start[lane] + run.stride[lane] * (n + 1)
+        actuate(drive, lane, frame_command, head_command)
+        head_0, frame_0 = state[0], state[half - 1]
+        head_rate_0, frame_rate_0 = state[half], state[2 * half - 1]
+        gap_0 = run.gap[lane]
+
+        head_free = move_free(body, lane, drive.force[lane, FRAME], drive.force[lane, HEAD])
+        wire_free, wire_yield, spring = move_wire(line, wire, lane, x0, x1, run.force[lane])
+        wire_free += irregularity(waves, x1)
+        stiffness = 1.0 / (run.strip_compliance[lane] + spring)
+        force = contact_force(
+            run.stiffness[lane],
+            gap_0,
+            stiffness,
+            head_free - wire_free,
+            run.strip_damping[lane],
+            wire_yield - body.contact_input[0],
+            run.lowest_force[lane],
+        )
+        press(body, lane, force)
+        load_wire(line, wire, lane, x0, x1, force)
+        gap_1 = state[0] - wire_free - wire_yield * force
+
+        k = (n + 1) % samples.channels.shape[1]
+        row = samples.channels[lane, k]
+        row[CONTACT_FORCE] = force
+        row[HEAD_HEIGHT] = 0.5 * (head_0 + state[0])
+        row[FRAME_HEIGHT] = 0.5 * (frame_0 + state[half - 1])
+        row[WIRE_HEIGHT] = 0.5 * (head_0 - gap_0 + state[0] - gap_1) + spring * force
+        row[HEAD_VELOCITY] = 0.5 * (head_rate_0 + state[half])
+        row[FRAME_VELOCITY] = 0.5 * (frame_rate_0 + state[2 * half - 1])
+        row[FRAME_FORCE] = drive.force[lane, FRAME]
+        row[HEAD_FORCE] = drive.force[lane, HEAD]
+        if recorded:
+            record_wire(line, wire, lane, samples.uplift[lane, k], samples.tension[lane, k])
+        run.force[lane] = force
+        run.gap[lane] = gap_1
+        run.stiffness[lane] = stiffness
+        run.step[lane] = n + 1
+
+
+@kernel
+def advance(line, wire, body, drive, run, command, steps, samples):
+    """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N)."""
     for lane in range(body.state.shape[0]):
-        state, waves = body.state[lane], run.waves[lane]
-        for _ in range(steps):
-            n = run.step[lane]
-            x0 = run.start[lane] + run.stride[lane] * n
-            x1 = run.start[lane] + run.stride[lane] * (n + 1)
-            actuate(drive, lane, command[lane, FRAME], command[lane, HEAD])
-            head_0, frame_0 = state[0], state[half - 1]
-            head_rate_0, frame_rate_0 = state[half], state[2 * half - 1]
-            gap_0 = run.gap[lane]
-
-            head_free = move_free(body, lane, drive.force[lane, FRAME], drive.force[lane, HEAD])
-            wire_free, wire_yield, spring = move_wire(line, wire, lane, x0, x1, run.force[lane])
-            wire_free += irregularity(waves, x1)
-            stiffness = 1.0 / (run.strip_compliance[lane] + spring)
-            force = contact_force(
-                run.stiffness[lane],
-                gap_0,
-                stiffness,
-                head_free - wire_free,
-                run.strip_damping[lane],
-                wire_yield - body.contact_input[0],
-                run.lowest_force[lane],
-            )
-            press(body, lane, force)
-            load_wire(line, wire, lane, x0, x1, force)
-            gap_1 = state[0] - wire_free - wire_yield * force
-
-            row = samples.channels[lane, n + 1]
-            row[CONTACT_FORCE] = force
-            row[HEAD_HEIGHT] = 0.5 * (head_0 + state[0])
-            row[FRAME_HEIGHT] = 0.5 * (frame_0 + state[half - 1])
-            row[WIRE_HEIGHT] = 0.5 * (head_0 - gap_0 + state[0] - gap_1) + spring * force
-            row[HEAD_VELOCITY] = 0.5 * (head_rate_0 + state[half])
-            row[FRAME_VELOCITY] = 0.5 * (frame_rate_0 + state[2 * half - 1])
-            row[FRAME_FORCE] = drive.force[lane, FRAME]
-            row[HEAD_FORCE] = drive.force[lane, HEAD]
-            if recorded:
-                record_wire(line, wire, lane, samples.uplift[lane, n + 1], samples.tension[lane, n + 1])
-            run.force[lane] = force
-            run.gap[lane] = gap_1
-            run.stiffness[lane] = stiffness
-            run.step[lane] = n + 1
+        frame_command, head_command = command[lane, FRAME], command[lane, HEAD]
+        advance_lane(line, wire, body, drive, run, lane, frame_command, head_command, steps, samples)

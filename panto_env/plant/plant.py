@@ -127,11 +127,11 @@ class Plant:
         run.gap[lane] = force * (self.strip_compliance + spring)
         run.stiffness[lane] = 1 / (self.strip_compliance + spring)
 
-    def samples(self, rows: int, *, uplift: bool = True, tension: bool = False) -> Samples:
-        """Arrays of ``rows`` rows for ``advance`` to record in, one more than there are steps."""
+    def samples(self, rows: int, *, tension: bool = False) -> Samples:
+        """Arrays of ``rows`` rows for ``advance`` to record in: one more than steps are to be kept."""
         return Samples(
             channels=np.zeros((self.lanes, rows, CHANNELS)),
-            uplift=np.zeros((self.lanes, rows, len(self.supports) if uplift else 0)),
+            uplift=np.zeros((self.lanes, rows, len(self.supports))),
             tension=np.zeros((self.lanes, rows, len(self.droppers) if tension else 0)),
         )
 

@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..catalog.schema import PantographData
 from ..plant import coupling
 from ..plant.actuator import Actuator
-from ..plant.jit import kernel
+from ..plant.jit import part
 from ..plant.sensor import Sensors
 
 BOUND = 10.0
@@ -88,41 +88,38 @@ def noise_scale(sensors: Sensors) -> Array:
     return np.array([sensors.displacement_noise] * 2 + [sensors.velocity_noise] * 2 + [sensors.force_noise])
 
 
-@kernel
-def observe(run, body, channels, action, noise, delay, span, time_step, full, scale, out):
-    """Observations of all lanes, (lanes, entries), into ``out`` as float32.
+@part
+def observe(episode, run, body, channels, lane):
+    """Observation of one lane into ``episode.observation`` as float32.
 
-    channels: (lanes, steps + 1, CHANNELS), row 0 the start. noise: (lanes, READINGS) in units.
-    delay: age of the readings in steps.
+    channels: (lanes, rows, CHANNELS), the row of a step as ``coupling.advance_lane`` counts it.
     """
-    actions = action.shape[1]
-    half = body.state.shape[1] // 2
-    for lane in range(out.shape[0]):
-        n = run.step[lane]
-        row = channels[lane, max(n - delay, 0)]
-        angle = 2 * np.pi * (run.start[lane] + run.stride[lane] * n) / span
-        view = out[lane]
-        view[0] = (row[coupling.HEAD_HEIGHT] + noise[lane, 0]) / scale[0]
-        view[1] = (row[coupling.FRAME_HEIGHT] + noise[lane, 1]) / scale[1]
-        view[2] = (row[coupling.HEAD_VELOCITY] + noise[lane, 2]) / scale[2]
-        view[3] = (row[coupling.FRAME_VELOCITY] + noise[lane, 3]) / scale[3]
-        view[4] = (row[coupling.CONTACT_FORCE] + noise[lane, 4]) / scale[4]
-        view[5] = np.sin(angle)
-        view[6] = np.cos(angle)
-        view[7] = run.stride[lane] / time_step / scale[7]
-        k = 8
-        for a in range(actions):
-            view[k + a] = action[lane, a]
-        k += actions
-        if full:
-            last = channels[lane, n]
-            view[k] = last[coupling.WIRE_HEIGHT] / scale[k]
-            view[k + 1] = last[coupling.FRAME_FORCE] / scale[k + 1]
-            view[k + 2] = last[coupling.HEAD_FORCE] / scale[k + 2]
-            k += 3
-            for m in range(1, half - 1):
-                view[k] = body.state[lane, m] / scale[k]
-                view[k + 1] = body.state[lane, half + m] / scale[k + 1]
-                k += 2
-        for i in range(view.size):
-            view[i] = min(max(view[i], -BOUND), BOUND)
+    n, rows = run.step[lane], channels.shape[1]
+    row = channels[lane, max(n - episode.delay, 0) % rows]
+    angle = 2 * np.pi * (run.start[lane] + run.stride[lane] * n) / episode.span
+    view, scale, noise = episode.observation[lane], episode.scale, episode.noise[lane]
+    view[0] = (row[coupling.HEAD_HEIGHT] + noise[0]) / scale[0]
+    view[1] = (row[coupling.FRAME_HEIGHT] + noise[1]) / scale[1]
+    view[2] = (row[coupling.HEAD_VELOCITY] + noise[2]) / scale[2]
+    view[3] = (row[coupling.FRAME_VELOCITY] + noise[3]) / scale[3]
+    view[4] = (row[coupling.CONTACT_FORCE] + noise[4]) / scale[4]
+    view[5] = np.sin(angle)
+    view[6] = np.cos(angle)
+    view[7] = run.stride[lane] / episode.time_step / scale[7]
+    k = 8
+    for a in range(episode.action.shape[1]):
+        view[k] = episode.action[lane, a]
+        k += 1
+    if episode.full:
+        half = body.state.shape[1] // 2
+        last = channels[lane, n % rows]
+        view[k] = last[coupling.WIRE_HEIGHT] / scale[k]
+        view[k + 1] = last[coupling.FRAME_FORCE] / scale[k + 1]
+        view[k + 2] = last[coupling.HEAD_FORCE] / scale[k + 2]
+        k += 3
+        for m in range(1, half - 1):
+            view[k] = body.state[lane, m] / scale[k]
+            view[k + 1] = body.state[lane, half + m] / scale[k + 1]
+            k += 2
+    for i in range(view.size):
+        view[i] = min(max(view[i], -BOUND), BOUND)

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from ..plant import coupling
-from ..plant.jit import kernel
+from ..plant.jit import part
 from ..settings import NonNegative, Settings
 
 # Columns of the terms, each summed over one control step and not weighted.
@@ -25,42 +25,42 @@ class Reward(Settings):
     rate: NonNegative = Field(0.0, description="weight of the squared change of action (-)")
 
 
-@kernel
-def judge(run, channels, nominal, action, last_action, steps, distance, weights, lost, terms, reward):
-    """Terms (lanes, 4) and reward (lanes,) of the control step of ``steps`` steps just made.
+@part
+def judge(episode, run, channels, lane):
+    """Terms and reward of the control step that one lane has just made.
 
-    channels: (lanes, steps + 1, CHANNELS), row 0 the start. nominal: F_N (N), distance: planned (m),
-    lost: steps since contact was lost, all (lanes,). The terms "cost_function" (N m) and
-    "contact_loss" (%) sum over an episode to the CF and CL of its trajectory.
+    channels: (lanes, rows, CHANNELS). The terms "cost_function" (N m) and "contact_loss" (%) sum over
+    an episode to the CF and CL of its trajectory.
     """
-    for lane in range(reward.size):
-        n = run.step[lane]
-        stride = run.stride[lane]
-        cost, gone = 0.0, 0
-        for i in range(n - steps + 1, n + 1):
-            force = channels[lane, i, coupling.CONTACT_FORCE]
-            if i > 1:
-                before = channels[lane, i - 1, coupling.CONTACT_FORCE]
-                cost += abs(before - nominal[lane]) + abs(force - nominal[lane])
-            if force <= 0:
-                gone += 1
-                lost[lane] += 1
-            else:
-                lost[lane] = 0
-        effort, rate = 0.0, 0.0
-        for a in range(action.shape[1]):
-            effort += action[lane, a] ** 2
-            rate += (0.5 * (action[lane, a] - last_action[lane, a])) ** 2
-        terms[lane, COST_FUNCTION] = 0.5 * stride * cost
-        terms[lane, CONTACT_LOSS] = 100.0 * gone * stride / distance[lane]
-        terms[lane, EFFORT] = effort
-        terms[lane, RATE] = rate
-        reward[lane] = -(
-            weights[COST_FUNCTION] * 0.5 * cost / (nominal[lane] * steps)
-            + weights[CONTACT_LOSS] * gone / steps
-            + weights[EFFORT] * effort
-            + weights[RATE] * rate
-        )
+    n, stride, steps = run.step[lane], run.stride[lane], episode.control_steps
+    nominal, rows = episode.nominal[lane], channels.shape[1]
+    cost, gone = 0.0, 0
+    for i in range(n - steps + 1, n + 1):
+        force = channels[lane, i % rows, coupling.CONTACT_FORCE]
+        if i > 1:
+            before = channels[lane, (i - 1) % rows, coupling.CONTACT_FORCE]
+            cost += abs(before - nominal) + abs(force - nominal)
+        if force <= 0:
+            gone += 1
+            episode.lost[lane] += 1
+        else:
+            episode.lost[lane] = 0
+    effort, rate = 0.0, 0.0
+    action, last_action = episode.action[lane], episode.last_action[lane]
+    for a in range(action.size):
+        effort += action[a] ** 2
+        rate += (0.5 * (action[a] - last_action[a])) ** 2
+    terms, weights = episode.terms[lane], episode.weights
+    terms[COST_FUNCTION] = 0.5 * stride * cost
+    terms[CONTACT_LOSS] = 100.0 * gone * stride / episode.distance[lane]
+    terms[EFFORT] = effort
+    terms[RATE] = rate
+    episode.reward[lane] = -(
+        weights[COST_FUNCTION] * 0.5 * cost / (nominal * steps)
+        + weights[CONTACT_LOSS] * gone / steps
+        + weights[EFFORT] * effort
+        + weights[RATE] * rate
+    )
 
 
 def weights(reward: Reward) -> np.ndarray:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..catalog import load_catenary, load_pantograph
 from ..errors import InputError
+from ..metrics import Figures
 from ..plant import coupling
 from ..plant.actuator import ACTUATORS, Actuator
+from ..plant.jit import bind
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from ..plant.numerics import Numerics
 from ..plant.plant import Plant
@@ -20,8 +24,10 @@ from ..plant.sensor import SENSORS, Sensors
 from ..settings import parse
 from ..trajectory import Trajectory
 from . import observation as obs
+from . import tally
+from .episode import Episode, control_step, first_look
 from .policy import Context
-from .reward import TERMS, Reward, judge, weights
+from .reward import TERMS, Reward, weights
 
 CONTROL_INTERVAL = 0.01
 """Time between actions (s): published active pantographs are controlled at 50-100 Hz."""
@@ -31,6 +37,8 @@ LOST_FOR = 0.5
 """Time without contact (s) after which an episode ends."""
 DEFAULT_LINE = "en50318-2002"
 DEFAULT_SPEED_KMH = 300.0
+LANES_A_THREAD = 8
+"""Fewer lanes than this are not worth a thread of their own."""
 
 
 class Task:
@@ -56,6 +64,7 @@ class Task:
         precision: str | None = None,
         bilateral: bool = False,
         lanes: int = 1,
+        keep_samples: bool = True,
         record_droppers: bool = False,
     ) -> None:
         """Build the plant and the arrays of an episode.
@@ -64,18 +73,21 @@ class Task:
         to draw from. actuator, sensors, line_condition, reward: a preset's name, a table, or the
         settings. distance: of an episode (m), to the end of the line by default; a line too short
         for it gets more spans. time_step (s), spacing (m), window, precision: see ``Numerics``.
-        bilateral: let the contact pull, as paper 3's equations do.
+        bilateral: let the contact pull, as paper 3's equations do. keep_samples: keep those of a whole
+        episode, for ``trajectory``; without them figures are kept as the episode runs.
         Raises InputError for what is not valid.
         """
         line, panto = load_catenary(catenary), load_pantograph(pantograph)
         self.actuator = parse(Actuator, actuator, "actuator", ACTUATORS)
         self.sensors = parse(Sensors, sensors, "sensors", SENSORS)
         self.condition = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
-        self.reward_settings = parse(Reward, {} if reward is None else reward, "reward")
+        reward_settings = parse(Reward, {} if reward is None else reward, "reward")
         if observation not in obs.OBSERVATIONS:
             raise InputError(
                 f"observation must be one of {', '.join(obs.OBSERVATIONS)}, not {observation!r}."
             )
+        if not (isinstance(lanes, int) and lanes >= 1):
+            raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
         if distance is not None:
             if not (isinstance(distance, int | float) and math.isfinite(distance) and distance > 0):
                 raise InputError(f"distance must be a positive number (m), not {distance!r}.")
@@ -83,7 +95,6 @@ class Task:
                 spans = max(line.spans, math.ceil(distance / line.span_length) + 1)
         given = {"time_step": time_step, "spacing": spacing, "window": window, "precision": precision}
         numerics = parse(Numerics, {k: v for k, v in given.items() if v is not None}, "the discretisation")
-        time_step = numerics.time_step
         self.plant = Plant(
             line,
             panto,
@@ -100,40 +111,62 @@ class Task:
                 f"distance must be at most {self.plant.line_length:g} m on {self.plant.spans} spans, "
                 f"not {self.distance:g} m; ask for more spans."
             )
-        self.control_steps = round(control_interval / time_step)
-        if self.control_steps < 1 or abs(self.control_steps * time_step - control_interval) > 1e-9:
-            raise InputError(
-                f"control_interval must be a whole number of time steps of {1e3 * time_step:g} ms, "
-                f"not {1e3 * control_interval:g} ms."
-            )
         self.control_interval = control_interval
+        self.control_steps = _whole_steps(control_interval, numerics.time_step)
         self.speed_range = self.check_speeds(speed_kmh)
         self.layout = obs.layout(observation, self.actuator, panto)
-        self._scale = self.layout.scale
-        self._noise_scale = obs.noise_scale(self.sensors)
-        self._delay = round(self.sensors.delay / time_step)
-        self._weights = weights(self.reward_settings)
-        self._lost_limit = round(LOST_FOR / time_step)
-
-        actions = len(self.actuator.channels)
         self.speed = np.zeros(lanes)  # m/s
-        self.nominal = np.zeros(lanes)  # N
-        self.episode_steps = np.zeros(lanes, dtype=np.int64)  # plant steps an episode has
-        self.episode_distance = np.zeros(lanes)  # m
-        self.terms = np.zeros((lanes, len(TERMS)))
-        self.reward = np.zeros(lanes)
-        self.observation = np.zeros((lanes, len(self.layout.entries)), dtype=np.float32)
-        self.action = np.zeros((lanes, actions))
-        self.terminated = np.zeros(lanes, dtype=bool)
-        self._last_action = np.zeros((lanes, actions))
-        self._command = np.zeros((lanes, 2))
-        self._noise = np.zeros((lanes, obs.READINGS))
-        self._lost = np.zeros(lanes, dtype=np.int64)
+        self.episode = self._episode(weights(reward_settings))
+        self._noise_scale = obs.noise_scale(self.sensors)
         self._random: list[np.random.Generator] = [np.random.default_rng(0)] * lanes
-        # The slowest run sets how many samples an episode may have; row 0 is the start.
-        longest = self._steps(self.speed_range[0]) + 1
         self._record_droppers = record_droppers
-        self.samples = self.plant.samples(longest, tension=record_droppers)
+        # The slowest run sets how many samples an episode may have; row 0 is the start.
+        rows = self._steps(self.speed_range[0]) + 1
+        if not keep_samples:
+            rows = min(rows, self.episode.delay + self.control_steps + 2)
+        self.keep_samples = keep_samples
+        self.samples = self.plant.samples(rows, tension=record_droppers)
+        self.tally = tally.tally(0 if keep_samples else lanes, len(self.plant.supports), numerics.time_step)
+        self._threads = _threads(lanes)
+        self._bind()
+
+    def _episode(self, reward_weights: Array) -> Episode:
+        lanes, actions = self.plant.lanes, len(self.actuator.channels)
+        time_step = self.plant.time_step
+        return Episode(
+            action=np.zeros((lanes, actions)),
+            last_action=np.zeros((lanes, actions)),
+            channels=np.array(self.actuator.channels, dtype=np.int64),
+            force_limit=self.actuator.force_limit,
+            nominal=np.zeros(lanes),
+            end=np.zeros(lanes, dtype=np.int64),
+            distance=np.zeros(lanes),
+            weights=reward_weights,
+            lost=np.zeros(lanes, dtype=np.int64),
+            terms=np.zeros((lanes, len(TERMS))),
+            reward=np.zeros(lanes),
+            terminated=np.zeros(lanes, dtype=np.bool_),
+            truncated=np.zeros(lanes, dtype=np.bool_),
+            observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
+            noise=np.zeros((lanes, obs.READINGS)),
+            scale=self.layout.scale,
+            delay=round(self.sensors.delay / time_step),
+            span=float(self.plant.catenary.span_length),
+            time_step=time_step,
+            full=self.layout.kind == "full",
+            control_steps=self.control_steps,
+            lost_limit=round(LOST_FOR / time_step),
+            head_range=HEAD_RANGE,
+        )
+
+    def _bind(self) -> None:
+        plant = self.plant
+        self._arguments = (
+            plant.line, plant.wire, plant.body, plant.drive, plant.run, self.samples, self.episode, self.tally
+        )  # fmt: skip
+        self._control_step = bind(control_step, *self._arguments, 0, 1)
+        self._look = (plant.body, plant.run, self.samples, self.episode)
+        self._first_look = bind(first_look, *self._look, 0, 1)
 
     @property
     def lanes(self) -> int:
@@ -162,47 +195,44 @@ class Task:
         possible = self.plant.line_length / stride + 1e-9
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
-    def reset(self, lane: int, random: np.random.Generator, speed: float | None = None) -> None:
-        """Start an episode in one lane: draw its speed (m/s, unless given) and its line."""
+    def reset(self, lane: int, random: np.random.Generator) -> None:
+        """Start an episode in one lane: draw its speed and its line."""
         low, high = self.speed_range
-        if speed is None:
-            speed = low if low == high else float(random.uniform(low, high))
+        speed = low if low == high else float(random.uniform(low, high))
         waves = draw(self.condition, random) if self.condition.waves else None
-        self.plant.start(lane, speed, waves)
+        plant, episode = self.plant, self.episode
+        plant.start(lane, speed, waves)
         self.speed[lane] = speed
-        self.nominal[lane] = self.plant.body.lift[lane]
-        self.episode_steps[lane] = self._steps(speed)
-        self.episode_distance[lane] = self.episode_steps[lane] * self.plant.run.stride[lane]
-        rows = self.episode_steps[lane] + 1
-        if rows > self.samples.channels.shape[1]:  # slower than any speed of the range
-            self.samples = self.plant.samples(int(rows), tension=self._record_droppers)
-        self.plant.clear(self.samples, lane)
-        self._random[lane] = random
-        self.action[lane] = self._last_action[lane] = 0.0
-        self._lost[lane] = 0
-        self.terminated[lane] = False
-        self.terms[lane] = 0.0
-        row = self.samples.channels[lane, 0]
-        half = len(self.plant.pantograph.masses)
-        state = self.plant.body.state[lane]
+        episode.nominal[lane] = plant.body.lift[lane]
+        episode.end[lane] = self._steps(speed)
+        episode.distance[lane] = episode.end[lane] * plant.run.stride[lane]
+        for array in (episode.action, episode.last_action, episode.lost, episode.terms, episode.reward):
+            array[lane] = 0
+        episode.terminated[lane] = episode.truncated[lane] = False
+        plant.clear(self.samples, lane)
+        if not self.keep_samples:
+            tally.clear(self.tally, lane)
+        row, state = self.samples.channels[lane, 0], plant.body.state[lane]
         row[:] = 0.0
-        row[coupling.CONTACT_FORCE] = self.plant.run.force[lane]
+        row[coupling.CONTACT_FORCE] = plant.run.force[lane]
         row[coupling.HEAD_HEIGHT] = state[0]
-        row[coupling.FRAME_HEIGHT] = state[half - 1]
-        row[coupling.WIRE_HEIGHT] = state[0] - self.plant.run.force[lane] * self.plant.strip_compliance
-        self._observe()
+        row[coupling.FRAME_HEIGHT] = state[len(plant.pantograph.masses) - 1]
+        row[coupling.WIRE_HEIGHT] = state[0] - plant.run.force[lane] * plant.strip_compliance
+        self._random[lane] = random
+        self._draw_noise(lane, lane + 1)
+        self._first_look(*self._look, lane, lane + 1)
 
     def context(self, lane: int) -> Context:
         """What a policy may know of a lane's episode."""
         return Context(
             layout=self.layout,
-            actions=self.action.shape[1],
+            actions=self.episode.action.shape[1],
             channels=self.actuator.channels,
             force_limit=self.actuator.force_limit,
             control_interval=self.control_interval,
             speed=float(self.speed[lane]),
             span_length=self.plant.catenary.span_length,
-            nominal_force=float(self.nominal[lane]),
+            nominal_force=float(self.episode.nominal[lane]),
             catenary=self.plant.catenary,
             pantograph=self.plant.pantograph,
         )
@@ -210,66 +240,43 @@ class Task:
     def step(self, action: Array) -> None:
         """One control step of all lanes under actions, (lanes, actions), clipped to -1..1.
 
-        Results are in ``observation``, ``reward``, ``terms``, ``terminated`` and ``done``.
+        Results are in ``episode``: observation, reward, terms, terminated, truncated.
         """
-        self._last_action[:] = self.action
-        np.clip(action, -1.0, 1.0, out=self.action)
-        for column, channel in enumerate(self.actuator.channels):
-            self._command[:, channel] = self.action[:, column] * self.actuator.force_limit
-        steps = self.control_steps
-        run = self.plant.run
-        self.plant.advance(self._command, steps, self.samples)
-        judge(
-            run,
-            self.samples.channels,
-            self.nominal,
-            self.action,
-            self._last_action,
-            steps,
-            self.episode_distance,
-            self._weights,
-            self._lost,
-            self.terms,
-            self.reward,
-        )
-        head = self.plant.body.state[:, 0]
-        self.terminated = (np.abs(head) > HEAD_RANGE) | (self._lost >= self._lost_limit)
-        for lane in np.flatnonzero(self.terminated):
-            self._charge_rest(int(lane))
-        self._observe()
+        self.episode.action[:] = action
+        self._draw_noise(0, self.lanes)
+        if self._threads is None:
+            self._control_step(*self._arguments, 0, self.lanes)
+            return
+        pool, bounds = self._threads
+        jobs = [
+            pool.submit(self._control_step, *self._arguments, first, last)
+            for first, last in pairwise(bounds[1:])
+        ]
+        self._control_step(*self._arguments, bounds[0], bounds[1])
+        for job in jobs:
+            job.result()
 
     def coast(self) -> None:
         """Run all lanes, reset to one speed, to the end without actuators, in one kernel call."""
-        self._command[:] = 0.0
-        self.plant.advance(self._command, int(self.episode_steps[0]), self.samples)
+        self.plant.advance(np.zeros((self.lanes, 2)), int(self.episode.end[0]), self.samples)
 
-    def _charge_rest(self, lane: int) -> None:
-        """A run that ends early pays as if it went on without contact: it must not be a way out."""
-        left = (self.episode_steps[lane] - self.plant.run.step[lane]) / self.control_steps
-        charge = self.reward_settings.cost_function + self.reward_settings.contact_loss
-        self.reward[lane] -= left * charge
-
-    @property
-    def done(self) -> NDArray[np.bool_]:
-        """Lanes that have reached the end of their run."""
-        return self.plant.run.step >= self.episode_steps
-
-    def _observe(self) -> None:
+    def _draw_noise(self, first: int, last: int) -> None:
         if self.sensors.noisy:
-            for lane, random in enumerate(self._random):
-                self._noise[lane] = self._noise_scale * random.standard_normal(obs.READINGS)
-        obs.observe(
-            self.plant.run,
-            self.plant.body,
-            self.samples.channels,
-            self.action,
-            self._noise,
-            self._delay,
-            self.plant.catenary.span_length,
+            for lane in range(first, last):
+                drawn = self._random[lane].standard_normal(obs.READINGS)
+                self.episode.noise[lane] = self._noise_scale * drawn
+
+    def figures(self, lane: int) -> Figures:
+        """Figures of a lane's run so far, the same as its trajectory's summary."""
+        if self.keep_samples:
+            return self.trajectory(lane).summary()
+        return tally.figures(
+            self.tally,
+            lane,
+            float(self.episode.nominal[lane]),
+            float(self.plant.run.stride[lane]),
             self.plant.time_step,
-            self.layout.kind == "full",
-            self._scale,
-            self.observation,
+            self.plant.supports,
         )
 
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
@@ -297,8 +304,28 @@ class Task:
             speed_kmh=3.6 * float(self.speed[lane]),
             span_length=plant.catenary.span_length,
             time_step=plant.time_step,
-            nominal_force=float(self.nominal[lane]),
+            nominal_force=float(self.episode.nominal[lane]),
             policy=policy,
             seed=seed,
-            terminated=bool(self.terminated[lane]),
+            terminated=bool(self.episode.terminated[lane]),
         )
+
+
+def _whole_steps(control_interval: float, time_step: float) -> int:
+    steps = round(control_interval / time_step)
+    if steps < 1 or abs(steps * time_step - control_interval) > 1e-9:
+        raise InputError(
+            f"control_interval must be a whole number of time steps of {1e3 * time_step:g} ms, "
+            f"not {1e3 * control_interval:g} ms."
+        )
+    return steps
+
+
+def _threads(lanes: int) -> tuple[ThreadPoolExecutor, list[int]] | None:
+    """Threads that share the lanes, one beside the caller's for each further core, and the bounds."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = min(cores, lanes // LANES_A_THREAD)
+    if count < 2:
+        return None
+    bounds = [lanes * k // count for k in range(count + 1)]
+    return ThreadPoolExecutor(count - 1, thread_name_prefix="panto"), bounds
