@@ -3,8 +3,9 @@
 import gymnasium
 
 from .single import PantographEnv
+from .vector import PantographVectorEnv
 
-__all__ = ["IDS", "PantographEnv", "register"]
+__all__ = ["IDS", "PantographEnv", "PantographVectorEnv", "register"]
 
 IDS = {
     "Pantograph-v0": {},
@@ -18,4 +19,9 @@ def register() -> None:
     """Make the ids known to ``gymnasium.make``, once."""
     for name, settings in IDS.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, entry_point="panto_env.envs:PantographEnv", kwargs=settings)
+            gymnasium.register(
+                name,
+                entry_point="panto_env.envs:PantographEnv",
+                vector_entry_point="panto_env.envs:PantographVectorEnv",
+                kwargs=settings,
+            )

@@ -103,7 +103,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(self, render_mode: str | None = None, **settings: Any) -> None:
         """See the class. Raises InputError for an argument that is unknown or not valid."""
-        _check_names(settings, "argument")
+        check_names(settings, "argument")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode must be None or 'rgb_array', not {render_mode!r}.")
         self.render_mode = render_mode
@@ -136,7 +136,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return task.episode.observation[0].copy(), {"speed_kmh": 3.6 * float(task.speed[0])}
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
-        _check_names(options, "option")
+        check_names(options, "option")
         if not options:
             return self._usual
         task = Task(**self._settings | options)
@@ -202,7 +202,8 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     return force
 
 
-def _check_names(given: dict[str, Any], what: str) -> None:
+def check_names(given: dict[str, Any], what: str) -> None:
+    """Raise InputError for a name that is not one of ``SETTINGS``."""
     for name in given:
         if name not in SETTINGS:
             raise InputError(f"Unknown {what} '{name}': {suggest(str(name), SETTINGS)}.")

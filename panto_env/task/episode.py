@@ -32,6 +32,7 @@ class Episode(NamedTuple):
     lost: Index  # (lanes,): plant steps since contact was lost
     terms: Array  # (lanes, terms): of the last control step
     reward: Array  # (lanes,)
+    idle: Flags  # (lanes,): lanes that the next step leaves as they are
     terminated: Flags  # (lanes,): whether the plant has left its valid range
     truncated: Flags  # (lanes,): whether the end of the run is reached
     observation: NDArray[np.float32]  # (lanes, entries)
@@ -57,6 +58,10 @@ def end_early(episode, run, lane):
 def control_step(line, wire, body, drive, run, samples, episode, tally, first, last):
     """One control step of the lanes from ``first`` to before ``last`` under ``episode.action``."""
     for lane in range(first, last):
+        if episode.idle[lane]:
+            for a in range(episode.channels.size):
+                episode.action[lane, a] = 0.0
+            continue
         frame, head = 0.0, 0.0
         for a in range(episode.channels.size):
             share = min(max(episode.action[lane, a], -1.0), 1.0)

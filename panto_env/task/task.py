@@ -25,7 +25,7 @@ from ..settings import parse
 from ..trajectory import Trajectory
 from . import observation as obs
 from . import tally
-from .episode import Episode, control_step, first_look
+from .episode import Episode, Flags, control_step, first_look
 from .policy import Context
 from .reward import TERMS, Reward, weights
 
@@ -145,6 +145,7 @@ class Task:
             lost=np.zeros(lanes, dtype=np.int64),
             terms=np.zeros((lanes, len(TERMS))),
             reward=np.zeros(lanes),
+            idle=np.zeros(lanes, dtype=np.bool_),
             terminated=np.zeros(lanes, dtype=np.bool_),
             truncated=np.zeros(lanes, dtype=np.bool_),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
@@ -219,6 +220,7 @@ class Task:
         row[coupling.FRAME_HEIGHT] = state[len(plant.pantograph.masses) - 1]
         row[coupling.WIRE_HEIGHT] = state[0] - plant.run.force[lane] * plant.strip_compliance
         self._random[lane] = random
+        episode.idle[lane] = False
         self._draw_noise(lane, lane + 1)
         self._first_look(*self._look, lane, lane + 1)
 
@@ -237,11 +239,14 @@ class Task:
             pantograph=self.plant.pantograph,
         )
 
-    def step(self, action: Array) -> None:
-        """One control step of all lanes under actions, (lanes, actions), clipped to -1..1.
+    def step(self, action: Array, skip: Flags | None = None) -> None:
+        """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
+        Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
         Results are in ``episode``: observation, reward, terms, terminated, truncated.
         """
+        if skip is not None:
+            self.episode.idle[:] = skip
         self.episode.action[:] = action
         self._draw_noise(0, self.lanes)
         if self._threads is None:
@@ -263,6 +268,8 @@ class Task:
     def _draw_noise(self, first: int, last: int) -> None:
         if self.sensors.noisy:
             for lane in range(first, last):
+                if self.episode.idle[lane]:
+                    continue
                 drawn = self._random[lane].standard_normal(obs.READINGS)
                 self.episode.noise[lane] = self._noise_scale * drawn
 

@@ -1,0 +1,165 @@
+"""The native vector environment: many lanes in one kernel call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..task import Task
+from ..task.observation import BOUND
+from ..task.reward import TERMS
+from .single import check_names, checked
+
+Lanes = NDArray[np.bool_]
+
+
+class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """Many pantographs, each on a line of its own, stepped together on all cores.
+
+    `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
+    speed, line irregularity and noise drawn a lane. Lane i, seeded seed + i, sees bit for bit what a
+    single environment seeded so sees. `autoreset_mode` is "NextStep" (as Gymnasium's default), "SameStep"
+    or "Disabled", where `reset(options={"reset_mask": ...})` begins anew in the lanes marked.
+
+    `infos` holds arrays of a value a lane ("contact_force" (N), "position" (m), the reward's terms) and,
+    for lanes whose episode ends, "figures".
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: None = None,
+        **settings: Any,
+    ) -> None:
+        """See the class. Raises InputError for an argument that is unknown or not valid."""
+        check_names(settings, "argument")
+        if render_mode is not None:
+            raise InputError("The vector environment does not render; leave render_mode at None.")
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError as error:
+            names = ", ".join(mode.value for mode in AutoresetMode)
+            raise InputError(f"autoreset_mode must be one of {names}, not {autoreset_mode!r}.") from error
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.num_envs = num_envs
+        self.render_mode = None
+        self.task = Task(**settings, lanes=num_envs, keep_samples=False)
+        episode = self.task.episode
+        self.single_observation_space = gymnasium.spaces.Box(
+            -BOUND, BOUND, episode.observation[0].shape, np.float32
+        )
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, episode.action[0].shape, np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._random: list[np.random.Generator] = []
+        self._ended: Lanes = np.zeros(num_envs, dtype=np.bool_)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
+
+        seed: of lane 0, lane i having seed + i; or one a lane.
+        """
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        if options:
+            raise InputError(f"Unknown option '{next(iter(options))}': known is reset_mask.")
+        lanes = self._masked(mask)
+        seeds = self._seeds(seed)
+        if not self._random:
+            self._random = [seeding.np_random(lane_seed)[0] for lane_seed in seeds]
+        elif seed is not None:
+            for lane in np.flatnonzero(lanes).tolist():
+                self._random[lane] = seeding.np_random(seeds[lane])[0]
+        self._restart(lanes)
+        return self.task.episode.observation.copy(), {"speed_kmh": 3.6 * self.task.speed}
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], Lanes, Lanes, dict[str, Any]]:
+        """Hold ``actions``, (num_envs, actions), for one control interval in every lane.
+
+        Raises InputError, and changes nothing, for actions that are not valid.
+        """
+        if not self._random:
+            raise InputError("No episode has begun; call reset before step.")
+        task, episode = self.task, self.task.episode
+        force = checked(actions, episode.action.shape)
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
+            lane = int(np.flatnonzero(self._ended)[0])
+            raise InputError(
+                f"The episode of lane {lane} has ended; call reset with options={{'reset_mask': ...}}."
+            )
+        waiting = self._ended.copy()  # in "NextStep": lanes that begin anew instead of stepping
+        if waiting.any():
+            self._restart(waiting)
+        task.step(force, skip=waiting)
+        reward = np.where(waiting, 0.0, episode.reward)
+        terminated = episode.terminated.copy()
+        truncated = episode.truncated & ~terminated
+        self._ended = terminated | truncated
+        infos: dict[str, Any] = {
+            "contact_force": task.plant.run.force.copy(),
+            "position": task.plant.run.step * task.plant.run.stride,
+            **dict(zip(TERMS, episode.terms.T.copy(), strict=True)),
+        }
+        for lane in np.flatnonzero(self._ended):
+            infos = self._add_info(infos, {"figures": task.figures(int(lane)).as_dict()}, int(lane))
+        observation = episode.observation.copy()
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
+            observation, infos = self._same_step(observation, infos)
+        return observation, reward, terminated, truncated, infos
+
+    def _same_step(
+        self, observation: NDArray[np.float32], infos: dict[str, Any]
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin anew at once where episodes have ended; what they ended with goes to the infos."""
+        ended = self._ended.copy()
+        final = np.full(self.num_envs, None, dtype=object)
+        for lane in np.flatnonzero(ended):
+            final[lane] = observation[lane].copy()
+        outcome = dict(infos)
+        self._restart(ended)
+        fresh = {
+            "speed_kmh": 3.6 * self.task.speed,
+            "final_obs": final,
+            "_final_obs": ended,
+            "final_info": outcome,
+            "_final_info": ended,
+        }
+        return self.task.episode.observation.copy(), infos | fresh
+
+    def _restart(self, lanes: Lanes) -> None:
+        for lane in np.flatnonzero(lanes):
+            self.task.reset(int(lane), self._random[lane])
+            self._ended[lane] = False
+
+    def _masked(self, mask: Any) -> Lanes:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        lanes = np.asarray(mask)
+        if lanes.shape != (self.num_envs,) or lanes.dtype != np.bool_ or not self._random:
+            raise InputError(
+                f"reset_mask must be {self.num_envs} booleans, given after a first reset of all lanes."
+            )
+        return lanes
+
+    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + lane for lane in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InputError(f"seed must be a number or one a lane, {self.num_envs}, not {len(seed)}.")
+        return list(seed)

@@ -1,0 +1,130 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import ClipAction, NormalizeObservation, RecordEpisodeStatistics
+
+from panto_env import InputError
+from panto_env.envs import IDS
+
+LIVELY = {"sensors": "realistic", "actuator": "realistic", "line_condition": "fair", "speed_kmh": (250, 300)}
+
+
+def make(name="Pantograph-v0", lanes=3, **settings):
+    return gymnasium.make_vec(f"panto_env:{name}", num_envs=lanes, **settings)
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("lanes", [3, 20])
+def test_lane_i_is_the_single_environment_seeded_seed_plus_i(name, lanes):
+    """Bit for bit, over the end of an episode and the autoreset, on one thread and on several."""
+    settings = LIVELY | {"distance": 40.0}
+    vector = make(name, lanes, **settings)
+    singles = [gymnasium.make(name, **settings) for _ in range(lanes)]
+    observations, _ = vector.reset(seed=5)
+    alone = [env.reset(seed=5 + i)[0] for i, env in enumerate(singles)]
+    np.testing.assert_array_equal(observations, alone)
+    random, ended = np.random.default_rng(0), [False] * lanes
+    for _ in range(120):
+        actions = random.uniform(-1, 1, vector.action_space.shape).astype(np.float32)
+        observations, rewards, terminated, truncated, infos = vector.step(actions)
+        for i, env in enumerate(singles):
+            if ended[i]:
+                observation, reward, ends = env.reset()[0], 0.0, (False, False)
+            else:
+                observation, reward, *ends, info = env.step(actions[i])
+            np.testing.assert_array_equal(observations[i], observation)
+            assert rewards[i] == reward
+            assert (terminated[i], truncated[i]) == tuple(ends)
+            ended[i] = any(ends)
+            if ended[i]:
+                figures = {key: values[i] for key, values in infos["figures"].items() if key[0] != "_"}
+                assert figures == pytest.approx(info["figures"], rel=1e-9, abs=1e-9, nan_ok=True)
+
+
+def test_autoreset_modes_are_declared_and_kept():
+    same = make(distance=10.0, autoreset_mode="SameStep")
+    assert same.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    first, _ = same.reset(seed=0)
+    for _ in range(13):
+        observation, _, _, truncated, infos = same.step(np.zeros((3, 1), np.float32))
+        if truncated.all():
+            break
+    assert truncated.all()
+    np.testing.assert_array_equal(observation, first)
+    assert infos["final_obs"][1].shape == (9,)
+    assert not np.array_equal(infos["final_obs"][1], first[1])
+    assert infos["final_info"]["figures"]["std"].shape == (3,)
+    assert make().metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+
+
+def test_disabled_autoreset_waits_for_a_masked_reset():
+    env = make(speed_kmh=(200, 300), distance=15.0, autoreset_mode="Disabled")
+    env.reset(seed=3)
+    ended = np.zeros(3, bool)
+    while not ended.any():
+        _, _, terminated, truncated, _ = env.step(np.zeros((3, 1), np.float32))
+        ended = terminated | truncated
+    with pytest.raises(InputError, match="has ended; call reset"):
+        env.step(np.zeros((3, 1), np.float32))
+    before = env.unwrapped.task.plant.run.step.copy()
+    env.reset(options={"reset_mask": ended})
+    after = env.unwrapped.task.plant.run.step
+    assert (after[ended] == 0).all()
+    assert (after[~ended] == before[~ended]).all()
+    env.step(np.zeros((3, 1), np.float32))
+
+
+def test_gymnasium_s_vector_wrappers_work():
+    env = ClipAction(NormalizeObservation(RecordEpisodeStatistics(make(distance=20.0, lanes=4))))
+    env.reset(seed=0)
+    lengths = []
+    for _ in range(60):
+        observation, _, _, _, infos = env.step(np.full((4, 1), 3.0, np.float32))
+        if "episode" in infos:
+            lengths += infos["episode"]["l"][infos["_episode"]].tolist()
+    assert observation.shape == (4, 9)
+    assert set(lengths) == {24}
+
+
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (np.full((3, 1), np.nan), "must be finite"),
+        (np.zeros(3), "must have the shape"),
+        (np.zeros((2, 1)), "must have the shape"),
+    ],
+)
+def test_bad_actions_change_nothing(actions, message):
+    env = make()
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=message):
+        env.step(actions)
+    assert (env.unwrapped.task.plant.run.step == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),
+        ({"lanes": 0}, "number of lanes must be a whole number from 1"),
+        ({"velocity": 3}, "Unknown argument 'velocity'"),
+        ({"render_mode": "rgb_array"}, "does not render"),
+    ],
+)
+def test_bad_arguments_are_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        make(**settings)
+
+
+def test_bad_resets_are_refused():
+    env = make()
+    with pytest.raises(InputError, match="call reset before step"):
+        env.step(np.zeros((3, 1)))
+    with pytest.raises(InputError, match="seed must be a number or one a lane"):
+        env.reset(seed=[1, 2])
+    with pytest.raises(InputError, match="Unknown option 'speed'"):
+        env.reset(options={"speed": 1})
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="reset_mask must be 3 booleans"):
+        env.reset(options={"reset_mask": np.ones(2, bool)})
