@@ -106,7 +106,8 @@ class Bar(BaseCallback):  # type: ignore[misc]
             self._pairs = self._evaluation()
             self._progress.console.print(f"step {self.num_timesteps}: {in_words(self._pairs)}")
         rate = (self.num_timesteps - self._first) / max(self._shown - self._began, 1e-9)
-        parts = [f"{rate:.0f} steps/s"]
+        inside = self.model.get_env().unwrapped.seconds / max(self._shown - self._began, 1e-9)
+        parts = [f"{rate:.0f} steps/s, {100 * inside:.0f} % in the environment"]
         if self.model.ep_info_buffer:
             rewards = [episode["r"] for episode in self.model.ep_info_buffer]
             parts.append(f"reward {np.mean(rewards):.1f}")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
+from stable_baselines3.common.vec_env import VecMonitor
+
+from panto_env.envs import PantographVectorEnv
 
 from .settings import Training
+from .vec_env import PantographVecEnv
 
 
 def make_lanes(training: Training) -> Any:
@@ -17,11 +19,8 @@ def make_lanes(training: Training) -> Any:
     Raises InputError where the environment's arguments are not valid.
     """
     given = {key: value for key, value in training.environment.items() if key != "id"}
-
-    def lane() -> gymnasium.Env[Any, Any]:
-        made: gymnasium.Env[Any, Any] = Monitor(
-            gymnasium.make(training.environment["id"], disable_env_checker=True, **given)
-        )
-        return made
-
-    return DummyVecEnv([lane] * training.lanes)
+    native = gymnasium.make_vec(
+        training.environment["id"], num_envs=training.lanes, autoreset_mode="SameStep", **given
+    )
+    assert isinstance(native, PantographVectorEnv)  # the only ids that a training takes
+    return VecMonitor(PantographVecEnv(native))

@@ -410,5 +410,5 @@ def test_lanes_are_seeded_one_by_one():
     lanes.reset()
     env = gymnasium.make("PantographStiffness-v0", distance=120.0, speed_kmh=[250, 300])
     speeds = [env.reset(seed=7 + lane)[1]["speed_kmh"] for lane in range(2)]
-    assert [info["speed_kmh"] for info in lanes.reset_infos] == speeds
+    assert [info["speed_kmh"] for info in lanes.unwrapped.reset_infos] == speeds
     lanes.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -65,7 +66,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         self._ended: Lanes = np.zeros(num_envs, dtype=np.bool_)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
 
@@ -97,9 +98,9 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         task, episode = self.task, self.task.episode
         force = checked(actions, episode.action.shape)
         if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
-            lane = int(np.flatnonzero(self._ended)[0])
             raise InputError(
-                f"The episode of lane {lane} has ended; call reset with options={{'reset_mask': ...}}."
+                f"The episode of lane {np.flatnonzero(self._ended)[0]} has ended; "
+                "call reset with options={'reset_mask': ...}."
             )
         waiting = self._ended.copy()  # in "NextStep": lanes that begin anew instead of stepping
         if waiting.any():
@@ -114,8 +115,8 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
             "position": task.plant.run.step * task.plant.run.stride,
             **dict(zip(TERMS, episode.terms.T.copy(), strict=True)),
         }
-        for lane in np.flatnonzero(self._ended):
-            infos = self._add_info(infos, {"figures": task.figures(int(lane)).as_dict()}, int(lane))
+        for lane in np.flatnonzero(self._ended).tolist():
+            infos = self._add_info(infos, {"figures": task.figures(lane).as_dict()}, lane)
         observation = episode.observation.copy()
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             observation, infos = self._same_step(observation, infos)
@@ -127,7 +128,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         """Begin anew at once where episodes have ended; what they ended with goes to the infos."""
         ended = self._ended.copy()
         final = np.full(self.num_envs, None, dtype=object)
-        for lane in np.flatnonzero(ended):
+        for lane in np.flatnonzero(ended).tolist():
             final[lane] = observation[lane].copy()
         outcome = dict(infos)
         self._restart(ended)
@@ -141,8 +142,8 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         return self.task.episode.observation.copy(), infos | fresh
 
     def _restart(self, lanes: Lanes) -> None:
-        for lane in np.flatnonzero(lanes):
-            self.task.reset(int(lane), self._random[lane])
+        for lane in np.flatnonzero(lanes).tolist():
+            self.task.reset(lane, self._random[lane])
             self._ended[lane] = False
 
     def _masked(self, mask: Any) -> Lanes:
@@ -155,11 +156,11 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
             )
         return lanes
 
-    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + lane for lane in range(self.num_envs)]
+        if isinstance(seed, int):
+            return [seed + lane for lane in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InputError(f"seed must be a number or one a lane, {self.num_envs}, not {len(seed)}.")
-        return list(seed)
+        return [None if each is None else int(each) for each in seed]

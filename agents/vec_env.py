@@ -1,0 +1,81 @@
+"""Stable-Baselines3's view of the native vector environment."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from panto_env.envs import PantographVectorEnv
+
+
+class PantographVecEnv(VecEnv):  # type: ignore[misc]
+    """A ``VecEnv`` over ``PantographVectorEnv``, which must begin anew in the same step.
+
+    Observations and rewards are those of the native environment, not copied again. A lane whose episode
+    ends has in its info "terminal_observation", "TimeLimit.truncated" and the episode's "figures".
+    """
+
+    def __init__(self, env: PantographVectorEnv) -> None:
+        self.env = env
+        self.seconds = 0.0  # spent in the environment
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start episodes in all lanes; lane i has the seed that ``seed`` gave plus i."""
+        given = [seed for seed in self._seeds if seed is not None]
+        observation, told = self.env.reset(seed=list(self._seeds) if given else None)
+        self._reset_seeds()
+        self._reset_options()
+        self.reset_infos = [{"speed_kmh": float(speed)} for speed in told["speed_kmh"]]
+        return observation
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep the actions, (lanes, actions), for ``step_wait``."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
+        """Step all lanes: observations, rewards, dones and one info a lane."""
+        began = time.perf_counter()
+        observation, reward, terminated, truncated, told = self.env.step(self._actions)
+        self.seconds += time.perf_counter() - began
+        done = terminated | truncated
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if done.any():
+            final, figures = told["final_obs"], told["final_info"]["figures"]
+            names = [name for name in figures if not name.startswith("_")]
+            for lane in np.flatnonzero(done).tolist():
+                infos[lane] = {
+                    "terminal_observation": final[lane],
+                    "TimeLimit.truncated": bool(truncated[lane]),
+                    "figures": {name: float(figures[name][lane]) for name in names},
+                }
+        return observation, reward.astype(np.float32), done, infos
+
+    def close(self) -> None:
+        """Close the native environment."""
+        self.env.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The native environment's attribute, once a lane asked for."""
+        return [getattr(self.env, attr_name)] * len(self._lanes(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: lanes share one environment, so an attribute can't be set for some."""
+        raise NotImplementedError("The lanes share one environment; make it anew to change an attribute.")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of the native environment once; its answer for each lane asked for."""
+        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """No lane has a wrapper of its own."""
+        return [False] * len(self._lanes(indices))
+
+    def _lanes(self, indices: Any) -> Sequence[int]:
+        lanes: Sequence[int] = self._get_indices(indices)
+        return lanes
