@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from .metrics import low_pass
 from .plant.numerics import Numerics
 from .simulation import simulate
 from .trajectory import Trajectory
@@ -81,3 +85,58 @@ DISCRETISATIONS = (
     Numerics(window=5),
 )
 """Rows of the convergence table; the first is taken as converged."""
+
+WINDOWS = (3, 5, 7, 9, 11)
+WINDOW_LINES = (("en50318-2002", "en50318-2002"), ("benchmark-2015", "benchmark-2015"))
+WINDOW_SPEEDS_KMH = (200.0, 250.0, 300.0, 350.0)
+WINDOW_SPANS = 30
+WINDOW_RANGE = (6, 20)
+"""Spans compared: after the run-in, before the far anchor's first reflection meets the train."""
+
+
+@dataclass(frozen=True)
+class WindowCheck:
+    """A travelling window beside the whole line, changes relative to the whole line."""
+
+    catenary: str
+    speed_kmh: float
+    window: int
+    std: float  # of sigma (%)
+    max: float  # of the maximum (%)
+    min: float  # of the minimum (% of the mean force)
+    uplift: float  # of the largest uplift (%)
+    rms: float  # difference of the low-passed contact force, rms (N)
+
+
+def check_windows(
+    catenary: str, pantograph: str, speed_kmh: float, windows: Sequence[int] = WINDOWS
+) -> list[WindowCheck]:
+    """Windows on a line of WINDOW_SPANS spans beside the whole line, over WINDOW_RANGE."""
+
+    def run(window: int) -> Trajectory:
+        return simulate(
+            catenary, pantograph, speed_kmh, spans=WINDOW_SPANS, window=window, record_droppers=False
+        )
+
+    whole = run(WHOLE)
+    true, span = whole.summary(WINDOW_RANGE), whole.span_length
+    first, last = (WINDOW_RANGE[0] - 1) * span, WINDOW_RANGE[1] * span
+    inside = (whole.position >= first) & (whole.position < last)
+    checks = []
+    for window in windows:
+        travelling = run(window)
+        own = travelling.summary(WINDOW_RANGE)
+        difference = low_pass(travelling.contact_force - whole.contact_force, whole.time_step)[inside]
+        checks.append(
+            WindowCheck(
+                catenary=catenary,
+                speed_kmh=speed_kmh,
+                window=window,
+                std=100 * (own.std / true.std - 1),
+                max=100 * (own.max / true.max - 1),
+                min=100 * (own.min - true.min) / true.mean,
+                uplift=100 * (own.max_uplift / true.max_uplift - 1),
+                rms=float(np.sqrt(np.mean(difference**2))),
+            )
+        )
+    return checks

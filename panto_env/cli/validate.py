@@ -15,6 +15,9 @@ def validate(
     convergence: Annotated[
         bool, typer.Option("--convergence", help="Print how the figures converge in grid and step.")
     ] = False,
+    window: Annotated[
+        bool, typer.Option("--window", help="Print how travelling windows compare with a whole line.")
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -30,14 +33,18 @@ def validate(
         title = "Reference model of EN 50318:2002, spans 5 and 6"
         figures.save(figures.plot_forces(runs, labels, validation.SPANS, title), plot)
     table = _convergence() if convergence else []
+    windows = _windows() if window else []
     passed = all(check.inside for check in checks)
     if json:
         rows = [vars(check) | {"inside": check.inside} for check in checks]
-        print_json({"passed": passed, "checks": rows, "convergence": table})
+        told = {"passed": passed, "checks": rows, "convergence": table}
+        print_json(told | {"windows": [vars(each) for each in windows]})
     else:
         _print_checks(checks)
         if convergence:
             _print_convergence(table)
+        if window:
+            _print_windows(windows)
         console.print("All figures inside." if passed else "[bold red]Not all figures are inside.")
     if not passed:
         raise typer.Exit(1)
@@ -96,4 +103,38 @@ def _print_convergence(rows: list[dict[str, Any]]) -> None:
                 *(number(value, 2) for value in values),
             )
         table.add_section()
+    console.print(table)
+
+
+def _windows() -> list[validation.WindowCheck]:
+    checks = []
+    for catenary, pantograph in validation.WINDOW_LINES:
+        for speed in validation.WINDOW_SPEEDS_KMH:
+            with progress_console.status(f"windows on {catenary} at {speed:g} km/h"):
+                checks += validation.check_windows(catenary, pantograph, speed)
+    return checks
+
+
+def _print_windows(checks: list[validation.WindowCheck]) -> None:
+    first, last = validation.WINDOW_RANGE
+    table = Table(
+        title=f"Travelling windows beside a whole line of {validation.WINDOW_SPANS} spans, "
+        f"spans {first} to {last}"
+    )
+    table.add_column("line")
+    for heading in ("km/h", "window\n(spans)", "σ\n(%)", "max\n(%)", "min\n(% of F_m)", "uplift\n(%)"):
+        table.add_column(heading, justify="right")
+    table.add_column("force, rms\ndifference (N)", justify="right")
+    for check in checks:
+        values = (check.std, check.max, check.min, check.uplift)
+        shown = (f"{value:+.2f}" for value in values)
+        speed, window = f"{check.speed_kmh:g}", str(check.window)
+        table.add_row(
+            check.catenary,
+            speed,
+            window,
+            *shown,
+            number(check.rms),
+            end_section=check.window == validation.WINDOWS[-1],
+        )
     console.print(table)

@@ -1,0 +1,71 @@
+import numba
+import numpy as np
+import pytest
+
+from panto_env import simulate, validation
+from panto_env.catalog import load_catenary
+from panto_env.plant import coupling
+from panto_env.plant.catenary import flexible
+from panto_env.plant.jit import OPTIONS
+from panto_env.plant.numerics import Numerics
+
+
+@numba.njit(**OPTIONS)
+def wait(line, wire, x, steps):
+    """Let a line swing for itself; x (m): anywhere in the window's middle."""
+    for _ in range(steps):
+        coupling.move_wire(line, wire, 0, x, x, 0.0)
+        coupling.load_wire(line, wire, 0, x, x, 0.0)
+
+
+def swinging(line, wire):
+    """Energy (J) of both bare wires but for what bending holds."""
+    u, d = wire.displacement[0].astype(float), wire.increment[0].astype(float)
+    total = 0.0
+    for w, (mass, tension) in enumerate(((1.35, 20e3), (1.07, 16e3))):
+        total += mass * line.spacing * (d[w] ** 2).sum() / 2 / 2e-3**2
+        total += tension * (np.diff(u[w]) ** 2).sum() / 2 / line.spacing
+    return total
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_ends_let_waves_out(precision):
+    """A pulse on bare wires leaves a window in the middle of a line; what is reflected is told."""
+    line = load_catenary("en50318-2002")
+    limp = line.droppers.model_copy(update={"stiffness": 1e-6})
+    built = flexible.build(line.model_copy(update={"droppers": limp}), 30, Numerics(precision=precision))
+    wire = flexible.at_rest(built, 1)
+    wire.shifted[0] = 10
+    x = built.spacing * np.arange(built.mobility.shape[1])
+    wire.displacement[0, 0] = 0.05 * np.exp(-(((x - 210) / 5) ** 2))
+    middle = 13.5 * line.span_length
+    wait(built, wire, middle, 1)
+    before = swinging(built, wire)
+    wait(built, wire, middle, 1250)  # 2.5 s: the pulse has met each end once
+    assert swinging(built, wire) < 1e-5 * before
+
+
+def test_runs_of_any_length_cost_the_same_and_stay_the_same():
+    """Spans far along a line are as those near its start: nothing builds up in the window."""
+    run = simulate(spans=120, distance=118 * 60.0, record_droppers=False)
+    early, late = run.summary((20, 60)), run.summary((77, 117))
+    assert late.std == pytest.approx(early.std, rel=0.01)
+    assert late.mean == pytest.approx(early.mean, rel=0.002)
+
+
+def test_window_is_the_whole_line_until_it_travels():
+    window = simulate(spans=20, window=7, distance=230.0)
+    whole = simulate(spans=20, window=0, distance=230.0)
+    # Waves reach the window's end, 7 spans ahead, and what is missing there comes back, later.
+    early = window.time < 7 * 60 / 122
+    np.testing.assert_allclose(window.contact_force[early], whole.contact_force[early], atol=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("catenary", "pantograph"), validation.WINDOW_LINES)
+@pytest.mark.parametrize("speed", validation.WINDOW_SPEEDS_KMH)
+def test_default_window_agrees_with_the_whole_line(catenary, pantograph, speed):
+    (check,) = validation.check_windows(catenary, pantograph, speed, [Numerics().window])
+    assert abs(check.std) < 2
+    assert abs(check.max) < 2
+    assert abs(check.min) < 2.1  # % of the mean force; 2.0 at 200 km/h on benchmark-2015
