@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .files import write_whole
@@ -89,3 +89,22 @@ def mark_supports(axis: Axes, run: Trajectory) -> None:
     count = int(run.position[-1] // run.span_length) + 2
     for k in range(count):
         axis.axvline(k * run.span_length, color="0.85", linewidth=0.8, zorder=0)
+
+
+def plot_speed(result: dict[str, Any]) -> Figure:
+    """Steps a second over lanes, and the cost of the flexible plant's settings."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    vectors = [row for row in result["environments"] if row["lanes"] is not None]
+    for name in dict.fromkeys(row["id"] for row in vectors):
+        own = [row for row in vectors if row["id"] == name]
+        rates = [row["steps_per_second"] for row in own]
+        left.loglog([row["lanes"] for row in own], rates, "o-", label=name)
+    left.set(xlabel="lanes", ylabel="environment steps a second", title="Native vector environments")
+    left.legend(fontsize="small")
+    rows = result["scaling"][::-1]
+    right.barh([row["settings"] for row in rows], [row["times_real_time"] for row in rows], color="tab:blue")
+    right.set(xlabel="times real time, one core", title="Flexible plant by its settings")
+    return figure
