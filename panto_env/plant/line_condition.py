@@ -1,30 +1,66 @@
-"""Condition of the line: irregularity of the contact wire's height."""
+"""Condition of the line: irregularity of the contact wire's height, and defects of what holds it."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field
+from dataclasses import dataclass
+from typing import Annotated, Any
 
+import numpy as np
+from pydantic import Field, field_validator
+
+from ..arrays import Array
 from ..settings import NonNegative, Positive, Settings
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a fair line (seen in one toy model).
 IRREGULARITY = ((12.0, 0.15e-3), (5.0, 0.08e-3), (1.5, 0.03e-3))
 
+Number = Annotated[int, Field(ge=1)]
+# Beyond this a wire is no longer nearly level.
+Error = Annotated[float, Field(ge=-0.2, le=0.2, allow_inf_nan=False)]
+
 
 class LineCondition(Settings):
-    """What differs from the line as designed."""
+    """What differs from the line as designed. Spans, droppers in a span and supports count from 1."""
 
     irregularity: NonNegative = Field(
         0.0, description="height irregularity, as a multiple of a fair line's, of random phases (-)"
     )
     wear_depth: NonNegative = Field(0.0, description="depth A of wear waves, A/2 (1 - cos) (m)")
     wear_wavelength: Positive = Field(0.8, description="wavelength of the wear waves (m)")
+    broken_droppers: tuple[tuple[Number, Number], ...] = Field(
+        (), description="droppers that are broken: (span, number in the span)"
+    )
+    miscut_droppers: tuple[tuple[Number, Number, Error], ...] = Field(
+        (), description="droppers of a wrong length: (span, number, how much too long (m))"
+    )
+    raised_supports: tuple[tuple[Number, Error], ...] = Field(
+        (),
+        description="messenger supports out of height: (number, how much too high (m)); support k "
+        "stands between span k and span k + 1",
+    )
+    dropper_scatter: Annotated[float, Field(ge=0, le=0.05)] = Field(
+        0.0, description="rms error of the length of every dropper, drawn at random (m)"
+    )
+
+    @field_validator("broken_droppers", "miscut_droppers", "raised_supports")
+    @classmethod
+    def _each_once(cls, value: tuple[Any, ...], info: Any) -> tuple[Any, ...]:
+        places = [row[:1] if info.field_name == "raised_supports" else row[:2] for row in value]
+        for k, place in enumerate(places):
+            if place in places[:k]:
+                raise ValueError(f"names {place} twice")
+        return value
 
     @property
     def waves(self) -> int:
         """How many cosines it takes."""
         return len(IRREGULARITY) * (self.irregularity > 0) + (self.wear_depth > 0)
+
+    @property
+    def defective(self) -> bool:
+        """Whether droppers or supports are not as designed."""
+        named = self.broken_droppers or self.miscut_droppers or self.raised_supports
+        return bool(named) or self.dropper_scatter > 0
 
 
 LINE_CONDITIONS = {
@@ -35,8 +71,16 @@ LINE_CONDITIONS = {
 }
 
 
-def draw(condition: LineCondition, random: np.random.Generator) -> NDArray[np.float64]:
-    """Cosines of one line in this condition, (waves, 3): amplitude (m), wavenumber (1/m), phase."""
+@dataclass(frozen=True)
+class DrawnLine:
+    """What is random about one line, drawn."""
+
+    waves: Array  # (waves, 3): irregularity as amplitude (m), wavenumber (1/m), phase
+    scatter: Array | None = None  # (droppers,): length errors (m); None where there are none
+
+
+def draw(condition: LineCondition, random: np.random.Generator, droppers: int = 0) -> DrawnLine:
+    """Draw one line of so many droppers in this condition."""
     rows = []
     if condition.irregularity > 0:
         phases = random.uniform(0, 2 * np.pi, len(IRREGULARITY))
@@ -45,4 +89,7 @@ def draw(condition: LineCondition, random: np.random.Generator) -> NDArray[np.fl
     if condition.wear_depth > 0:
         # Only the alternating part: the mean depth lowers the whole line and changes nothing.
         rows.append((condition.wear_depth / 2, 2 * np.pi / condition.wear_wavelength, np.pi))
-    return np.array(rows).reshape(-1, 3)
+    waves = np.array(rows).reshape(-1, 3)
+    if condition.dropper_scatter == 0:
+        return DrawnLine(waves)
+    return DrawnLine(waves, condition.dropper_scatter * random.standard_normal(droppers))

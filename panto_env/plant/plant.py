@@ -15,6 +15,7 @@ from . import coupling, pantograph
 from .catenary import MODELS
 from .coupling import CHANNELS, Run, Samples
 from .jit import bind
+from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
 
 
@@ -30,13 +31,14 @@ class Plant:
         spans: int | None = None,
         numerics: Numerics | None = None,
         actuator: actuators.Actuator | None = None,
-        waves: int = 0,
+        condition: LineCondition | None = None,
         bilateral: bool = False,
     ) -> None:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
-        waves: cosines of irregularity a lane may have. bilateral: let the contact pull, as paper 3's
-        equations do. Raises InputError where grid and step are not usable.
+        condition: what differs from the line as designed. bilateral: let the contact pull, as paper 3's
+        equations do. Raises InputError where grid and step are not usable, or the line has not what
+        is said to be defective.
         """
         numerics = numerics or Numerics()
         if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
@@ -52,7 +54,10 @@ class Plant:
         self.drive = actuators.drive(self.actuator, time_step, lanes)
         self.supports = self.model.supports(catenary, self.spans)
         self.droppers = self.model.droppers(catenary, self.spans)
-        self._static_tension = self.model.static_tension(catenary, self.spans)
+        self.condition = condition or LineCondition()
+        self._static_tension = self.model.static_tension(catenary, self.spans)[None]
+        if self.condition.defective:
+            self._make_defective()
         self._advance: Callable[..., Any] | None = None
 
         stiffness = pantograph_data.contact_stiffness
@@ -71,8 +76,24 @@ class Plant:
             force=np.zeros(lanes),
             gap=np.zeros(lanes),
             stiffness=np.zeros(lanes),
-            waves=np.zeros((lanes, waves, 3)),
+            waves=np.zeros((lanes, self.condition.waves, 3)),
         )
+
+    def _make_defective(self) -> None:
+        """Give the line its defects, or room for them where each lane draws its own."""
+        if not hasattr(self.model, "DefectiveLine"):
+            raise InputError(
+                "Only a flexible catenary has droppers and supports that can be defective, and line "
+                f"'{self.catenary.name}' is none."
+            )
+        self._defective = self.model.DefectiveLine(self.catenary, self.spans, self.condition)
+        rows = self.body.state.shape[0] if self.condition.dropper_scatter else 1
+        self.line = self._defective.room(self.line, rows)
+        self._static_tension = np.repeat(self._static_tension, rows, axis=0)
+        self._impose_defects(0, None)
+
+    def _impose_defects(self, row: int, scatter: Array | None) -> None:
+        self._static_tension[row] = self._defective.impose(self.line, row, scatter).tension
 
     @property
     def lanes(self) -> int:
@@ -103,15 +124,17 @@ class Plant:
                 f"not at {3.6 * speed:g} km/h."
             )
 
-    def start(self, lane: int, speed: float, waves: Array | None = None) -> None:
+    def start(self, lane: int, speed: float, drawn: DrawnLine | None = None) -> None:
         """Put a lane at the start of the line, at rest under the nominal force.
 
-        speed: of the train (m/s), not beyond the waves of the wire. waves: the line's irregularity,
-        (waves, 3) as ``line_condition.draw`` gives it. Raises InputError for a bad speed.
+        speed: of the train (m/s), not beyond the waves of the wire. drawn: what is random about its
+        line, as ``line_condition.draw`` gives it. Raises InputError for a bad speed.
         """
         self.check_speed(speed)
         run = self.run
-        run.waves[lane] = 0.0 if waves is None else waves
+        run.waves[lane] = 0.0 if drawn is None else drawn.waves
+        if self.condition.dropper_scatter:
+            self._impose_defects(lane, None if drawn is None else drawn.scatter)
         height, wire, spring = self.model.start_point(self.line)
         height += coupling.irregularity.py_func(run.waves[lane], 0.0)  # type: ignore[attr-defined]
         compliance = self.strip_compliance + wire + spring
@@ -139,7 +162,7 @@ class Plant:
         """Forget a lane's earlier run: what lies beyond the window is not written, but at rest."""
         samples.uplift[lane] = 0.0
         if samples.tension.shape[2]:
-            samples.tension[lane] = self._static_tension
+            samples.tension[lane] = self._static_tension[min(lane, len(self._static_tension) - 1)]
 
     def advance(self, command: Array, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` under commands (lanes, 2) (N: frame, head).

@@ -102,7 +102,7 @@ class Task:
             spans=spans,
             numerics=numerics,
             actuator=self.actuator,
-            waves=self.condition.waves,
+            condition=self.condition,
             bilateral=bilateral,
         )
         self.distance = self.plant.line_end if distance is None else float(distance)
@@ -200,9 +200,8 @@ class Task:
         """Start an episode in one lane: draw its speed and its line."""
         low, high = self.speed_range
         speed = low if low == high else float(random.uniform(low, high))
-        waves = draw(self.condition, random) if self.condition.waves else None
         plant, episode = self.plant, self.episode
-        plant.start(lane, speed, waves)
+        plant.start(lane, speed, draw(self.condition, random, len(plant.droppers)))
         self.speed[lane] = speed
         episode.nominal[lane] = plant.body.lift[lane]
         episode.end[lane] = self._steps(speed)

@@ -22,6 +22,7 @@ from ...catalog.schema import FlexibleCatenaryData, Wire
 from ...errors import InputError
 from ..interpolation import stencil
 from ..numerics import Numerics
+from .defects import DefectiveLine as DefectiveLine
 from .flexible_motion import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .static_shape import StaticShape, solve
 
@@ -107,6 +108,9 @@ def build(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> Flexibl
         spans=spans,
         window=window,
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),
+        rise=np.zeros((1, 0, 4)),
+        rise_breaks=np.zeros(0),
+        rise_decay=0.0,
         stencil=np.array(rows, dtype=real),
         leave=(courant - 1) / (courant + 1),
         inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
@@ -122,7 +126,8 @@ def build(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> Flexibl
         ).astype(real),
         dropper_yield=relative.astype(real),
         dropper_stiffness=stiffness.astype(real),
-        dropper_static=np.tile(shape.dropper_tension, window).astype(real),
+        dropper_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
+        dropper_gap=np.zeros((1, len(first)), dtype=real),
     )
 
 
@@ -224,6 +229,8 @@ def start_point(line: FlexibleLine) -> tuple[float, float, float]:
 
 def settle(line: FlexibleLine, wire: FlexibleWire, lane: int, force: float) -> None:
     """Put one lane's wires back at rest; a force (N) at the anchor does not move them."""
-    for array in (wire.displacement, wire.increment, wire.extension, wire.change):
+    for array in (wire.displacement, wire.increment, wire.change):
         array[lane] = 0.0
+    gap = line.dropper_gap[min(lane, len(line.dropper_gap) - 1)]
+    wire.extension[lane] = 0.0 - gap[: len(line.dropper_node)]
     wire.shifted[lane] = 0

@@ -26,7 +26,9 @@ FORWARD = 0xFFFFFFF
 class FlexibleLine(NamedTuple):
     """Constants of a line on its grid; the first axis of a pair is contact wire, messenger.
 
-    The grid covers a window of the line that travels with the train, or all of it.
+    The grid covers a window of the line that travels with the train, or all of it. What defects change
+    has one row for all lanes or one a lane, for the whole line; intact spans are alike, and there one
+    window does.
     """
 
     spacing: float  # of the grid (m)
@@ -34,6 +36,9 @@ class FlexibleLine(NamedTuple):
     spans: int  # of the whole line
     window: int  # spans that the grid covers
     shape: Array  # static height of the contact wire over one span, every span/(n - 1) m (m)
+    rise: Array  # (rows, pieces, 4): what defects add to it: a, b, c, d of each piece of the line
+    rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
+    rise_decay: float  # kappa: of exponentials along a piece (1/m)
     stencil: Array  # (2, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
     leave: Array  # (2,): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
     inertia: Array  # (2, nodes): mass of the bare wire over that of the node, or (2, 0) where all are 1
@@ -47,7 +52,8 @@ class FlexibleLine(NamedTuple):
     dropper_linear: Array  # (droppers, 2): change of tension by mean extension before and after (N/m)
     dropper_yield: Array  # (droppers,): mean relative displacement of the ends over a step by 1 N (m/N)
     dropper_stiffness: Array  # (droppers,): in tension (N/m)
-    dropper_static: Array  # (droppers,): static tension (N)
+    dropper_static: Array  # (rows, droppers of the window or the line): static tension (N)
+    dropper_gap: Array  # likewise: how far the ends of a slack one must part before it pulls (m)
 
 
 class FlexibleWire(NamedTuple):
@@ -58,7 +64,8 @@ class FlexibleWire(NamedTuple):
     blend: Array  # (lanes, nodes): what the stencil acts on, scratch (m)
     shifted: Index  # (lanes,): spans that the window has travelled
     support_past: Array  # (lanes, supports, 2 wires): increment before the step, scratch (m)
-    extension: Array  # (lanes, 2 times, droppers): before the step and at its start, about static (m)
+    # Extensions are about static, less the gap of a dropper that is slack there.
+    extension: Array  # (lanes, 2 times, droppers): before the step and at its start (m)
     change: Array  # (lanes, droppers): of the tension about the static one, over the last step (N)
 
 
@@ -69,6 +76,33 @@ def static_height(shape, span, x):
     ratio = (x / span - np.floor(x / span)) * intervals
     k = min(int(ratio), intervals - 1)
     return shape[k] + (ratio - k) * (shape[k + 1] - shape[k])
+
+
+@part
+def defect_row(table, lane):
+    """Row of a lane in a table of defects."""
+    return min(lane, table.shape[0] - 1)
+
+
+@part
+def first_dropper(line, shifted):
+    """Where the window's droppers begin in the tables of static tension and gap."""
+    count = line.dropper_node.size
+    return min(shifted * (count // line.window), line.dropper_static.shape[1] - count) & FORWARD
+
+
+@part
+def rise_by_defects(pieces, breaks, decay, x):
+    """Static change (m) of the contact wire's height at x (m): a + b s + c e^(-ks) + d e^(-k(l - s))."""
+    each, span = breaks.size - 1, breaks[-1]
+    number = min(int(x / span), pieces.shape[0] // each - 1)
+    local = x - number * span
+    k = 0
+    while k < each - 1 and local >= breaks[k + 1]:
+        k += 1
+    piece, left, right = pieces[number * each + k], local - breaks[k], breaks[k + 1] - local
+    bend = piece[2] * np.exp(-decay * left) + piece[3] * np.exp(-decay * right)
+    return piece[0] + piece[1] * left + bend
 
 
 @part
@@ -129,7 +163,7 @@ def shove(u, d, i, move, force):
 
 
 @part
-def remember(line, u, d, support_past, past, now):
+def remember(line, u, d, support_past, past, now, gap):
     """Keep what the sweep overwrites: increments of the supports, extensions of the droppers (m)."""
     for s in range(line.support_node.size):
         for w in range(2):
@@ -137,7 +171,7 @@ def remember(line, u, d, support_past, past, now):
     node, weight = line.dropper_node, line.dropper_weight
     for k in range(node.size):
         past[k] = now[k]
-        now[k] = difference(u[CONTACT], u[MESSENGER], node[k] & FORWARD, weight[k])
+        now[k] = difference(u[CONTACT], u[MESSENGER], node[k] & FORWARD, weight[k]) - gap[k]
 
 
 @part
@@ -186,11 +220,11 @@ def slackening(stiffness, static, past, free, yielding):
 
 
 @part
-def pull_droppers(line, u, d, past, now, change):
+def pull_droppers(line, u, d, past, now, static, change):
     """Droppers: each one scalar equation for its tension, which is never negative."""
     node, weight, move = line.dropper_node, line.dropper_weight, line.dropper_move
     linear, yielding = line.dropper_linear, line.dropper_yield
-    static, stiffness, half = line.dropper_static, line.dropper_stiffness, line.half[0]
+    stiffness, half = line.dropper_stiffness, line.half[0]
     for k in range(node.size):
         i = node[k] & FORWARD
         step = difference(d[CONTACT], d[MESSENGER], i, weight[k])
@@ -242,8 +276,10 @@ def travel(line, wire, lane):
     each = now.size // line.window
     for k in range(now.size - each):
         now[k] = now[k + each]
+    gap = line.dropper_gap[defect_row(line.dropper_gap, lane)]
+    first = first_dropper(line, wire.shifted[lane])
     for k in range(now.size - each, now.size):
-        now[k] = 0.0
+        now[k] = 0.0 - gap[first + k]
 
 
 @overload(coupling.move_wire, jit_options=PART)
@@ -258,7 +294,9 @@ def _move_wire(line, wire, lane, x0, x1, force):
         u, d, q = wire.displacement[lane], wire.increment[lane], wire.blend[lane]
         past, now, support_past = wire.extension[lane, 0], wire.extension[lane, 1], wire.support_past[lane]
         mobility = line.mobility
-        remember(line, u, d, support_past, past, now)
+        row, first = defect_row(line.dropper_static, lane), first_dropper(line, wire.shifted[lane])
+        static, gap = line.dropper_static[row, first:], line.dropper_gap[row, first:]
+        remember(line, u, d, support_past, past, now, gap)
         for w in range(2):
             sweep(u[w], d[w], q, line.inertia[w], line.stencil[w])
         # The wire takes at each time level the mean of the forces before and after it.
@@ -266,9 +304,11 @@ def _move_wire(line, wire, lane, x0, x1, force):
         first_0, weights_0 = locate(x0 - start, line.spacing, u.shape[1])
         push(u, d, mobility, first_0, weights_0, 0.5 * force)
         hold_supports(line.support_node, line.support_spring, mobility, u, d, support_past)
-        pull_droppers(line, u, d, past, now, wire.change[lane])
+        pull_droppers(line, u, d, past, now, static, wire.change[lane])
         first_1, weights_1 = locate(x1 - start, line.spacing, u.shape[1])
         height = static_height(line.shape, line.span, x1)
+        if line.rise.shape[1] > 0:
+            height += rise_by_defects(line.rise[row], line.rise_breaks, line.rise_decay, x1)
         compliance = 0.0
         for k in range(4):
             height += weights_1[k] * u[CONTACT, first_1 + k]
@@ -317,7 +357,9 @@ def _record_wire(line, wire, lane, uplift, tension):
                 uplift[shifted + s] = wire.displacement[lane, CONTACT, line.support_node[s]]
         if tension.size > 0:
             first = shifted * (line.dropper_node.size // line.window)
+            static = line.dropper_static[defect_row(line.dropper_static, lane)]
+            begin = first_dropper(line, shifted)
             for k in range(line.dropper_node.size):
-                tension[first + k] = line.dropper_static[k] + wire.change[lane, k]
+                tension[first + k] = static[begin + k] + wire.change[lane, k]
 
     return record
