@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs clean
+.PHONY: demo test lint proofs oldest clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -38,5 +38,13 @@ test: $(READY) lint
 proofs: $(READY)
 	$(BIN)/pytest -n auto -m slow
 
+# The oldest Gymnasium that is supported, without the extra 'agents'.
+OLDEST := .venv-oldest
+oldest:
+	$(PYTHON) -m venv $(OLDEST)
+	grep -v '^gymnasium==' constraints.txt > $(OLDEST)/constraints.txt
+	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt gymnasium==1.1.1 pytest --editable .
+	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -7,11 +7,12 @@ from rich.table import Table
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.numerics import Numerics
 
 from . import finite_element
 
 NAME = "en50318-2002"
-OURS = ((0.25, 1e-3), (0.125, 2.5e-4))  # grid (m), time step (s)
+OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precision="double"))
 JUDGE = ((1.0, 1e-3), (0.5, 5e-4), (0.25, 2.5e-4))  # element (m), time step (s)
 
 
@@ -20,11 +21,17 @@ def main() -> None:
     line, pantograph = load_catenary(NAME), load_pantograph(NAME)
     table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
     for speed in (250.0, 300.0):
-        for spacing, step in OURS:
-            figures = simulate(NAME, NAME, speed, spacing=spacing, time_step=step).summary((5, 6))
+        for numerics in OURS:
+            figures = simulate(NAME, NAME, speed, **numerics.model_dump()).summary((5, 6))
             values = (figures.mean, figures.std, figures.max, figures.min)
             row = (f"{value:.2f}" for value in values)
-            table.add_row(f"{speed:g}", "finite differences", f"{spacing:g}", f"{1e3 * step:g}", *row)
+            table.add_row(
+                f"{speed:g}",
+                "finite differences",
+                f"{numerics.spacing or 1 / 3:.3g}",
+                f"{1e3 * numerics.time_step:g}",
+                *row,
+            )
         for element, step in JUDGE:
             result = finite_element.simulate(
                 line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from ...arrays import Array
 from ...catalog.schema import FlexibleCatenaryData, Wire
@@ -112,6 +111,8 @@ class DefectiveLine:
 
     def _solve_linear(self, taut: Any, error: Array) -> Array:
         """Change of all unknowns with these droppers taut, the others without tension."""
+        from scipy.linalg import solveh_banded  # slow to import
+
         band, load = self._band.copy(), self._load.copy()
         spring = np.where(taut, self._stiffness, 0.0)
         contact, messenger = self._ends.T

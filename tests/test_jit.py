@@ -1,0 +1,54 @@
+"""Kernels are compiled once, and never run stale."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import panto_env
+
+PACKAGE = Path(panto_env.__file__).parent
+CODE = """
+import time, numpy as np
+from panto_env import simulate
+from panto_env.plant import coupling
+run = simulate("periodic-stiffness", "three-mass", 200, distance=20.0)
+hits = sum(coupling.advance.stats.cache_hits.values())
+print(hits, repr(float(run.contact_force.sum())))
+"""
+
+
+def run(root, cache):
+    """Cache hits and a sum of contact forces, by the package under ``root`` in a fresh process."""
+    environment = os.environ | {"PYTHONPATH": str(root), "PANTO_CACHE_DIR": str(cache)}
+    result = subprocess.run(
+        [sys.executable, "-c", CODE], capture_output=True, text=True, env=environment, cwd=root, check=True
+    )
+    hits, total = result.stdout.split()
+    return int(hits), float(total)
+
+
+def test_edit_of_any_kernel_source_is_seen_and_no_edit_compiles_nothing(tmp_path):
+    shutil.copytree(PACKAGE, tmp_path / "panto_env", ignore=shutil.ignore_patterns("__pycache__"))
+    cache = tmp_path / "cache"
+    first = run(tmp_path, cache)
+    again = run(tmp_path, cache)
+    assert first[0] == 0
+    assert again == (1, first[1])
+    # The contact law lies in another file than the kernel that is kept on disk.
+    law = tmp_path / "panto_env" / "plant" / "contact.py"
+    source = law.read_text()
+    assert "return max(force, lowest)" in source
+    law.write_text(source.replace("return max(force, lowest)", "return max(2.0 * force, lowest)"))
+    hits, total = run(tmp_path, cache)
+    assert hits == 0
+    assert abs(total - first[1]) > 1.0
+    law.write_text(source)
+    assert run(tmp_path, cache) == (1, first[1])
+
+
+def test_cache_falls_back_where_it_cannot_be_written(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert run(PACKAGE.parent, blocked / "cache")[1] > 0
