@@ -9,7 +9,7 @@ import numpy as np
 
 from .plant.jit import kernel
 
-# Arithmetic of one step, counted in the source of flexible_motion: adds and multiplies.
+# Arithmetic of one step, counted in the source of flexible_parts: adds and multiplies.
 FLOPS_A_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
 FLOPS_A_DROPPER = 90  # two differences 2 x 11, tension 12, two shoves 2 x 20, and what surrounds them
 # Numbers that the sweep moves to or from the nearest cache for each node: u, d, q written; u, d, five q

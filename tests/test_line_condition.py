@@ -12,7 +12,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.schema import Rayleigh
 from panto_env.plant.catenary import flexible
 from panto_env.plant.catenary.defects import DefectiveLine
-from panto_env.plant.catenary.flexible_motion import rise_by_defects
+from panto_env.plant.catenary.flexible_parts import rise_by_defects
 from panto_env.plant.line_condition import LineCondition, draw
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant

@@ -19,7 +19,7 @@ from ...arrays import Array
 from ...catalog.schema import FlexibleCatenaryData, Wire
 from ...errors import InputError
 from ..line_condition import LineCondition
-from .flexible_motion import CONTACT, MESSENGER, FlexibleLine
+from .flexible_state import CONTACT, MESSENGER, FlexibleLine
 from .static_shape import solve
 
 HELD = 1e18  # N/m, that holds a wire at the anchor

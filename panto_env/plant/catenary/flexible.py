@@ -22,8 +22,9 @@ from ...catalog.schema import FlexibleCatenaryData, Wire
 from ...errors import InputError
 from ..interpolation import stencil
 from ..numerics import Numerics
+from . import flexible_motion as _motion  # noqa: F401 - its overloads
 from .defects import DefectiveLine as DefectiveLine
-from .flexible_motion import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
+from .flexible_state import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .static_shape import StaticShape, solve
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
