@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs oldest clean
+.PHONY: demo test lint proofs oldest rllib clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -46,5 +46,13 @@ oldest:
 	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt gymnasium==1.1.1 pytest --editable .
 	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py
 
+# RLlib on the native vector environment: Ray is large and pins a Gymnasium of its own.
+RLLIB := .venv-rllib
+rllib:
+	$(PYTHON) -m venv $(RLLIB)
+	$(RLLIB)/bin/pip install -qq --constraint constraints.txt torch
+	$(RLLIB)/bin/pip install -qq 'ray[rllib]==2.60.0' pytest --editable .
+	$(RLLIB)/bin/pytest tests/test_rllib.py
+
 clean:
-	rm -rf $(VENV) $(OLDEST) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) $(RLLIB) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -41,7 +41,7 @@ def plot_run(run: Trajectory, spans: tuple[int, int] | None = None) -> Figure:
     axes = figure.subplots(3 if active else 2, 1, sharex=True)
     filtered = low_pass(run.contact_force, run.time_step)
     axes[0].plot(run.position, run.contact_force, color="0.75", linewidth=0.8, label="raw")
-    axes[0].plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz")
+    axes[0].plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz, delayed by the filter")
     axes[0].axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
     axes[0].set(ylabel="contact force (N)")
     axes[0].set_title(f"{run.pantograph} on {run.catenary}, {run.speed_kmh:g} km/h, {run.policy}")
@@ -72,7 +72,9 @@ def plot_forces(
     for axis, run, label in zip(axes, runs, labels, strict=True):
         axis.plot(run.position, run.contact_force, color="0.8", linewidth=0.8, label="raw")
         filtered = low_pass(run.contact_force, run.time_step)
-        axis.plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz")
+        axis.plot(
+            run.position, filtered, color="tab:blue", label="low-passed at 20 Hz, delayed by the filter"
+        )
         axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
         axis.set(ylabel="contact force (N)")
         axis.set_title(label, loc="left", fontsize="medium")
