@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ from pydantic import Field, SerializeAsAny
 from panto_env.envs import IDS
 from panto_env.envs.single import SETTINGS
 from panto_env.errors import InputError
+from panto_env.files import read_toml
 from panto_env.settings import Positive, Settings, parse, suggest
 from panto_env.task import Task
 
@@ -79,14 +79,9 @@ def load_training(path: str | Path, **changes: Any) -> Training:
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"The training file {path} does not exist; give a TOML file's path.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} could not be read: {error}.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
+    if not Path(path).exists():
+        raise InputError(f"The training file {path} does not exist; give a TOML file's path.")
+    table = read_toml(path)
     given = {key: value for key, value in changes.items() if value is not None}
     return parse_training(table | given, str(path))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
@@ -10,6 +9,7 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from panto_env.errors import InputError
+from panto_env.files import read_toml
 from panto_env.plant.actuator import ACTUATORS, Actuator
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensor import SENSORS, Sensors
@@ -111,10 +111,4 @@ def load_benchmark(path: str | Path) -> BenchmarkSettings:
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} could not be read: {error}.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
-    return parse(BenchmarkSettings, table, str(path))
+    return parse(BenchmarkSettings, read_toml(path), str(path))

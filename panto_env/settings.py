@@ -43,11 +43,11 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
 
 
-def explain(error: ValidationError, skip: frozenset[str] = frozenset()) -> str:
+def explain(error: ValidationError) -> str:
     """One clause a problem: the key, what was expected, what was given."""
     parts = []
     for problem in error.errors():
-        key = ".".join(str(part) for part in problem["loc"] if part not in skip)
+        key = ".".join(str(part) for part in problem["loc"])
         message = problem["msg"].removeprefix("Value error, ")
         given = problem["input"]
         shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"

@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +58,6 @@ class Trajectory:
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
-    notes: dict[str, Any] = field(default_factory=dict)
 
     def summary(self, spans: tuple[int, int] | None = None) -> metrics.Figures:
         """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or the whole run.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import reprlib
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
+from ..files import read_toml
 from .schema import (
     Catenary,
     CatenaryData,
@@ -99,12 +99,7 @@ def _find(family: str, source: str | Path) -> Path:
 
 @cache
 def _read(path: Path, _modified: int, adapter: TypeAdapter[Any]) -> Any:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} could not be read: {error}.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
+    table = read_toml(path)
     sources: dict[str, str] = {}
     try:
         values = _split(table, "", sources)
