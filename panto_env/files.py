@@ -1,11 +1,12 @@
-"""Files: TOML read with clear errors, and any file written whole or not at all."""
+"""Files: TOML read with clear errors, any file written whole or not at all, numbers fit for JSON."""
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -45,3 +46,16 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path} could not be read: {error}.") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
+
+
+def finite(value: Any) -> Any:
+    """Plain data for JSON: arrays as lists, and null for what is no number."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -15,7 +15,7 @@ def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
     import typer
 
-    from . import catalogue, simulate, speed, validate
+    from . import catalogue, reproduce, simulate, speed, validate
 
     app = typer.Typer(
         name="panto",
@@ -30,6 +30,7 @@ def main() -> None:
     app.command()(simulate.simulate)
     app.command()(validate.validate)
     app.command()(speed.speed)
+    app.command()(reproduce.reproduce)
     for point in sorted(entry_points(group=COMMANDS), key=lambda point: point.name):
         app.command(point.name)(point.load())
     try:

@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from ..files import finite
+
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 Plot = Annotated[str | None, typer.Option(help="Write a picture to this file (.png, .svg, .pdf).")]
 
@@ -19,18 +21,8 @@ progress_console = Console(stderr=True)
 
 def print_json(value: Any) -> None:
     """Print JSON to standard output; figures that are not numbers become null."""
-    json.dump(_clean(value), sys.stdout, indent=2, ensure_ascii=False)
+    json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=False)
     sys.stdout.write("\n")
-
-
-def _clean(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _clean(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_clean(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def number(value: float, digits: int = 1) -> str:

@@ -1,0 +1,22 @@
+"""Papers reproduced: each study computes ours beside the paper's, with tables, figures and a JSON."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from ..errors import InputError
+from ..settings import suggest
+from .study import Comparison, Outcome, Report, Study, Table, write
+
+__all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
+
+STUDIES: tuple[str, ...] = ()
+"""Names of all studies; the module of "paper3-parameters" is ``paper3_parameters``."""
+
+
+def find_study(name: str) -> Study:
+    """The study of this name. Raises InputError where there is none."""
+    if name not in STUDIES:
+        raise InputError(f"Unknown study '{name}': {suggest(name, [*STUDIES, 'all'])}.")
+    study: Study = import_module(f".{name.replace('-', '_')}", __name__).run
+    return study

@@ -1,0 +1,89 @@
+"""What a study of a paper returns, and how it is written to a folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..figures import save
+from ..files import finite, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Report = Callable[[str, float], None]
+"""Told what is being done and the share of the study that is done, 0..1."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One figure of ours beside the paper's, and the range in which they agree.
+
+    A statement in words has no figure: ``paper`` is then the sentence in short. ``low`` and ``high`` are
+    inclusive.
+    """
+
+    quantity: str
+    unit: str
+    ours: float
+    paper: float | str
+    low: float
+    high: float
+    note: str = ""  # why they differ, or what the paper leaves open
+
+    @property
+    def agrees(self) -> bool:
+        """Whether ours lies in the range."""
+        return self.low <= self.ours <= self.high
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return vars(self) | {"agrees": self.agrees}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table for people: rows of text or numbers under headings that name units."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str | float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a study found."""
+
+    title: str
+    comparisons: tuple[Comparison, ...]
+    tables: tuple[Table, ...] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)  # by file name, without suffix
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # every number behind tables and figures
+
+
+class Study(Protocol):
+    """A study of one part of a paper."""
+
+    def __call__(self, report: Report) -> Outcome:
+        """Run it, on all cores where it takes long."""
+
+
+def write(outcome: Outcome, folder: str | Path) -> list[Path]:
+    """Write the numbers as JSON and the figures as PNG into a folder; the files written."""
+    folder = Path(folder)
+    told = {
+        "title": outcome.title,
+        "comparisons": [each.as_dict() for each in outcome.comparisons],
+        **outcome.numbers,
+    }
+    files = [folder / "numbers.json"]
+    with write_whole(files[0]) as temporary:
+        text = json.dumps(finite(told), indent=1, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+    for name, figure in outcome.figures.items():
+        files.append(folder / f"{name}.png")
+        save(figure, files[-1])
+    return files
