@@ -2,19 +2,23 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.plant.actuator import ACTUATORS, Actuator, actuate, drive
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.actuator import ACTUATORS, Actuator
+from panto_env.plant.coupling import FRAME_FORCE
+from panto_env.plant.numerics import Numerics
+from panto_env.plant.plant import Plant
 from panto_env.settings import parse
 
 STEP = 1e-3
 
 
 def response(actuator, command, steps=200):
-    state = drive(actuator, STEP, 1)
-    forces = []
-    for _ in range(steps):
-        actuate(state, 0, command, 0.0)
-        forces.append(state.force[0, 0])
-    return np.array(forces)
+    line, pantograph = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
+    plant = Plant(line, pantograph, numerics=Numerics(time_step=STEP), actuator=actuator)
+    samples = plant.samples(steps + 1)
+    plant.start(0, 50.0)
+    plant.advance(np.array([[command, 0.0]]), steps, samples)
+    return samples.channels[0, 1:, FRAME_FORCE]
 
 
 def test_ideal_actuator_follows_at_once_within_its_limit():
@@ -56,7 +60,7 @@ class Constant:
 def test_steady_frame_force_adds_to_the_mean_contact_force():
     passive = simulate("periodic-stiffness", "three-mass", 200)
     pushed = simulate("periodic-stiffness", "three-mass", 200, Constant(), actuator={"force_limit": 20.0})
-    gain = pushed.contact_force[3000:].mean() - passive.contact_force[3000:].mean()
+    gain = pushed.contact_force[1200:].mean() - passive.contact_force[1200:].mean()
     assert gain == pytest.approx(20.0, rel=0.05)
     assert pushed.frame_force.max() == 20.0
     assert pushed.head_force.max() == 0.0

@@ -19,7 +19,7 @@ class PantographData(Entry):
     kind: Literal["pantograph"] = "pantograph"
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
-    masses: tuple[Positive, ...] = Field(min_length=1, description="masses, head first (kg)")
+    masses: tuple[Positive, ...] = Field(min_length=1, max_length=8, description="masses, head first (kg)")
     stiffnesses: tuple[NonNegative, ...] = Field(
         description="springs below each mass, the last to the ground (N/m)"
     )

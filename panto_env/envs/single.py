@@ -158,7 +158,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         task.step(checked(action, episode.action.shape[1:]))
         terminated, truncated = bool(episode.terminated[0]), bool(episode.truncated[0])
         steps = int(run.step[0])
-        row = task.samples.channels[0, steps].tolist()
+        row = episode.latest[:, 0].tolist()
         info: dict[str, Any] = {
             "contact_force": row[coupling.CONTACT_FORCE],
             "head": row[coupling.HEAD_HEIGHT],
@@ -166,7 +166,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "frame_force": row[coupling.FRAME_FORCE],
             "head_force": row[coupling.HEAD_FORCE],
             "position": steps * float(run.stride[0]),
-            "reward_terms": dict(zip(TERMS, episode.terms[0].tolist(), strict=True)),
+            "reward_terms": dict(zip(TERMS, episode.terms[:, 0].tolist(), strict=True)),
         }
         if terminated or truncated:
             self._running = False

@@ -113,7 +113,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         infos: dict[str, Any] = {
             "contact_force": task.plant.run.force.copy(),
             "position": task.plant.run.step * task.plant.run.stride,
-            **dict(zip(TERMS, episode.terms.T.copy(), strict=True)),
+            **dict(zip(TERMS, episode.terms.copy(), strict=True)),
         }
         for lane in np.flatnonzero(self._ended).tolist():
             infos = self._add_info(infos, {"figures": task.figures(lane).as_dict()}, lane)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from ..arrays import Array
 from ..settings import NonNegative, Positive, Settings
 from .jit import part
 
-FRAME, HEAD = 0, 1  # the two places a force can act, columns of every (lanes, 2) array below
+FRAME, HEAD = 0, 1  # the two places a force can act, rows of the arrays below
 
 
 class Actuator(Settings):
@@ -38,11 +37,10 @@ ACTUATORS = {
 
 
 class Drive(NamedTuple):
-    """Actuators of all lanes; parameters and forces have a column for frame and head."""
+    """Actuators of all lanes; parameters and forces have a row for frame and head."""
 
-    force: Array  # (lanes, 2): the force acting now (N)
-    delayed: Array  # (lanes, 2, delay + 1): ring of past commands (N)
-    cursor: NDArray[np.int64]  # (lanes,): where the ring is written next
+    force: Array  # (2, lanes): the force acting now (N)
+    pending: Array  # (delay, 2, lanes): commands that have not arrived, the next to arrive first (N)
     follow: Array  # (2,): share of the way to the command gone in one step
     rate: Array  # (2,): largest change of force in one step (N)
     limit: Array  # (2,): largest force (N)
@@ -54,9 +52,8 @@ def drive(actuator: Actuator, time_step: float, lanes: int) -> Drive:
     follow = 1.0 if actuator.lag == 0 else 1.0 - np.exp(-time_step / actuator.lag)
     rate = np.inf if actuator.rate_limit is None else actuator.rate_limit * time_step
     return Drive(
-        force=np.zeros((lanes, 2)),
-        delayed=np.zeros((lanes, 2, steps + 1)),
-        cursor=np.zeros(lanes, dtype=np.int64),
+        force=np.zeros((2, lanes)),
+        pending=np.zeros((steps, 2, lanes)),
         follow=np.full(2, follow),
         rate=np.full(2, rate),
         limit=np.full(2, actuator.force_limit),
@@ -65,22 +62,26 @@ def drive(actuator: Actuator, time_step: float, lanes: int) -> Drive:
 
 def release(drive: Drive, lane: int) -> None:
     """Put one lane's actuators at rest, nothing pending."""
-    drive.force[lane] = 0.0
-    drive.delayed[lane] = 0.0
-    drive.cursor[lane] = 0
+    drive.force[:, lane] = 0.0
+    drive.pending[:, :, lane] = 0.0
 
 
 @part
-def actuate(drive, lane, frame_command, head_command):
-    """Move one lane's actuators one step towards their commands (N); forces into ``drive.force``."""
-    depth = drive.delayed.shape[2]
-    write = drive.cursor[lane]
-    read = write + 1 if write + 1 < depth else 0
-    drive.cursor[lane] = read
-    drive.delayed[lane, 0, write] = frame_command
-    drive.delayed[lane, 1, write] = head_command
-    for k in range(2):
-        target = min(max(drive.delayed[lane, k, read], -drive.limit[k]), drive.limit[k])
-        change = drive.follow[k] * (target - drive.force[lane, k])
-        change = min(max(change, -drive.rate[k]), drive.rate[k])
-        drive.force[lane, k] += change
+def actuate(drive, block, begin, count):
+    """Move the actuators of a block one step towards ``block.command`` (N); forces to ``block.drive``."""
+    depth = drive.pending.shape[0]
+    for c in range(2):
+        follow, rate, limit = drive.follow[c], drive.rate[c], drive.limit[c]
+        for i in range(count):
+            block.due[i] = block.command[c, i]
+        if depth > 0:
+            pending = drive.pending[:, c, begin : begin + count]
+            for i in range(count):
+                block.due[i] = pending[0, i]
+                for k in range(depth - 1):
+                    pending[k, i] = pending[k + 1, i]
+                pending[depth - 1, i] = block.command[c, i]
+        for i in range(count):
+            target = min(max(block.due[i], -limit), limit)
+            change = follow * (target - block.drive[c, i])
+            block.drive[c, i] += min(max(change, -rate), rate)

@@ -75,7 +75,7 @@ LINE_CONDITIONS = {
 class DrawnLine:
     """What is random about one line, drawn."""
 
-    waves: Array  # (waves, 3): irregularity as amplitude (m), wavenumber (1/m), phase
+    waves: Array  # (waves, 3): irregularity as amplitude (m), turns a metre (1/m), phase in turns
     scatter: Array | None = None  # (droppers,): length errors (m); None where there are none
 
 
@@ -83,12 +83,12 @@ def draw(condition: LineCondition, random: np.random.Generator, droppers: int = 
     """Draw one line of so many droppers in this condition."""
     rows = []
     if condition.irregularity > 0:
-        phases = random.uniform(0, 2 * np.pi, len(IRREGULARITY))
+        phases = random.uniform(0, 1, len(IRREGULARITY))
         for (wavelength, amplitude), phase in zip(IRREGULARITY, phases, strict=True):
-            rows.append((condition.irregularity * amplitude, 2 * np.pi / wavelength, phase))
+            rows.append((condition.irregularity * amplitude, 1 / wavelength, phase))
     if condition.wear_depth > 0:
         # Only the alternating part: the mean depth lowers the whole line and changes nothing.
-        rows.append((condition.wear_depth / 2, 2 * np.pi / condition.wear_wavelength, np.pi))
+        rows.append((condition.wear_depth / 2, 1 / condition.wear_wavelength, 0.5))
     waves = np.array(rows).reshape(-1, 3)
     if condition.dropper_scatter == 0:
         return DrawnLine(waves)

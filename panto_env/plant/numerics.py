@@ -12,7 +12,9 @@ from ..settings import Positive, Settings
 class Numerics(Settings):
     """Discretisation. docs/validation.md shows how the defaults were chosen."""
 
-    time_step: Positive = Field(2e-3, description="time step (s)")
+    time_step: Positive | None = Field(
+        None, description="time step (s); None: 2.5 ms, or 5 ms under a wire that has no mass"
+    )
     spacing: Positive | None = Field(
         None, description="grid of the flexible catenary (m); None: 1/3 m, or the finest that is stable"
     )

@@ -6,24 +6,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Index
 from ..catalog.schema import PantographData
+from .actuator import FRAME, HEAD
 from .jit import part
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
 
 
-class Body(NamedTuple):
-    """Pantographs of all lanes. n masses: the state is n displacements, then n velocities."""
+MAX_STATE = 16
+"""Entries of the state of a pantograph at most: the schema allows eight masses."""
 
-    state: Array  # (lanes, 2n): displacement (m) and velocity (m/s), head first
-    free: Array  # (lanes, 2n): state at the end of the step, were there no contact force
-    transition: Array  # (2n, 2n): exp(A dt)
-    contact_input: Array  # (2n,): change of the state by 1 N of contact force over a step
-    frame_input: Array  # (2n,): by 1 N up on the frame (the lowest mass)
-    head_input: Array  # (2n,): by 1 N up on the head and down on the mass below it
+
+class Body(NamedTuple):
+    """Pantographs of all lanes. n masses: the state is n displacements, then n velocities.
+
+    Lanes share what they are made of, or each has a variety of its own.
+    """
+
+    state: Array  # (2n, lanes): displacement (m) and velocity (m/s), head first
     lift: Array  # (lanes,): static and aerodynamic uplift on the lowest mass (N)
+    variety: Index  # (lanes,): which of the varieties a lane has
+    transition: Array  # (varieties, 2n, 2n): exp(A dt)
+    contact_input: Array  # (varieties, 2n): change of the state by 1 N of contact force over a step
+    frame_input: Array  # (varieties, 2n): by 1 N up on the frame (the lowest mass)
+    head_input: Array  # (varieties, 2n): by 1 N up on the head and down on the mass below it
+    strip: Array  # (varieties, 2): compliance of the contact spring (m/N); damper over the step (N/m)
 
 
 def matrices(pantograph: PantographData) -> tuple[Array, Array]:
@@ -62,19 +71,31 @@ def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Arr
     return whole[:n, :n].copy(), whole[:n, n:].copy()
 
 
-def body(pantograph: PantographData, time_step: float, lanes: int) -> Body:
-    """Pantographs at rest for ``lanes`` lanes; ``rest`` puts them on the wire."""
-    transition, inputs = discretise(pantograph, time_step)
-    size = len(transition)
+def body(size: int, lanes: int, varieties: int = 1) -> Body:
+    """Room for the pantographs of ``lanes`` lanes, of ``size`` entries of state; ``equip`` fills it."""
     return Body(
-        state=np.zeros((lanes, size)),
-        free=np.zeros((lanes, size)),
-        transition=transition,
-        contact_input=inputs[:, 0].copy(),
-        frame_input=inputs[:, 1].copy(),
-        head_input=inputs[:, 2].copy(),
+        state=np.zeros((size, lanes)),
         lift=np.zeros(lanes),
+        variety=np.zeros(lanes, dtype=np.int64),
+        transition=np.zeros((varieties, size, size)),
+        contact_input=np.zeros((varieties, size)),
+        frame_input=np.zeros((varieties, size)),
+        head_input=np.zeros((varieties, size)),
+        strip=np.zeros((varieties, 2)),
     )
+
+
+def equip(body: Body, variety: int, pantograph: PantographData, massless: bool, time_step: float) -> None:
+    """Make one variety this pantograph; massless: whether the wire is, so that a strip can be rigid."""
+    transition, inputs = discretise(pantograph, time_step)
+    body.transition[variety] = transition
+    body.contact_input[variety] = inputs[:, 0]
+    body.frame_input[variety] = inputs[:, 1]
+    body.head_input[variety] = inputs[:, 2]
+    rigid = 0.0 if massless else 1 / STRIP_STIFFNESS
+    stiffness = pantograph.contact_stiffness
+    compliance = rigid if stiffness == "rigid" else 1 / stiffness
+    body.strip[variety] = compliance, pantograph.contact_damping / time_step
 
 
 def rest(pantograph: PantographData, lift: float, wire: float, compliance: float) -> Array:
@@ -93,21 +114,24 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
 
 
 @part
-def move_free(body, lane, frame_force, head_force):
-    """State of one lane after a step without contact force, into ``body.free``; the head's height."""
-    state, free = body.state[lane], body.free[lane]
-    lift = body.lift[lane] + frame_force
-    for i in range(state.size):
-        total = body.frame_input[i] * lift + body.head_input[i] * head_force
-        for j in range(state.size):
-            total += body.transition[i, j] * state[j]
-        free[i] = total
-    return free[0]
+def move_free(body, variety, size, block, count):
+    """States of a block after a step without contact force, into ``block.free``."""
+    state, free = block.state, block.free
+    for r in range(size):
+        frame_input, head_input = body.frame_input[variety, r], body.head_input[variety, r]
+        for i in range(count):
+            lift = block.lift[i] + block.drive[FRAME, i]
+            free[r, i] = frame_input * lift + head_input * block.drive[HEAD, i]
+        for j in range(0, size, 2):  # in pairs: there are as many velocities as displacements
+            a, b = body.transition[variety, r, j], body.transition[variety, r, j + 1]
+            for i in range(count):
+                free[r, i] += a * state[j, i] + b * state[j + 1, i]
 
 
 @part
-def press(body, lane, contact_force):
-    """End the step of one lane: the free motion and what the contact force adds to it."""
-    state, free = body.state[lane], body.free[lane]
-    for i in range(state.size):
-        state[i] = free[i] + body.contact_input[i] * contact_force
+def press(body, variety, size, block, count):
+    """End the step of a block: the free motion and what the contact force adds to it."""
+    for r in range(size):
+        contact_input = body.contact_input[variety, r]
+        for i in range(count):
+            block.state[r, i] = block.free[r, i] + contact_input * block.force[i]

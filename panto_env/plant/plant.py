@@ -33,25 +33,30 @@ class Plant:
         actuator: actuators.Actuator | None = None,
         condition: LineCondition | None = None,
         bilateral: bool = False,
+        varied: bool = False,
     ) -> None:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
         condition: what differs from the line as designed. bilateral: let the contact pull, as paper 3's
-        equations do. Raises InputError where grid and step are not usable, or the line has not what
-        is said to be defective.
+        equations do. varied: each lane may have a pantograph that differs in its values. Raises
+        InputError where grid and step are not usable, or the line has not what is said to be defective.
         """
         numerics = numerics or Numerics()
         if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
             raise InputError(f"spans must be a whole number from 3 to 1000, not {spans!r}.")
         self.catenary, self.pantograph = catenary, pantograph_data
         self.spans = spans or catenary.spans
-        self.time_step = time_step = numerics.time_step
         self.model = MODELS[catenary.kind]  # type: ignore[attr-defined]
+        self.time_step = numerics.time_step or self.model.TIME_STEP
         self.line = self.model.build(catenary, self.spans, numerics)
         self.wire = self.model.at_rest(self.line, lanes)
-        self.body = pantograph.body(pantograph_data, time_step, lanes)
+        self.body = pantograph.body(2 * len(pantograph_data.masses), lanes, lanes if varied else 1)
+        if varied:
+            self.body.variety[:] = np.arange(lanes)
+        self._massless = isinstance(catenary, PeriodicStiffnessData)
+        self._equip(0, pantograph_data)
         self.actuator = actuator or actuators.Actuator()
-        self.drive = actuators.drive(self.actuator, time_step, lanes)
+        self.drive = actuators.drive(self.actuator, self.time_step, lanes)
         self.supports = self.model.supports(catenary, self.spans)
         self.droppers = self.model.droppers(catenary, self.spans)
         self.condition = condition or LineCondition()
@@ -60,24 +65,18 @@ class Plant:
             self._make_defective()
         self._advance: Callable[..., Any] | None = None
 
-        stiffness = pantograph_data.contact_stiffness
-        if stiffness == "rigid":
-            massless = isinstance(catenary, PeriodicStiffnessData)
-            self.strip_compliance = 0.0 if massless else 1 / pantograph.STRIP_STIFFNESS
-        else:
-            self.strip_compliance = 1 / stiffness
         self.run = Run(
             step=np.zeros(lanes, dtype=np.int64),
-            start=np.zeros(lanes),
             stride=np.zeros(lanes),
-            strip_compliance=np.full(lanes, self.strip_compliance),
-            strip_damping=np.full(lanes, pantograph_data.contact_damping / time_step),
-            lowest_force=np.full(lanes, -np.inf if bilateral else 0.0),
             force=np.zeros(lanes),
             gap=np.zeros(lanes),
             stiffness=np.zeros(lanes),
-            waves=np.zeros((lanes, self.condition.waves, 3)),
+            waves=np.zeros((self.condition.waves, 3, lanes)),
+            lowest_force=-np.inf if bilateral else 0.0,
         )
+
+    def _equip(self, variety: int, data: PantographData) -> None:
+        pantograph.equip(self.body, variety, data, self._massless, self.time_step)
 
     def _make_defective(self) -> None:
         """Give the line its defects, or room for them where each lane draws its own."""
@@ -87,7 +86,7 @@ class Plant:
                 f"'{self.catenary.name}' is none."
             )
         self._defective = self.model.DefectiveLine(self.catenary, self.spans, self.condition)
-        rows = self.body.state.shape[0] if self.condition.dropper_scatter else 1
+        rows = self.lanes if self.condition.dropper_scatter else 1
         self.line = self._defective.room(self.line, rows)
         self._static_tension = np.repeat(self._static_tension, rows, axis=0)
         self._impose_defects(0, None)
@@ -98,7 +97,7 @@ class Plant:
     @property
     def lanes(self) -> int:
         """Number of lanes."""
-        return len(self.run.step)
+        return len(self.body.lift)
 
     @property
     def line_end(self) -> float:
@@ -124,31 +123,52 @@ class Plant:
                 f"not at {3.6 * speed:g} km/h."
             )
 
-    def start(self, lane: int, speed: float, drawn: DrawnLine | None = None) -> None:
+    def start(
+        self,
+        lane: int,
+        speed: float,
+        drawn: DrawnLine | None = None,
+        pantograph_data: PantographData | None = None,
+    ) -> None:
         """Put a lane at the start of the line, at rest under the nominal force.
 
         speed: of the train (m/s), not beyond the waves of the wire. drawn: what is random about its
-        line, as ``line_condition.draw`` gives it. Raises InputError for a bad speed.
+        line, as ``line_condition.draw`` gives it. pantograph_data: the lane's own, where they are varied.
+        Raises InputError for a bad speed.
         """
         self.check_speed(speed)
-        run = self.run
-        run.waves[lane] = 0.0 if drawn is None else drawn.waves
+        run, variety = self.run, int(self.body.variety[lane])
+        data = pantograph_data or self.pantograph
+        if pantograph_data is not None:
+            self._equip(variety, data)
+        run.waves[:, :, lane] = 0.0 if drawn is None else drawn.waves
         if self.condition.dropper_scatter:
             self._impose_defects(lane, None if drawn is None else drawn.scatter)
         height, wire, spring = self.model.start_point(self.line)
-        height += coupling.irregularity.py_func(run.waves[lane], 0.0)  # type: ignore[attr-defined]
-        compliance = self.strip_compliance + wire + spring
-        lift = self.pantograph.nominal_force(speed)
+        height += float(run.waves[:, 0, lane] @ np.cos(2 * np.pi * run.waves[:, 2, lane]))
+        strip = float(self.body.strip[variety, 0])
+        compliance = strip + wire + spring
+        lift = data.nominal_force(speed)
         self.body.lift[lane] = lift
-        self.body.state[lane] = pantograph.rest(self.pantograph, lift, height, compliance)
-        force = (self.body.state[lane, 0] - height) / compliance
+        self.body.state[:, lane] = pantograph.rest(data, lift, height, compliance)
+        force = (self.body.state[0, lane] - height) / compliance
         self.model.settle(self.line, self.wire, lane, force)
         actuators.release(self.drive, lane)
         run.step[lane] = 0
         run.stride[lane] = speed * self.time_step
         run.force[lane] = force
-        run.gap[lane] = force * (self.strip_compliance + spring)
-        run.stiffness[lane] = 1 / (self.strip_compliance + spring)
+        run.gap[lane] = force * (strip + spring)
+        run.stiffness[lane] = 1 / (strip + spring)
+
+    def first_sample(self, lane: int) -> Array:
+        """What a lane's sample would be at the start, (CHANNELS,)."""
+        state, half = self.body.state[:, lane], len(self.pantograph.masses)
+        sample = np.zeros(CHANNELS)
+        force = sample[coupling.CONTACT_FORCE] = self.run.force[lane]
+        sample[coupling.HEAD_HEIGHT] = state[0]
+        sample[coupling.FRAME_HEIGHT] = state[half - 1]
+        sample[coupling.WIRE_HEIGHT] = state[0] - force * self.body.strip[self.body.variety[lane], 0]
+        return sample
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays of ``rows`` rows for ``advance`` to record in: one more than steps are to be kept."""

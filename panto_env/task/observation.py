@@ -12,13 +12,24 @@ from ..arrays import Array
 from ..catalog.schema import PantographData
 from ..plant import coupling
 from ..plant.actuator import Actuator
+from ..plant.cosine import cosine_of_turns, sine_of_turns
+from ..plant.coupling import fetch
 from ..plant.jit import part
 from ..plant.sensor import Sensors
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
 OBSERVATIONS = ("measured", "full")
-READINGS = 5  # entries that come from sensors and carry noise
+# Channels of a sample that the sensors read, in the order of the entries; they carry noise.
+SENSED = (
+    coupling.HEAD_HEIGHT,
+    coupling.FRAME_HEIGHT,
+    coupling.HEAD_VELOCITY,
+    coupling.FRAME_VELOCITY,
+    coupling.CONTACT_FORCE,
+)
+READINGS = len(SENSED)
+MAX_ENTRIES = 32  # of an observation: eight masses give 25
 
 
 class Entry(NamedTuple):
@@ -89,37 +100,41 @@ def noise_scale(sensors: Sensors) -> Array:
 
 
 @part
-def observe(episode, run, body, channels, lane):
-    """Observation of one lane into ``episode.observation`` as float32.
+def observe(episode, scores, block, size, begin, count):
+    """Observation of a block into ``episode.observation`` as float32.
 
-    channels: (lanes, rows, CHANNELS), the row of a step as ``coupling.advance_lane`` counts it.
+    size: of the pantograph's state. ``scores.reading`` holds what the sensors read, ``block`` the rest.
     """
-    n, rows = run.step[lane], channels.shape[1]
-    row = channels[lane, max(n - episode.delay, 0) % rows]
-    angle = 2 * np.pi * (run.start[lane] + run.stride[lane] * n) / episode.span
-    view, scale, noise = episode.observation[lane], episode.scale, episode.noise[lane]
-    view[0] = (row[coupling.HEAD_HEIGHT] + noise[0]) / scale[0]
-    view[1] = (row[coupling.FRAME_HEIGHT] + noise[1]) / scale[1]
-    view[2] = (row[coupling.HEAD_VELOCITY] + noise[2]) / scale[2]
-    view[3] = (row[coupling.FRAME_VELOCITY] + noise[3]) / scale[3]
-    view[4] = (row[coupling.CONTACT_FORCE] + noise[4]) / scale[4]
-    view[5] = np.sin(angle)
-    view[6] = np.cos(angle)
-    view[7] = run.stride[lane] / episode.time_step / scale[7]
+    entries, scale, reading = scores.entries, episode.scale, scores.reading
+    for k in range(READINGS):
+        noise = episode.noise[k, begin : begin + count]
+        for i in range(count):
+            entries[k, i] = (reading[k, i] + noise[i]) / scale[k]
+    for i in range(count):
+        turns = block.stride[i] * block.step[i] / episode.span
+        entries[5, i] = sine_of_turns(turns)
+        entries[6, i] = cosine_of_turns(turns)
+        entries[7, i] = block.stride[i] / episode.time_step / scale[7]
     k = 8
-    for a in range(episode.action.shape[1]):
-        view[k] = episode.action[lane, a]
+    for a in range(episode.channels.size):
+        fetch(episode.action[:, a], entries[k], begin, count)
         k += 1
     if episode.full:
-        half = body.state.shape[1] // 2
-        last = channels[lane, n % rows]
-        view[k] = last[coupling.WIRE_HEIGHT] / scale[k]
-        view[k + 1] = last[coupling.FRAME_FORCE] / scale[k + 1]
-        view[k + 2] = last[coupling.HEAD_FORCE] / scale[k + 2]
+        half = size // 2
+        for i in range(count):
+            entries[k, i] = block.sample[coupling.WIRE_HEIGHT, i] / scale[k]
+            entries[k + 1, i] = block.sample[coupling.FRAME_FORCE, i] / scale[k + 1]
+            entries[k + 2, i] = block.sample[coupling.HEAD_FORCE, i] / scale[k + 2]
         k += 3
         for m in range(1, half - 1):
-            view[k] = body.state[lane, m] / scale[k]
-            view[k + 1] = body.state[lane, half + m] / scale[k + 1]
+            for i in range(count):
+                entries[k, i] = block.state[m, i] / scale[k]
+                entries[k + 1, i] = block.state[half + m, i] / scale[k + 1]
             k += 2
-    for i in range(view.size):
-        view[i] = min(max(view[i], -BOUND), BOUND)
+    for r in range(k):
+        for i in range(count):
+            entries[r, i] = min(max(entries[r, i], -BOUND), BOUND)
+    for i in range(count):
+        seen = episode.observation[begin + i]
+        for r in range(k):
+            seen[r] = entries[r, i]

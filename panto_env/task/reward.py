@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ..plant import coupling
 from ..plant.jit import part
 from ..settings import NonNegative, Settings
 
@@ -26,41 +25,49 @@ class Reward(Settings):
 
 
 @part
-def judge(episode, run, channels, lane):
-    """Terms and reward of the control step that one lane has just made.
+def judge_sample(scores, block, count):
+    """Add the step that a block has just made to the cost and the loss of its control step."""
+    for i in range(count):
+        force, nominal = block.force[i], scores.nominal[i]
+        # An interval lies between two samples: before the first one there is none.
+        between = 1.0 if block.step[i] > 1.5 else 0.0
+        scores.cost[i] += between * (abs(scores.before[i] - nominal) + abs(force - nominal))
+        lost = 1.0 if force <= 0.0 else 0.0
+        scores.gone[i] += lost
+        scores.lost[i] = lost * (scores.lost[i] + 1.0)
+        scores.before[i] = force
 
-    channels: (lanes, rows, CHANNELS). The terms "cost_function" (N m) and "contact_loss" (%) sum over
-    an episode to the CF and CL of its trajectory.
+
+@part
+def judge(episode, scores, block, begin, count):
+    """Terms and reward of the control step that a block has just made.
+
+    The terms "cost_function" (N m) and "contact_loss" (%) sum over an episode to the CF and CL of its
+    trajectory.
     """
-    n, stride, steps = run.step[lane], run.stride[lane], episode.control_steps
-    nominal, rows = episode.nominal[lane], channels.shape[1]
-    cost, gone = 0.0, 0
-    for i in range(n - steps + 1, n + 1):
-        force = channels[lane, i % rows, coupling.CONTACT_FORCE]
-        if i > 1:
-            before = channels[lane, (i - 1) % rows, coupling.CONTACT_FORCE]
-            cost += abs(before - nominal) + abs(force - nominal)
-        if force <= 0:
-            gone += 1
-            episode.lost[lane] += 1
-        else:
-            episode.lost[lane] = 0
-    effort, rate = 0.0, 0.0
-    action, last_action = episode.action[lane], episode.last_action[lane]
-    for a in range(action.size):
-        effort += action[a] ** 2
-        rate += (0.5 * (action[a] - last_action[a])) ** 2
-    terms, weights = episode.terms[lane], episode.weights
-    terms[COST_FUNCTION] = 0.5 * stride * cost
-    terms[CONTACT_LOSS] = 100.0 * gone * stride / episode.distance[lane]
-    terms[EFFORT] = effort
-    terms[RATE] = rate
-    episode.reward[lane] = -(
-        weights[COST_FUNCTION] * 0.5 * cost / (nominal * steps)
-        + weights[CONTACT_LOSS] * gone / steps
-        + weights[EFFORT] * effort
-        + weights[RATE] * rate
-    )
+    steps, weights = episode.control_steps, episode.weights
+    for i in range(count):
+        scores.effort[i] = 0.0
+        scores.rate[i] = 0.0
+    for a in range(episode.channels.size):
+        action = episode.action[begin : begin + count, a]
+        last_action = episode.last_action[begin : begin + count, a]
+        for i in range(count):
+            scores.effort[i] += action[i] * action[i]
+            change = 0.5 * (action[i] - last_action[i])
+            scores.rate[i] += change * change
+    for i in range(count):
+        cost, gone = 0.5 * scores.cost[i], scores.gone[i]
+        scores.terms[COST_FUNCTION, i] = block.stride[i] * cost
+        scores.terms[CONTACT_LOSS, i] = 100.0 * gone * block.stride[i] / scores.distance[i]
+        scores.terms[EFFORT, i] = scores.effort[i]
+        scores.terms[RATE, i] = scores.rate[i]
+        scores.reward[i] = -(
+            weights[COST_FUNCTION] * cost / (scores.nominal[i] * steps)
+            + weights[CONTACT_LOSS] * gone / steps
+            + weights[EFFORT] * scores.effort[i]
+            + weights[RATE] * scores.rate[i]
+        )
 
 
 def weights(reward: Reward) -> np.ndarray:

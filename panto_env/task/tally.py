@@ -8,21 +8,22 @@ import numpy as np
 
 from ..arrays import Array
 from ..metrics import Figures, low_pass_sections
-from ..plant import coupling
+from ..plant.coupling import FRAME_FORCE, HEAD_FORCE, fetch, store
 from ..plant.jit import part
 
 # Columns of the sums.
 COUNT, DEVIATION, SQUARE, MAX, MIN, LOST, COST, EFFORT, RATE = range(9)
+SUMS = 9
 
 
 class Tally(NamedTuple):
     """Running sums of all lanes; arrays of no lanes keep nothing."""
 
     sections: Array  # (sections, 6): EN 50317's filter, second-order sections
-    settled: Array  # (sections, 2): its state settled at 1 N
-    filter: Array  # (lanes, sections, 2): its state
-    sums: Array  # (lanes, 9)
-    forces: Array  # (lanes, 2): actuator forces of the last sample (N)
+    settled: Array  # (2 sections,): its state settled at 1 N
+    filter: Array  # (2 sections, lanes): its state
+    sums: Array  # (SUMS, lanes)
+    forces: Array  # (2, lanes): actuator forces of the last sample (N)
     peak: Array  # (lanes, supports): largest uplift (m)
 
 
@@ -31,65 +32,88 @@ def tally(lanes: int, supports: int, time_step: float) -> Tally:
     sections, settled = low_pass_sections(time_step) if lanes else (np.zeros((0, 6)), np.zeros((0, 2)))
     return Tally(
         sections=sections,
-        settled=settled,
-        filter=np.zeros((lanes, *settled.shape)),
-        sums=np.zeros((lanes, 9)),
-        forces=np.zeros((lanes, 2)),
+        settled=settled.ravel(),
+        filter=np.zeros((settled.size, lanes)),
+        sums=np.zeros((SUMS, lanes)),
+        forces=np.zeros((2, lanes)),
         peak=np.zeros((lanes, supports)),
     )
 
 
 def clear(tally: Tally, lane: int) -> None:
     """Begin anew in one lane."""
-    tally.sums[lane] = 0.0
-    tally.sums[lane, MAX], tally.sums[lane, MIN] = -np.inf, np.inf
+    tally.sums[:, lane] = 0.0
+    tally.sums[MAX, lane], tally.sums[MIN, lane] = -np.inf, np.inf
     tally.peak[lane] = -np.inf
 
 
 @part
-def count(tally, episode, run, samples, lane):
-    """Add the samples of the control step that one lane has just made."""
-    if tally.sums.shape[0] == 0:
-        return
-    sums, state, sections = tally.sums[lane], tally.filter[lane], tally.sections
-    rows, nominal = samples.channels.shape[1], episode.nominal[lane]
-    n = run.step[lane]
-    for i in range(n - episode.control_steps + 1, n + 1):
-        row = samples.channels[lane, i % rows]
-        force = row[coupling.CONTACT_FORCE]
-        frame, head = row[coupling.FRAME_FORCE], row[coupling.HEAD_FORCE]
-        if sums[COUNT] == 0:
-            for k in range(state.shape[0]):
-                state[k, 0] = tally.settled[k, 0] * force
-                state[k, 1] = tally.settled[k, 1] * force
-        else:
-            sums[RATE] += (frame - tally.forces[lane, 0]) ** 2 + (head - tally.forces[lane, 1]) ** 2
-        filtered = force
-        for k in range(state.shape[0]):  # direct form II transposed
-            b0, b1, b2 = sections[k, 0], sections[k, 1], sections[k, 2]
-            a1, a2 = sections[k, 4], sections[k, 5]
-            out = b0 * filtered + state[k, 0]
-            state[k, 0] = b1 * filtered - a1 * out + state[k, 1]
-            state[k, 1] = b2 * filtered - a2 * out
-            filtered = out
-        sums[COUNT] += 1.0
-        sums[DEVIATION] += filtered - nominal
-        sums[SQUARE] += (filtered - nominal) ** 2
-        sums[MAX] = max(sums[MAX], filtered)
-        sums[MIN] = min(sums[MIN], filtered)
-        sums[LOST] += 1.0 if force <= 0 else 0.0
-        sums[EFFORT] += frame**2 + head**2
-        tally.forces[lane, 0], tally.forces[lane, 1] = frame, head
-        for s in range(tally.peak.shape[1]):
-            tally.peak[lane, s] = max(tally.peak[lane, s], samples.uplift[lane, i % rows, s])
-    sums[COST] += episode.terms[lane, 0]
+def load_tally(tally, scores, begin, count):
+    """Fetch the sums of a block."""
+    for k in range(tally.filter.shape[0]):
+        fetch(tally.filter[k], scores.filter[k], begin, count)
+    for k in range(SUMS):
+        fetch(tally.sums[k], scores.sums[k], begin, count)
+    for c in range(2):
+        fetch(tally.forces[c], scores.forces[c], begin, count)
+
+
+@part
+def store_tally(tally, scores, begin, count):
+    """Put them back."""
+    for k in range(tally.filter.shape[0]):
+        store(scores.filter[k], tally.filter[k], begin, count)
+    for k in range(SUMS):
+        store(scores.sums[k], tally.sums[k], begin, count)
+    for c in range(2):
+        store(scores.forces[c], tally.forces[c], begin, count)
+
+
+@part
+def count_sample(tally, scores, samples, block, begin, count):
+    """Add the sample of the step that a block has just made."""
+    state, filtered, sums, sample = scores.filter, scores.filtered, scores.sums, block.sample
+    for i in range(count):
+        filtered[i] = block.force[i]
+    for k in range(tally.sections.shape[0]):  # direct form II transposed
+        b0, b1, b2 = tally.sections[k, 0], tally.sections[k, 1], tally.sections[k, 2]
+        a1, a2 = tally.sections[k, 4], tally.sections[k, 5]
+        settled_0, settled_1 = tally.settled[2 * k], tally.settled[2 * k + 1]
+        for i in range(count):
+            first = sums[COUNT, i] == 0.0
+            s0 = settled_0 * block.force[i] if first else state[2 * k, i]
+            s1 = settled_1 * block.force[i] if first else state[2 * k + 1, i]
+            out = b0 * filtered[i] + s0
+            state[2 * k, i] = b1 * filtered[i] - a1 * out + s1
+            state[2 * k + 1, i] = b2 * filtered[i] - a2 * out
+            filtered[i] = out
+    for i in range(count):
+        more = 0.0 if sums[COUNT, i] == 0.0 else 1.0
+        frame, head = sample[FRAME_FORCE, i], sample[HEAD_FORCE, i]
+        jump, pair_jump = frame - scores.forces[0, i], head - scores.forces[1, i]
+        sums[RATE, i] += more * (jump * jump + pair_jump * pair_jump)
+        sums[EFFORT, i] += frame * frame + head * head
+        scores.forces[0, i] = frame
+        scores.forces[1, i] = head
+    for i in range(count):
+        deviation = filtered[i] - scores.nominal[i]
+        sums[COUNT, i] += 1.0
+        sums[DEVIATION, i] += deviation
+        sums[SQUARE, i] += deviation * deviation
+        sums[MAX, i] = max(sums[MAX, i], filtered[i])
+        sums[MIN, i] = min(sums[MIN, i], filtered[i])
+        sums[LOST, i] += 1.0 if block.force[i] <= 0.0 else 0.0
+    for s in range(tally.peak.shape[1]):
+        for i in range(count):
+            peak, uplift = tally.peak[begin + i], samples.uplift[begin + i, 0]
+            peak[s] = max(peak[s], uplift[s])
 
 
 def figures(
     tally: Tally, lane: int, nominal: float, stride: float, time_step: float, supports: Array
 ) -> Figures:
     """Figures of one lane's run so far; supports: their positions (m)."""
-    sums = tally.sums[lane]
+    sums = tally.sums[:, lane]
     samples = sums[COUNT]
     shift = sums[DEVIATION] / samples
     mean, std = nominal + shift, float(np.sqrt(max(sums[SQUARE] / samples - shift**2, 0.0)))

@@ -112,7 +112,7 @@ class Task:
                 f"not {self.distance:g} m; ask for more spans."
             )
         self.control_interval = control_interval
-        self.control_steps = _whole_steps(control_interval, numerics.time_step)
+        self.control_steps = _whole_steps(control_interval, self.plant.time_step)
         self.speed_range = self.check_speeds(speed_kmh)
         self.layout = obs.layout(observation, self.actuator, panto)
         self.speed = np.zeros(lanes)  # m/s
@@ -120,19 +120,19 @@ class Task:
         self._noise_scale = obs.noise_scale(self.sensors)
         self._random: list[np.random.Generator] = [np.random.default_rng(0)] * lanes
         self._record_droppers = record_droppers
-        # The slowest run sets how many samples an episode may have; row 0 is the start.
-        rows = self._steps(self.speed_range[0]) + 1
-        if not keep_samples:
-            rows = min(rows, self.episode.delay + self.control_steps + 2)
         self.keep_samples = keep_samples
+        # The slowest run sets how many samples an episode may have; row 0 is the start.
+        rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
         self.samples = self.plant.samples(rows, tension=record_droppers)
-        self.tally = tally.tally(0 if keep_samples else lanes, len(self.plant.supports), numerics.time_step)
+        tallied = 0 if keep_samples else lanes
+        self.tally = tally.tally(tallied, len(self.plant.supports), self.plant.time_step)
         self._threads = _threads(lanes)
         self._bind()
 
     def _episode(self, reward_weights: Array) -> Episode:
         lanes, actions = self.plant.lanes, len(self.actuator.channels)
         time_step = self.plant.time_step
+        late, early = divmod(round(self.sensors.delay / time_step), self.control_steps)
         return Episode(
             action=np.zeros((lanes, actions)),
             last_action=np.zeros((lanes, actions)),
@@ -142,16 +142,18 @@ class Task:
             end=np.zeros(lanes, dtype=np.int64),
             distance=np.zeros(lanes),
             weights=reward_weights,
-            lost=np.zeros(lanes, dtype=np.int64),
-            terms=np.zeros((lanes, len(TERMS))),
+            lost=np.zeros(lanes),
+            terms=np.zeros((len(TERMS), lanes)),
             reward=np.zeros(lanes),
             idle=np.zeros(lanes, dtype=np.bool_),
             terminated=np.zeros(lanes, dtype=np.bool_),
             truncated=np.zeros(lanes, dtype=np.bool_),
+            latest=np.zeros((coupling.CHANNELS, lanes)),
+            past=np.zeros((late, obs.READINGS, lanes)),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
-            noise=np.zeros((lanes, obs.READINGS)),
+            noise=np.zeros((obs.READINGS, lanes)),
             scale=self.layout.scale,
-            delay=round(self.sensors.delay / time_step),
+            read_at=self.control_steps - early,
             span=float(self.plant.catenary.span_length),
             time_step=time_step,
             full=self.layout.kind == "full",
@@ -166,7 +168,7 @@ class Task:
             plant.line, plant.wire, plant.body, plant.drive, plant.run, self.samples, self.episode, self.tally
         )  # fmt: skip
         self._control_step = bind(control_step, *self._arguments, 0, 1)
-        self._look = (plant.body, plant.run, self.samples, self.episode)
+        self._look = (plant.line, plant.body, plant.drive, plant.run, self.episode)
         self._first_look = bind(first_look, *self._look, 0, 1)
 
     @property
@@ -206,18 +208,17 @@ class Task:
         episode.nominal[lane] = plant.body.lift[lane]
         episode.end[lane] = self._steps(speed)
         episode.distance[lane] = episode.end[lane] * plant.run.stride[lane]
-        for array in (episode.action, episode.last_action, episode.lost, episode.terms, episode.reward):
+        for array in (episode.action, episode.last_action, episode.lost, episode.reward):
             array[lane] = 0
+        episode.terms[:, lane] = 0
         episode.terminated[lane] = episode.truncated[lane] = False
         plant.clear(self.samples, lane)
-        if not self.keep_samples:
+        sample = episode.latest[:, lane] = plant.first_sample(lane)
+        episode.past[:, :, lane] = sample[list(obs.SENSED)]
+        if self.keep_samples:
+            self.samples.channels[lane, 0] = sample
+        else:
             tally.clear(self.tally, lane)
-        row, state = self.samples.channels[lane, 0], plant.body.state[lane]
-        row[:] = 0.0
-        row[coupling.CONTACT_FORCE] = plant.run.force[lane]
-        row[coupling.HEAD_HEIGHT] = state[0]
-        row[coupling.FRAME_HEIGHT] = state[len(plant.pantograph.masses) - 1]
-        row[coupling.WIRE_HEIGHT] = state[0] - plant.run.force[lane] * plant.strip_compliance
         self._random[lane] = random
         episode.idle[lane] = False
         self._draw_noise(lane, lane + 1)
@@ -270,7 +271,7 @@ class Task:
                 if self.episode.idle[lane]:
                     continue
                 drawn = self._random[lane].standard_normal(obs.READINGS)
-                self.episode.noise[lane] = self._noise_scale * drawn
+                self.episode.noise[:, lane] = self._noise_scale * drawn
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's run so far, the same as its trajectory's summary."""

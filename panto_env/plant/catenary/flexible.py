@@ -30,6 +30,8 @@ from .static_shape import StaticShape, solve
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 FINEST = 1 / 3
 """Grid (m) unless told otherwise, where it is stable: docs/validation.md."""
+TIME_STEP = 2.5e-3
+"""Unless told otherwise (s): docs/validation.md."""
 QUIET = 1e-25
 """Load (m a step) that keeps quiet wires away from subnormal numbers; it moves a wire by less than
 1e-15 m."""
@@ -73,8 +75,8 @@ def build(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> Flexibl
     """
     shape = solve(data)
     window = min(numerics.window or spans, spans)
-    step, beta = numerics.time_step, data.damping.beta
-    per_span = nodes_per_span(data, numerics)
+    step, beta = numerics.time_step or TIME_STEP, data.damping.beta
+    per_span = nodes_per_span(data, numerics.spacing, step)
     dx = data.span_length / per_span
     nodes = window * per_span + 1 + 2 * PAD
     settle = 1.0 + data.damping.alpha * step / 2
@@ -151,23 +153,21 @@ def _added_mass(
     return added
 
 
-def nodes_per_span(data: FlexibleCatenaryData, numerics: Numerics) -> int:
-    """Nodes a span of the grid asked for, or of the finest up to FINEST that is stable."""
-    if numerics.spacing is not None:
-        nodes = int(np.ceil(data.span_length / numerics.spacing - 1e-9))
-        if not stable(data, data.span_length / nodes, numerics.time_step):
+def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
+    """Nodes a span of the grid asked for (m), or of the finest up to FINEST that is stable."""
+    if spacing is not None:
+        nodes = int(np.ceil(data.span_length / spacing - 1e-9))
+        if not stable(data, data.span_length / nodes, step):
             raise InputError(
-                f"A time step of {1e3 * numerics.time_step:g} ms is unstable on a grid of "
+                f"A time step of {1e3 * step:g} ms is unstable on a grid of "
                 f"{data.span_length / nodes:g} m for line '{data.name}'; take a shorter step or a "
                 "coarser grid."
             )
         return nodes
     for nodes in range(int(np.ceil(data.span_length / FINEST - 1e-9)), 7, -1):
-        if stable(data, data.span_length / nodes, numerics.time_step):
+        if stable(data, data.span_length / nodes, step):
             return nodes
-    raise InputError(
-        f"A time step of {1e3 * numerics.time_step:g} ms is too long for line '{data.name}' on any grid."
-    )
+    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:

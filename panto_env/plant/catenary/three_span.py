@@ -24,6 +24,10 @@ SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
 
 
+TIME_STEP = 2.5e-3
+"""Unless told otherwise (s): tests/test_three_span.py shows how figures converge."""
+
+
 class ThreeSpanLine(NamedTuple):
     """Constants of the line; modes are scaled to unit modal mass."""
 
@@ -99,7 +103,7 @@ def build(data: ThreeSpanData, spans: int, numerics: Numerics) -> ThreeSpanLine:
     moved = mode_shapes(data, vectors, everywhere + span)
     moved[everywhere > 2 * span + 1e-9] = 0.0
     project = np.linalg.lstsq(mode_shapes(data, vectors, everywhere), moved, rcond=None)[0]
-    free, forced = _propagation(frequency, data.damping_ratio, numerics.time_step)
+    free, forced = _propagation(frequency, data.damping_ratio, numerics.time_step or TIME_STEP)
     return ThreeSpanLine(
         span=span,
         shape=mode_shapes(data, vectors, positions),
