@@ -108,7 +108,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise InputError(f"render_mode must be None or 'rgb_array', not {render_mode!r}.")
         self.render_mode = render_mode
         self._settings = settings
-        self._usual = self.task = Task(**settings)
+        self._usual = Task(**settings)
+        self._watch(self._usual)
         self._running = False
         shape = self.task.episode.observation[0].shape
         self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
@@ -130,10 +131,19 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Start an episode; ``options`` are arguments of the class, for this episode alone."""
         task = self._episode_task(options or {})
         super().reset(seed=seed)
-        self.task = task
+        if task is not self.task:
+            self._watch(task)
         task.reset(0, self.np_random)
         self._running = True
         return task.episode.observation[0].copy(), {"speed_kmh": 3.6 * float(task.speed[0])}
+
+    def _watch(self, task: Task) -> None:
+        """Make this the task, and keep its only lane's arrays at hand for ``step``."""
+        self.task, episode = task, task.episode
+        self._shape = episode.action.shape[1:]
+        self._observation = episode.observation[0]
+        self._latest, self._terms = episode.latest[:, 0], episode.terms[:, 0]
+        self._reward, self._ends = episode.reward, (episode.terminated, episode.truncated)
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
         check_names(options, "option")
@@ -153,31 +163,23 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Hold ``action`` for one control interval. Raises InputError for an action that is not valid."""
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
-        task = self.task
-        episode, run = task.episode, task.plant.run
-        task.step(checked(action, episode.action.shape[1:]))
-        terminated, truncated = bool(episode.terminated[0]), bool(episode.truncated[0])
-        steps = int(run.step[0])
-        row = episode.latest[:, 0].tolist()
+        task, run = self.task, self.task.plant.run
+        task.step(checked(action, self._shape))
+        terminated, truncated = self._ends[0].item(), self._ends[1].item()
+        latest = self._latest.tolist()
         info: dict[str, Any] = {
-            "contact_force": row[coupling.CONTACT_FORCE],
-            "head": row[coupling.HEAD_HEIGHT],
-            "wire": row[coupling.WIRE_HEIGHT],
-            "frame_force": row[coupling.FRAME_FORCE],
-            "head_force": row[coupling.HEAD_FORCE],
-            "position": steps * float(run.stride[0]),
-            "reward_terms": dict(zip(TERMS, episode.terms[:, 0].tolist(), strict=True)),
+            "contact_force": latest[coupling.CONTACT_FORCE],
+            "head": latest[coupling.HEAD_HEIGHT],
+            "wire": latest[coupling.WIRE_HEIGHT],
+            "frame_force": latest[coupling.FRAME_FORCE],
+            "head_force": latest[coupling.HEAD_FORCE],
+            "position": run.step.item() * run.stride.item(),
+            "reward_terms": dict(zip(TERMS, self._terms.tolist(), strict=True)),
         }
         if terminated or truncated:
             self._running = False
             info["figures"] = task.figures(0).as_dict()
-        return (
-            episode.observation[0].copy(),
-            float(episode.reward[0]),
-            terminated,
-            truncated and not terminated,
-            info,
-        )
+        return self._observation.copy(), self._reward.item(), terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
@@ -196,8 +198,8 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
         raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {action!r}.") from error
     if force.shape != shape:
         raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
-    # The sum is finite where all are: cheaper than to ask each.
-    if not math.isfinite(force.sum()):
+    # The sum is finite where all are: cheaper than to ask each; Python adds up a few sooner than NumPy.
+    if not math.isfinite(sum(force.tolist()) if force.ndim == 1 else force.sum()):
         raise InputError(f"The action must be finite, not {action!r}; check the policy.")
     return force
 

@@ -18,6 +18,7 @@ from ..arrays import Array
 from .actuator import FRAME, HEAD, actuate
 from .contact import contact_force
 from .cosine import cosine_of_turns
+from .held import open_held
 from .jit import PART, kernel, part
 from .pantograph import MAX_STATE, move_free, press
 from .stack import stack
@@ -256,8 +257,12 @@ def alike(body, block, begin, last):
 
 
 @kernel
-def advance(line, wire, body, drive, run, command, steps, samples):
-    """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N)."""
+def advance(held, samples, command, steps):
+    """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N).
+
+    held: line, wire, body, drive and run.
+    """
+    line, wire, body, drive, run = open_held(held)
     block = new_block(line)
     begin, last = 0, body.lift.size
     while begin < last:

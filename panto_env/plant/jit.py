@@ -74,15 +74,3 @@ def part(function: F) -> F:
     """Compile a part of kernels with Numba, inlined where it is called."""
     compiled: F = numba.njit(**PART)(function)
     return compiled
-
-
-def bind(compiled: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
-    """A kernel's entry for arguments of these types, to be called with such arguments alone.
-
-    It skips Numba's look at the type of every argument, which takes microseconds where tuples hold
-    fifty arrays, and more than the kernel itself.
-    """
-    signature = tuple(numba.typeof(argument) for argument in arguments)
-    compiled.compile(signature)  # type: ignore[attr-defined]
-    entry: Callable[..., Any] = compiled.overloads[signature].entry_point  # type: ignore[attr-defined]
-    return entry

@@ -14,7 +14,7 @@ from . import actuator as actuators
 from . import coupling, pantograph
 from .catenary import MODELS
 from .coupling import CHANNELS, Run, Samples
-from .jit import bind
+from .held import bind
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
 
@@ -189,9 +189,7 @@ class Plant:
 
         The sample of a lane's step n (counted from 0) is recorded in row n + 1.
         """
-        arguments = (
-            self.line, self.wire, self.body, self.drive, self.run, command, steps, samples
-        )  # fmt: skip
         if self._advance is None:
-            self._advance = bind(coupling.advance, *arguments)
-        self._advance(*arguments)
+            fixed = (self.line, self.wire, self.body, self.drive, self.run)
+            self._advance = bind(coupling.advance, fixed, samples, command, steps)
+        self._advance(samples, command, steps)

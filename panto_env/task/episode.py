@@ -22,6 +22,7 @@ from ..plant.coupling import (
     store,
     store_block,
 )
+from ..plant.held import open_held
 from ..plant.jit import PART, kernel, part
 from ..plant.stack import stack
 from .observation import MAX_ENTRIES, READINGS, SENSED, observe
@@ -188,8 +189,12 @@ def finish(episode, scores, block, begin, count):
 
 
 @kernel
-def control_step(line, wire, body, drive, run, samples, episode, tally, first, last):
-    """One control step of the lanes from ``first`` to before ``last`` under ``episode.action``."""
+def control_step(held, first, last):
+    """One control step of the lanes from ``first`` to before ``last`` under ``episode.action``.
+
+    held: line, wire, body, drive, run, samples, episode and tally.
+    """
+    line, wire, body, drive, run, samples, episode, tally = open_held(held)
     block, scores = new_block(line), new_scores(line)
     keep = tally.sums.shape[1] > 0
     begin = first
@@ -229,8 +234,9 @@ def control_step(line, wire, body, drive, run, samples, episode, tally, first, l
 
 
 @kernel
-def first_look(line, body, drive, run, episode, first, last):
-    """Observations of the lanes from ``first`` to before ``last`` as they stand."""
+def first_look(held, first, last):
+    """Observations of the lanes from ``first`` to before ``last`` as they stand; held: as above."""
+    line, _, body, drive, run, _, episode, _ = open_held(held)
     block, scores = new_block(line), new_scores(line)
     for lane in range(first, last):
         load_block(body, drive, run, block, lane, 1)

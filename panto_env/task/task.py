@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..metrics import Figures
 from ..plant import coupling
 from ..plant.actuator import ACTUATORS, Actuator
-from ..plant.jit import bind
+from ..plant.held import bind
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from ..plant.numerics import Numerics
 from ..plant.plant import Plant
@@ -105,6 +105,7 @@ class Task:
             condition=self.condition,
             bilateral=bilateral,
         )
+        self.lanes = lanes
         self.distance = self.plant.line_end if distance is None else float(distance)
         if self.distance > self.plant.line_length:
             raise InputError(
@@ -117,6 +118,7 @@ class Task:
         self.layout = obs.layout(observation, self.actuator, panto)
         self.speed = np.zeros(lanes)  # m/s
         self.episode = self._episode(weights(reward_settings))
+        self._noisy = self.sensors.noisy
         self._noise_scale = obs.noise_scale(self.sensors)
         self._random: list[np.random.Generator] = [np.random.default_rng(0)] * lanes
         self._record_droppers = record_droppers
@@ -164,17 +166,11 @@ class Task:
 
     def _bind(self) -> None:
         plant = self.plant
-        self._arguments = (
+        fixed = (
             plant.line, plant.wire, plant.body, plant.drive, plant.run, self.samples, self.episode, self.tally
         )  # fmt: skip
-        self._control_step = bind(control_step, *self._arguments, 0, 1)
-        self._look = (plant.line, plant.body, plant.drive, plant.run, self.episode)
-        self._first_look = bind(first_look, *self._look, 0, 1)
-
-    @property
-    def lanes(self) -> int:
-        """Number of lanes."""
-        return self.plant.lanes
+        self._control_step = bind(control_step, fixed, 0, 1)
+        self._first_look = bind(first_look, fixed, 0, 1)
 
     def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
         """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid."""
@@ -222,7 +218,7 @@ class Task:
         self._random[lane] = random
         episode.idle[lane] = False
         self._draw_noise(lane, lane + 1)
-        self._first_look(*self._look, lane, lane + 1)
+        self._first_look(lane, lane + 1)
 
     def context(self, lane: int) -> Context:
         """What a policy may know of a lane's episode."""
@@ -248,16 +244,14 @@ class Task:
         if skip is not None:
             self.episode.idle[:] = skip
         self.episode.action[:] = action
-        self._draw_noise(0, self.lanes)
+        if self._noisy:
+            self._draw_noise(0, self.lanes)
         if self._threads is None:
-            self._control_step(*self._arguments, 0, self.lanes)
+            self._control_step(0, self.lanes)
             return
         pool, bounds = self._threads
-        jobs = [
-            pool.submit(self._control_step, *self._arguments, first, last)
-            for first, last in pairwise(bounds[1:])
-        ]
-        self._control_step(*self._arguments, bounds[0], bounds[1])
+        jobs = [pool.submit(self._control_step, first, last) for first, last in pairwise(bounds[1:])]
+        self._control_step(bounds[0], bounds[1])
         for job in jobs:
             job.result()
 
@@ -266,10 +260,8 @@ class Task:
         self.plant.advance(np.zeros((self.lanes, 2)), int(self.episode.end[0]), self.samples)
 
     def _draw_noise(self, first: int, last: int) -> None:
-        if self.sensors.noisy:
-            for lane in range(first, last):
-                if self.episode.idle[lane]:
-                    continue
+        for lane in range(first, last):
+            if self._noisy and not self.episode.idle[lane]:
                 drawn = self._random[lane].standard_normal(obs.READINGS)
                 self.episode.noise[:, lane] = self._noise_scale * drawn
 
