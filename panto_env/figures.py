@@ -122,8 +122,13 @@ SWEPT = (
 
 
 def plot_sweep(rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> Figure:
-    """Figures over the one swept parameter, or σ, maximum and minimum as maps over the two."""
-    return _sweep_lines(rows, parameters[0]) if len(parameters) == 1 else _sweep_maps(rows, parameters)
+    """Figures over one parameter, or σ, maximum and minimum as maps over two; one value varies nothing."""
+    varied = [name for name in parameters if len({row[name] for row in rows}) > 1] or parameters[:1]
+    figure = _sweep_maps(rows, varied) if len(varied) == 2 else _sweep_lines(rows, varied[0])
+    fixed = [f"{name} = {rows[0][name]:g}" for name in dict.fromkeys((*parameters, "speed_kmh"))]
+    held = [text for text in fixed if text.partition(" = ")[0] not in varied]
+    figure.suptitle(", ".join((f"{rows[0]['pantograph']} on {rows[0]['catenary']}", *held)))
+    return figure
 
 
 def _sweep_lines(rows: Sequence[Mapping[str, Any]], parameter: str) -> Figure:
@@ -131,27 +136,31 @@ def _sweep_lines(rows: Sequence[Mapping[str, Any]], parameter: str) -> Figure:
     from matplotlib.lines import Line2D
 
     shown = [(key, label, scale) for key, label, scale in SWEPT if not all(isnan(row[key]) for row in rows)]
-    figure = Figure(figsize=(8, 2.6 * (1 + len(shown))), layout="constrained")
+    figure = Figure(figsize=(8, 1 + 2.4 * (1 + len(shown))), layout="constrained")
     axes = figure.subplots(1 + len(shown), 1, sharex=True)
+    styles: dict[str, tuple[str, Any]] = {
+        "maximum": ("max", "--"),
+        "mean": ("mean", "-"),
+        "minimum": ("min", ":"),
+    }
     by_policy = _by_policy(rows)
     for k, own in enumerate(by_policy.values()):
         at, colour = [row[parameter] for row in own], f"C{k}"
-        for key, line in (("max", "--"), ("mean", "-"), ("min", ":")):
+        for key, line in styles.values():
             axes[0].plot(at, [row[key] for row in own], line, color=colour, marker=".")
         for axis, (key, _, scale) in zip(axes[1:], shown, strict=True):
             axis.plot(at, [scale * row[key] for row in own], color=colour, marker=".")
-    lines = [Line2D([], [], color="0.3", linestyle=line) for line in ("--", "-", ":")]
     axes[0].set(ylabel="contact force (N)")
-    axes[0].legend(lines, ("maximum", "mean", "minimum"), ncols=3, fontsize="small")
-    for axis, (_, label, _) in zip(axes[1:], shown, strict=True):
+    for axis, (key, label, _) in zip(axes[1:], shown, strict=True):
         axis.set(ylabel=label)
+        if key == "contact_loss":  # never below 0; a line without loss is not magnified
+            axis.set_ylim(bottom=0, top=max(1.0, axis.get_ylim()[1]))
     for axis in axes:
         axis.grid(color="0.9")
-    axes[1].legend(
-        [Line2D([], [], color=f"C{k}") for k in range(len(by_policy))], list(by_policy), fontsize="small"
-    )
+    handles = [Line2D([], [], color="0.3", linestyle=line, label=name) for name, (_, line) in styles.items()]
+    handles += [Line2D([], [], color=f"C{k}", marker=".", label=name) for k, name in enumerate(by_policy)]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize="small")
     axes[-1].set(xlabel=parameter)
-    figure.suptitle(_sweep_title(rows, (parameter,)))
     return figure
 
 
@@ -177,7 +186,6 @@ def _sweep_maps(rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]) ->
         axis.set(xlabel=parameters[0])
     for axis in axes[:, 0]:
         axis.set(ylabel=parameters[1])
-    figure.suptitle(_sweep_title(rows, parameters))
     return figure
 
 
@@ -185,9 +193,3 @@ def _by_policy(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str,
     """Rows of each policy, in the order in which policies were named."""
     names = dict.fromkeys(row["policy"] for row in rows)
     return {name: [row for row in rows if row["policy"] == name] for name in names}
-
-
-def _sweep_title(rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> str:
-    row = rows[0]
-    at = "" if "speed_kmh" in parameters else f", {row['speed_kmh']:g} km/h"
-    return f"{row['pantograph']} on {row['catenary']}{at}"

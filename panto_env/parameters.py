@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from .errors import InputError
-from .settings import Settings, suggest
+from .settings import Settings
 
 S = TypeVar("S", bound=Settings)
 
@@ -26,15 +27,30 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
     return names
 
 
+def check_name(name: str, entry: Settings) -> None:
+    """Raise InputError, with a suggestion, unless an entry has a parameter of this dotted name."""
+    family = name.partition(".")[0]
+    known = parameter_names(entry, family)
+    if name in known:
+        return
+    owner = getattr(entry, "name", None)
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    # Of a list its first place stands for all: droppers alone would fill the line.
+    shown = [each for each in known if not each[-1].isdigit() or each.endswith(".0")]
+    raise InputError(
+        f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint}known are {', '.join(shown)}"
+        f"{' (lists count from 0)' if shown != known else ''}."
+    )
+
+
 def change(entry: S, name: str, value: float) -> S:
     """The entry with another value of the parameter ``name``, whose first part names the family.
 
     Raises InputError where the entry has no such parameter, or its schema refuses the value.
     """
-    family, *path = name.split(".")
-    known = parameter_names(entry, family)
-    if name not in known:
-        raise InputError(f"Unknown parameter '{name}': {suggest(name, known)}.")
+    check_name(name, entry)
+    path = name.split(".")[1:]
     try:
         return type(entry).model_validate(_put(entry.model_dump(), path, value))
     except ValidationError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, fields
@@ -13,11 +14,11 @@ from .catalog import load_catenary, load_pantograph
 from .errors import InputError
 from .machine import cores
 from .metrics import Figures
-from .parameters import change, parameter_names
+from .parameters import change, check_name, parameter_names
 from .plant.actuator import ACTUATORS, Actuator
 from .plant.line_condition import LINE_CONDITIONS, LineCondition
 from .plant.sensor import SENSORS, Sensors
-from .settings import Settings, parse, suggest
+from .settings import Settings, parse
 from .simulation import simulate
 from .task.policy import find_policy
 from .task.task import DEFAULT_LINE, DEFAULT_SPEED_KMH
@@ -108,17 +109,26 @@ def _check(
         if not (policy is None or isinstance(policy, str | Path)):
             raise InputError(f"A sweep takes policies by name or model file, not {policy!r}.")
     for name, values in parameters.items():
-        family = name.partition(".")[0]
-        if family in entries:
-            known = parameter_names(entries[family], family)
-        else:
-            known = [SPEED, *(name for f, entry in entries.items() for name in parameter_names(entry, f))]
-        if name != SPEED and not name.startswith(f"{POLICY}.") and name not in known:
-            raise InputError(
-                f"Unknown parameter '{name}': {suggest(name, known)}; or policy.NAME for one of a policy's."
-            )
+        _check_name(name, entries)
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
+
+
+def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
+    family = name.partition(".")[0]
+    if name == SPEED or (family == POLICY and family != name):
+        return
+    if family in entries:
+        check_name(name, entries[family])
+        return
+    everything = [n for each, entry in entries.items() for n in parameter_names(entry, each)]
+    near = difflib.get_close_matches(name, [SPEED, *everything], n=1)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    families = ", ".join(f"'{each}.'" for each in (*entries, POLICY))
+    raise InputError(
+        f"Unknown parameter '{name}': {hint}it must be {SPEED} or begin with one of {families} "
+        "(as pantograph.masses.0)."
+    )
 
 
 def _prepare(

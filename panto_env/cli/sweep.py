@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -137,8 +139,9 @@ def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None)
     at = "" if "speed_kmh" in parameters else f" at {first['speed_kmh']:g} km/h"
     table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans or 'all'}")
     for name in (*parameters, "policy"):
-        table.add_column(name, justify="left" if name == "policy" else "right")
-    shown = [column for column in COLUMNS if any(row[column[0]] == row[column[0]] for row in rows)]
+        heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
+        table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")
+    shown = [column for column in COLUMNS if any(isfinite(row[column[0]]) for row in rows)]
     for _, heading, _ in shown:
         table.add_column(heading, justify="right")
     for row in rows:

@@ -43,7 +43,7 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    figure = Figure(figsize=(8, 4.4), layout="constrained")
     axis = figure.subplots()
     scale = 1e3 if quantity == "displacement" else 1.0
     handles = []
@@ -61,11 +61,11 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
     masts = [span * k for k in range(SPANS[0] - 1, SPANS[1] + 1)]
     axis.set(xlim=(masts[0], masts[-1]), xlabel="distance (m); grey lines: masts")
     for mast in masts:
-        axis.axvline(mast, color="0.85", linewidth=0.8, zorder=0)
+        axis.axvline(mast, color="0.7", linewidth=0.8, zorder=0)
     what = "head displacement $z_1$" if quantity == "displacement" else "contact force $F_C$"
     axis.set(ylabel=f"{what} ({'mm' if quantity == 'displacement' else 'N'})")
     at = "" if influence.key == "speed" else f", {SPEED_KMH:g} km/h"
     axis.set_title(f"As Fig. {_number(influence, quantity)} of paper 3{at}", fontsize="medium")
     axis.grid(axis="y", color="0.92")
-    axis.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    figure.legend(handles=handles, fontsize="small", loc="outside lower center", ncols=len(handles))
     return figure

@@ -153,7 +153,7 @@ def landmarks(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 def resonance(found: Mapping[str, float]) -> Table:
     """The landmarks, in words."""
     rows = tuple((name, f"{speed:g}") for name, speed in found.items())
-    return Table("Speeds, in steps of 5 km/h, F_S = 70 N", ("what", "km/h"), rows)
+    return Table("Speeds at which something begins, swept in steps of 5 km/h; F_S = 70 N", ("what", "km/h"), rows)
 
 
 def _extremes(each: Pass) -> tuple[float, float, float]:
