@@ -10,7 +10,7 @@ from ...sweep import sweep
 from ..study import Outcome, Report
 from . import tables
 from .equations import Equations
-from .passes import CATENARY, PANTOGRAPH, SPANS, SPEEDS_KMH, Passes, influences, run_pass
+from .passes import CATENARY, PANTOGRAPH, SPANS, SPEED_KMH, SPEEDS_KMH, Passes, influences, run_pass
 from .pictures import figure_name, pictures
 from .sensitivity import SHARE, SHARES, measure
 from .statements import statements
@@ -46,7 +46,7 @@ def run(report: Report) -> Outcome:
     beginnings = [tables.Beginning.of(Equations(speed), speed) for speed in SPEEDS_KMH]
     report("figures", 0.9)
     figures = pictures(varied, passes[True], passes[False])
-    landmarks = tables.landmarks(over_speed)
+    landmarks = tables.landmarks(over_speed, Equations(SPEED_KMH))
     numbers: dict[str, Any] = {
         "figures": {
             figure_name(each, quantity): {

@@ -27,7 +27,8 @@ class Equations:
         self._mean: float = line.mean_stiffness  # type: ignore[attr-defined]
         self._variation: float = line.stiffness_variation  # type: ignore[attr-defined]
         speed = speed_kmh / 3.6
-        self.span_time = line.span_length / speed
+        self.span_length = line.span_length
+        self.span_time = self.span_length / speed
         self.shown = np.linspace(SPANS[0] - 1, SPANS[1], POINTS) * self.span_time
         self._inertia = np.array(data.masses)[:, None]
         springs, dampers = _chain(data.stiffnesses), _chain(data.dampings)
@@ -47,6 +48,13 @@ class Equations:
         matrix = self._matrix.copy()
         matrix[3, 0] -= self.stiffness(time) / self._inertia[0, 0]
         return matrix
+
+    def natural_frequency(self) -> float:
+        """Lowest natural frequency (Hz) of the pantograph on the mean stiffness."""
+        matrix = self._matrix.copy()
+        matrix[3, 0] -= self._mean / self._inertia[0, 0]
+        swings = np.linalg.eigvals(matrix)
+        return float(np.abs(swings[swings.imag > 0]).min() / (2 * np.pi))
 
     def contact_force(self, start: Literal["rest", "flat"]) -> Array:
         """Contact force over the 11th and 12th span (N), (POINTS,), Eq. 8: the contact may pull.

@@ -130,19 +130,27 @@ def beginnings(found: Sequence[Beginning]) -> Table:
     return Table(f"Initial values are not printed; the paper runs {RUN_TIME:g} s", headings, rows)
 
 
-def landmarks(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Speeds (km/h) of a sweep over speed at which something ends or peaks; nan where it does not."""
+def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[str, float]:
+    """Speeds (km/h) at which something ends or peaks in a sweep over speed, nan where it does not.
+
+    equations: at any speed; they give the natural period that spans may meet.
+    """
 
     def first(broken: Sequence[bool]) -> float:
         return next((row["speed_kmh"] for row, ends in zip(rows, broken, strict=True) if ends), float("nan"))
 
     shares = [row["std"] / row["nominal_force"] for row in rows]
+    period = 1 / equations.natural_frequency()
+    # Length of a span over the natural period, km/h.
+    resonant = 3.6 * equations.span_length / period
     high = [row["speed_kmh"] > 200 for row in rows]
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),
         "maximum above its limit from": first([row["max"] > maximum_limit(row["speed_kmh"]) for row in rows]),
         "contact lost from": first([row["contact_loss"] > 0 for row in rows]),
         "sigma over F(v) greatest at": rows[int(np.argmax(shares))]["speed_kmh"],
+        "a span takes a natural period at": resonant,
+        "a span takes two natural periods at": resonant / 2,
         "sigma least above 200 km/h at": min(
             (row["std"], row["speed_kmh"]) for row, fast in zip(rows, high, strict=True) if fast
         )[1],
@@ -152,8 +160,8 @@ def landmarks(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 
 def resonance(found: Mapping[str, float]) -> Table:
     """The landmarks, in words."""
-    rows = tuple((name, f"{speed:g}") for name, speed in found.items())
-    return Table("Speeds at which something begins, swept in steps of 5 km/h; F_S = 70 N", ("what", "km/h"), rows)
+    rows = tuple((name, f"{speed:.0f}") for name, speed in found.items())
+    return Table("Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N", ("what", "km/h"), rows)
 
 
 def _extremes(each: Pass) -> tuple[float, float, float]:
