@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -14,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.errors import InputError
-from panto_env.files import write_whole
+from panto_env.files import TABLES, write_rows, write_whole
+from panto_env.machine import cores
 from panto_env.task import Task
 from panto_env.task.policy import find_policy
 
@@ -24,7 +24,7 @@ from .statistics import Cell, compare
 
 FIRST_SPAN = 4
 """First span evaluated unless told otherwise: the three before it are the run-in from rest."""
-FORMATS = (".json", ".csv", ".parquet")
+FORMATS = (".json", *TABLES)
 Progress = Callable[[int, int], None]
 Job = tuple[BenchmarkSettings, Line, tuple[int, int], str, float, int]
 
@@ -53,21 +53,11 @@ class Benchmark:
     def save(self, path: str | Path) -> None:
         """Write a file, whole or not at all: all as JSON, or the rows as CSV or Parquet."""
         check_format(path)
+        if Path(path).suffix != ".json":
+            write_rows([row.as_dict() for row in self.rows], path)
+            return
         with write_whole(path) as temporary:
-            if temporary.suffix == ".json":
-                temporary.write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
-                return
-            import pyarrow as pa  # slow to import
-
-            table = pa.Table.from_pylist([row.as_dict() for row in self.rows])
-            if temporary.suffix == ".csv":
-                from pyarrow.csv import write_csv
-
-                write_csv(table, temporary)
-            else:
-                from pyarrow.parquet import write_table
-
-                write_table(table, temporary)
+            temporary.write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
 
 
 def run(
@@ -95,13 +85,6 @@ def run(
     ]
     rows = tuple(_passes(jobs, min(workers, len(jobs)), progress or (lambda done, total: None)))
     return Benchmark(settings, spans, rows, compare(rows))
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def check_format(path: str | Path) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,3 +111,85 @@ def plot_speed(result: dict[str, Any]) -> Figure:
     right.barh([row["settings"] for row in rows], [row["times_real_time"] for row in rows], color="tab:blue")
     right.set(xlabel="times real time, one core", title="Flexible plant by its settings")
     return figure
+
+
+SWEPT = (
+    ("std", "standard deviation σ (N)", 1.0),
+    ("contact_loss", "contact loss (%)", 1.0),
+    ("max_uplift", "uplift at supports (mm)", 1e3),
+)
+"""Figures that a sweep's plot shows below the force itself: key, label, scale from SI."""
+
+
+def plot_sweep(rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> Figure:
+    """Figures over one parameter, or σ, maximum and minimum as maps over two; one value varies nothing."""
+    varied = [name for name in parameters if len({row[name] for row in rows}) > 1] or parameters[:1]
+    figure = _sweep_maps(rows, varied) if len(varied) == 2 else _sweep_lines(rows, varied[0])
+    fixed = [f"{name} = {rows[0][name]:g}" for name in dict.fromkeys((*parameters, "speed_kmh"))]
+    held = [text for text in fixed if text.partition(" = ")[0] not in varied]
+    figure.suptitle(", ".join((f"{rows[0]['pantograph']} on {rows[0]['catenary']}", *held)))
+    return figure
+
+
+def _sweep_lines(rows: Sequence[Mapping[str, Any]], parameter: str) -> Figure:
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    shown = [(key, label, scale) for key, label, scale in SWEPT if not all(isnan(row[key]) for row in rows)]
+    figure = Figure(figsize=(8, 1 + 2.4 * (1 + len(shown))), layout="constrained")
+    axes = figure.subplots(1 + len(shown), 1, sharex=True)
+    styles: dict[str, tuple[str, Any]] = {
+        "maximum": ("max", "--"),
+        "mean": ("mean", "-"),
+        "minimum": ("min", ":"),
+    }
+    by_policy = _by_policy(rows)
+    for k, own in enumerate(by_policy.values()):
+        at, colour = [row[parameter] for row in own], f"C{k}"
+        for key, line in styles.values():
+            axes[0].plot(at, [row[key] for row in own], line, color=colour, marker=".")
+        for axis, (key, _, scale) in zip(axes[1:], shown, strict=True):
+            axis.plot(at, [scale * row[key] for row in own], color=colour, marker=".")
+    axes[0].set(ylabel="contact force (N)")
+    for axis, (key, label, _) in zip(axes[1:], shown, strict=True):
+        axis.set(ylabel=label)
+        if key == "contact_loss":  # never below 0; a line without loss is not magnified
+            axis.set_ylim(bottom=0, top=max(1.0, axis.get_ylim()[1]))
+    for axis in axes:
+        axis.grid(color="0.9")
+    handles = [Line2D([], [], color="0.3", linestyle=line, label=name) for name, (_, line) in styles.items()]
+    handles += [Line2D([], [], color=f"C{k}", marker=".", label=name) for k, name in enumerate(by_policy)]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize="small")
+    axes[-1].set(xlabel=parameter)
+    return figure
+
+
+def _sweep_maps(rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> Figure:
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    first, second = (np.array(sorted({row[name] for row in rows})) for name in parameters)
+    by_policy = _by_policy(rows)
+    figure = Figure(figsize=(13, 0.6 + 3.6 * len(by_policy)), layout="constrained")
+    axes = figure.subplots(len(by_policy), 3, sharex=True, sharey=True, squeeze=False)
+    labels = (("std", "standard deviation σ (N)"), ("max", "maximum (N)"), ("min", "minimum (N)"))
+    for k, (key, label) in enumerate(labels):
+        values = [row[key] for row in rows if not isnan(row[key])]
+        low, high = (min(values), max(values)) if values else (0.0, 1.0)  # one scale for all policies
+        for axis, (policy, own) in zip(axes[:, k], by_policy.items(), strict=True):
+            table = {(row[parameters[0]], row[parameters[1]]): row[key] for row in own}
+            grid = [[table[x, y] for x in first] for y in second]
+            mesh = axis.pcolormesh(first, second, grid, shading="nearest", vmin=low, vmax=high)
+            axis.set_title(f"{label}, {policy}", fontsize="medium")
+        figure.colorbar(mesh, ax=axes[:, k])
+    for axis in axes[-1]:
+        axis.set(xlabel=parameters[0])
+    for axis in axes[:, 0]:
+        axis.set(ylabel=parameters[1])
+    return figure
+
+
+def _by_policy(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Rows of each policy, in the order in which policies were named."""
+    names = dict.fromkeys(row["policy"] for row in rows)
+    return {name: [row for row in rows if row["policy"] == name] for name in names}

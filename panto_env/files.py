@@ -1,4 +1,4 @@
-"""Files: TOML read with clear errors, any file written whole or not at all, numbers fit for JSON."""
+"""Files: TOML read with clear errors, any file written whole or not at all, rows, numbers fit for JSON."""
 
 from __future__ import annotations
 
@@ -36,6 +36,33 @@ def write_whole(path: str | Path) -> Iterator[Path]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+TABLES = (".csv", ".parquet")
+"""Suffixes of files that hold rows."""
+
+
+def check_table(path: str | Path) -> None:
+    """Raise InputError unless the name of a file says how to write rows."""
+    if Path(path).suffix not in TABLES:
+        raise InputError(f"{path} must end in one of {', '.join(TABLES)}.")
+
+
+def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
+    """Write rows of the same keys as CSV or Parquet, by the file's suffix, whole or not at all."""
+    check_table(path)
+    import pyarrow as pa  # slow to import
+
+    table = pa.Table.from_pylist(rows)
+    with write_whole(path) as temporary:
+        if temporary.suffix == ".csv":
+            from pyarrow.csv import write_csv
+
+            write_csv(table, temporary)
+        else:
+            from pyarrow.parquet import write_table
+
+            write_table(table, temporary)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

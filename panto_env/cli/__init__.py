@@ -15,7 +15,7 @@ def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
     import typer
 
-    from . import catalogue, reproduce, simulate, speed, validate
+    from . import catalogue, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
         name="panto",
@@ -28,6 +28,7 @@ def main() -> None:
     app.callback()(_version)
     app.command("list")(catalogue.list_entries)
     app.command()(simulate.simulate)
+    app.command()(sweep.sweep)
     app.command()(validate.validate)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..catalog import load_catenary, load_pantograph
 from ..errors import InputError
+from ..machine import cores
 from ..metrics import Figures
 from ..plant import coupling
 from ..plant.actuator import ACTUATORS, Actuator
@@ -322,8 +322,7 @@ def _whole_steps(control_interval: float, time_step: float) -> int:
 
 def _threads(lanes: int) -> tuple[ThreadPoolExecutor, list[int]] | None:
     """Threads that share the lanes, one beside the caller's for each further core, and the bounds."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    count = min(cores, lanes // LANES_A_THREAD)
+    count = min(cores(), lanes // LANES_A_THREAD)
     if count < 2:
         return None
     bounds = [lanes * k // count for k in range(count + 1)]

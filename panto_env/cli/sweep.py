@@ -1,0 +1,151 @@
+"""``panto sweep``: figures over ranges of one or two parameters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+from rich.table import Table
+
+from ..errors import InputError
+from .output import Json, Plot, console, number, print_json, progress_console
+from .simulate import parse_spans
+
+COLUMNS = (
+    ("mean", "F_m\n(N)", 1.0),
+    ("std", "σ\n(N)", 1.0),
+    ("max", "max\n(N)", 1.0),
+    ("min", "min\n(N)", 1.0),
+    ("contact_loss", "CL\n(%)", 1.0),
+    ("max_uplift", "uplift\n(mm)", 1e3),
+)
+
+
+def sweep(
+    parameters: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="NAME=VALUES...",
+            help="One or two parameters by dotted name, as pantograph.masses.0, "
+            "catenary.contact_wire.tension, actuator.lag, policy.gain or speed_kmh; values as "
+            "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
+        ),
+    ],
+    catenary: Annotated[str, typer.Option(help="Line: a catalogue name or TOML file.")] = "en50318-2002",
+    pantograph: Annotated[str, typer.Option(help="Pantograph, likewise.")] = "en50318-2002",
+    speed: Annotated[float | None, typer.Option(help="Train speed (km/h) where it is not swept.")] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(help="Policy: a name, name:key=value,... or a model file; can be given again."),
+    ] = None,
+    spans: Annotated[
+        str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")
+    ] = None,
+    distance: Annotated[float | None, typer.Option(help="How far to run (m).")] = None,
+    actuator: Annotated[str, typer.Option(help="Actuator: ideal or realistic.")] = "ideal",
+    sensors: Annotated[str, typer.Option(help="Sensors: ideal or realistic.")] = "ideal",
+    line_condition: Annotated[str, typer.Option(help="Line: new, fair or worn.")] = "new",
+    seed: Annotated[int, typer.Option(help="Seed of irregularity and noise.")] = 0,
+    bilateral: Annotated[
+        bool, typer.Option("--bilateral", help="Let the contact pull, as paper 3 does.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(help="Threads; one a core unless told otherwise.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Run every value of one parameter, or every pair of two, and print the figures."""
+    from .. import files
+    from ..sweep import SPEED
+    from ..sweep import sweep as run
+
+    values = _parse(parameters)
+    if output is not None:
+        files.check_table(output)
+    if plot is not None:
+        from ..figures import check_picture, plot_sweep, save
+
+        check_picture(plot)
+    settings: dict[str, Any] = {"distance": distance, "bilateral": bilateral, "seed": seed}
+    if speed is not None:
+        if SPEED in values:
+            raise InputError("The speed is swept already; leave out --speed.")
+        settings[SPEED] = speed
+    columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal
+    ) as progress:
+        bar = progress.add_task("passes", total=None)
+        rows = run(
+            values,
+            catenary=catenary,
+            pantograph=pantograph,
+            policies=policy or (None,),
+            spans=parse_spans(spans),
+            actuator=actuator,
+            sensors=sensors,
+            line_condition=line_condition,
+            workers=workers,
+            progress=lambda done, total: progress.update(bar, completed=done, total=total),
+            **settings,
+        )
+    if output is not None:
+        files.write_rows(rows, output)
+    if plot is not None:
+        save(plot_sweep(rows, list(values)), plot)
+    if json:
+        print_json(rows)
+        return
+    _print(rows, list(values), spans)
+
+
+def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
+    """Values by name from NAME=VALUES. Raises InputError where they can't be read."""
+    found: dict[str, list[float]] = {}
+    for text in parameters:
+        name, equals, values = text.partition("=")
+        if not (equals and name and values):
+            raise InputError(f"'{text}' must read NAME=VALUES, as catenary.mean_stiffness=3000:5000:5.")
+        if name in found:
+            raise InputError(f"{name} is given twice; put all of its values in one list.")
+        found[name] = parse_values(name, values)
+    return found
+
+
+def parse_values(name: str, text: str) -> list[float]:
+    """Values from "start:stop:count", both ends included, or from "1,2,3". InputError if not so."""
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            first, last, steps = float(start), float(stop), int(count) - 1
+            if steps < 1:
+                raise ValueError
+            return [first + (last - first) * k / steps for k in range(steps + 1)]
+        return [float(value) for value in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"The values of {name} must be start:stop:count with a count from 2 up, or numbers with "
+            f"commas between, not '{text}'."
+        ) from error
+
+
+def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None) -> None:
+    first = rows[0]
+    at = "" if "speed_kmh" in parameters else f" at {first['speed_kmh']:g} km/h"
+    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans or 'all'}")
+    for name in (*parameters, "policy"):
+        heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
+        table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")
+    shown = [column for column in COLUMNS if any(isfinite(row[column[0]]) for row in rows)]
+    for _, heading, _ in shown:
+        table.add_column(heading, justify="right")
+    for row in rows:
+        cells = [number(scale * row[key], 2) for key, _, scale in shown]
+        policy = f"{row['policy']}, ended early" if row["terminated"] else row["policy"]
+        table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *cells)
+    console.print(table)

@@ -1,0 +1,71 @@
+"""Paper 3's Figs 4 to 13: head displacement and contact force over the 11th and 12th span."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .passes import SPANS, SPEED_KMH, Influence, Pass, Passes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TELL_APART = 0.5
+"""Contact force (N) by which the two readings must differ for both to be drawn."""
+
+
+def pictures(influences: Sequence[Influence], pulling: Passes, pushing: Passes) -> dict[str, Figure]:
+    """One figure a figure of the paper, by file name. Where contact is lost both readings are drawn.
+
+    pulling, pushing: passes with a contact that may pull, as the paper's equations have it, and with
+    one that can only push.
+    """
+    found = {}
+    for influence in influences:
+        both = pulling[influence.key], pushing[influence.key]
+        for quantity in ("displacement", "force"):
+            found[figure_name(influence, quantity)] = _draw(influence, quantity, *both)
+    return found
+
+
+def figure_name(influence: Influence, quantity: str) -> str:
+    """File name, without suffix; quantity is "displacement" or "force"."""
+    return f"fig{_number(influence, quantity):02d}-{influence.key}-{quantity}"
+
+
+def _number(influence: Influence, quantity: str) -> int:
+    return influence.first_figure + (quantity == "force")
+
+
+def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing: Sequence[Pass]) -> Figure:
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(8, 4.4), layout="constrained")
+    axis = figure.subplots()
+    scale = 1e3 if quantity == "displacement" else 1.0
+    handles = []
+    for k, (value, each, pushed) in enumerate(zip(influence.values, pulling, pushing, strict=True)):
+        axis.plot(each.position, scale * getattr(each, quantity), color=f"C{k}", linewidth=1.6)
+        label = f"${influence.symbol}$ = {value:g} {influence.unit}"
+        handles.append(Line2D([], [], color=f"C{k}", label=label))
+        if np.abs(each.force - pushed.force).max() > TELL_APART:
+            axis.plot(pushed.position, scale * getattr(pushed, quantity), ":", color=f"C{k}", linewidth=1.6)
+            label = f"{value:g} {influence.unit}, contact can only push"
+            handles.append(Line2D([], [], color=f"C{k}", linestyle=":", label=label))
+    if any(getattr(each, quantity).min() < 0 for each in pulling):
+        axis.axhline(0.0, color="0.5", linewidth=0.8)
+    span = pulling[0].span_length
+    masts = [span * k for k in range(SPANS[0] - 1, SPANS[1] + 1)]
+    axis.set(xlim=(masts[0], masts[-1]), xlabel="distance (m); grey lines: masts")
+    for mast in masts:
+        axis.axvline(mast, color="0.7", linewidth=0.8, zorder=0)
+    what = "head displacement $z_1$" if quantity == "displacement" else "contact force $F_C$"
+    axis.set(ylabel=f"{what} ({'mm' if quantity == 'displacement' else 'N'})")
+    at = "" if influence.key == "speed" else f", {SPEED_KMH:g} km/h"
+    axis.set_title(f"As Fig. {_number(influence, quantity)} of paper 3{at}", fontsize="medium")
+    axis.grid(axis="y", color="0.92")
+    figure.legend(handles=handles, fontsize="small", loc="outside lower center", ncols=len(handles))
+    return figure

@@ -1,0 +1,255 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.cli.sweep import parse_values
+from panto_env.parameters import change, parameter_names
+from panto_env.plant.actuator import Actuator
+from panto_env.sweep import sweep
+
+PANTO = Path(sys.executable).with_name("panto")
+PAPER_3 = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
+
+
+def panto(*arguments, cwd=None):
+    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+
+
+def figures(row):
+    return {key: row[key] for key in ("mean", "std", "max", "min", "contact_loss", "cost_function", "effort")}
+
+
+def expected(run, spans):
+    return figures(run.summary(spans).as_dict())
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("pantograph.masses.0", 9.5),
+        ("pantograph.stiffnesses.1", 4000.0),
+        ("pantograph.static_force", 90.0),
+        ("catenary.mean_stiffness", 5500.0),
+        ("catenary.span_length", 55.0),
+    ],
+)
+def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path):
+    """The same value written into a copy of the TOML file and simulated directly."""
+    family, key, *place = parameter.split(".")
+    name = PAPER_3[family]
+    entry = (load_catenary if family == "catenary" else load_pantograph)(name).model_dump(exclude={"sources"})
+    if place:
+        changed = list(entry[key])
+        changed[int(place[0])] = value
+        entry[key] = changed
+    else:
+        entry[key] = value
+    text = "\n".join(
+        f"{k} = {json.dumps(v if not isinstance(v, tuple) else list(v))}" for k, v in entry.items()
+    )
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    direct = simulate(**PAPER_3 | {family: str(path)}, speed_kmh=280)
+    (row,) = sweep({parameter: [value]}, **PAPER_3, speed_kmh=280, spans=(5, 8))
+    assert row[parameter] == value
+    assert figures(row) == expected(direct, (5, 8))
+    assert figures(row) != expected(simulate(**PAPER_3, speed_kmh=280), (5, 8))
+
+
+def test_nested_value_of_a_flexible_line_takes_effect():
+    line = load_catenary("en50318-2002")
+    wire = line.contact_wire.model_copy(update={"tension": 25e3})
+    direct = simulate(line.model_copy(update={"contact_wire": wire}), distance=240)
+    (row,) = sweep({"catenary.contact_wire.tension": [25e3]}, distance=240)
+    assert figures(row) == expected(direct, None)
+    assert row["max_uplift"] == direct.summary().max_uplift
+
+
+def test_speed_actuator_and_policy_parameters_take_effect():
+    rows = sweep(
+        {"speed_kmh": [200, 250], "actuator.lag": [0.0, 0.02]}, **PAPER_3, policies=["pd"], distance=300
+    )
+    assert [(row["speed_kmh"], row["actuator.lag"]) for row in rows] == [
+        (200, 0.0), (200, 0.02), (250, 0.0), (250, 0.02)
+    ]  # fmt: skip
+    for row in rows:
+        lag = Actuator(lag=row["actuator.lag"])
+        direct = simulate(**PAPER_3, speed_kmh=row["speed_kmh"], policy="pd", actuator=lag, distance=300)
+        assert figures(row) == expected(direct, None)
+    rows = sweep({"policy.gain": [0.3]}, **PAPER_3, policies=["p", "pd:damping=100"], distance=300)
+    assert [row["policy"] for row in rows] == ["p", "pd:damping=100"]
+    for row, policy in zip(rows, ("p:gain=0.3", "pd:damping=100,gain=0.3"), strict=True):
+        assert figures(row) == expected(simulate(**PAPER_3, policy=policy, distance=300), None)
+
+
+def test_outcome_does_not_depend_on_threads_and_progress_counts_every_pass():
+    told = []
+    values = {"pantograph.masses.0": [5.0, 7.5, 10.0]}
+    one = sweep(values, policies=[None, "p"], distance=180, workers=1)
+    three = sweep(
+        values, policies=[None, "p"], distance=180, workers=3, progress=lambda *done: told.append(done)
+    )
+    assert one == three
+    assert told == [(k, 6) for k in range(1, 7)]
+
+
+def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
+    for family, entry in (
+        ("catenary", load_catenary("benchmark-2015")),
+        ("pantograph", load_pantograph("three-mass")),
+        ("actuator", Actuator()),
+    ):
+        names = parameter_names(entry, family)
+        assert names
+        for name in names:
+            value = entry
+            for part in name.split(".")[1:]:
+                value = value[int(part)] if part.isdigit() else getattr(value, part)
+            if isinstance(value, int | float):
+                assert change(entry, name, value) == entry
+    assert "pantograph.contact_stiffness" in parameter_names(load_pantograph("three-mass"), "pantograph")
+    assert "actuator.rate_limit" in parameter_names(Actuator(), "actuator")
+    assert not any(
+        "holds_wire" in name for name in parameter_names(load_catenary("en50318-2002"), "catenary")
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "settings", "message"),
+    [
+        ({}, {}, "One or two parameters"),
+        ({"a.b": [1], "c.d": [1], "e.f": [1]}, {}, "One or two parameters"),
+        ({"pantograph.mases.0": [1]}, {}, r"did you mean 'pantograph.masses.0'\?"),
+        ({"pantograph.masses": [1]}, {}, "Unknown parameter 'pantograph.masses' of en50318-2002"),
+        ({"pantograph.masses.2": [1]}, {}, "Unknown parameter 'pantograph.masses.2'"),
+        ({"catenary.mean_stiffness": [1]}, {}, "Unknown parameter 'catenary.mean_stiffness'"),
+        ({"speed": [300]}, {}, r"did you mean 'speed_kmh'\?"),
+        ({"policy": [300]}, {}, "Unknown parameter 'policy'"),
+        ({"pantograph.masses.0": [7.0, -7.0]}, {}, r"pantograph.masses.0 can't be -7: .* greater than 0"),
+        ({"pantograph.masses.0": [float("nan")]}, {}, "can't be nan"),
+        ({"pantograph.masses.0": []}, {}, "no values of pantograph.masses.0"),
+        ({"catenary.spans": [12.5]}, {}, "catenary.spans can't be 12.5"),
+        ({"catenary.span_length": [20.0]}, {}, "catenary.span_length can't be 20: dropper at"),
+        ({"catenary.contact_wire.tension": [-1.0]}, {}, "catenary.contact_wire.tension can't be -1"),
+        ({"speed_kmh": [300, 600]}, {}, "At speed_kmh = 600: The speed must lie above 0"),
+        ({"speed_kmh": [300]}, {"spans": (5, 90)}, "At speed_kmh = 300: spans 5 to 90"),
+        ({"policy.gain": [1]}, {}, "The passive pantograph has no policy.gain"),
+        ({"policy.gian": [1]}, {"policies": ["p"]}, "'gian'"),
+        ({"speed_kmh": [300]}, {"policies": []}, "no policy to run"),
+        ({"speed_kmh": [300]}, {"policies": [object()]}, "by name or model file"),
+        ({"speed_kmh": [300]}, {"workers": 0}, "workers must be 1 or more"),
+    ],
+)
+def test_bad_input_is_refused_in_one_sentence(values, settings, message):
+    with pytest.raises(InputError, match=message) as caught:
+        sweep(values, **settings)
+    assert "\n" not in str(caught.value)
+
+
+def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
+    monkeypatch.setattr("panto_env.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
+    with pytest.raises(InputError, match="can't be -1"):
+        sweep({"pantograph.masses.0": [7.0, 8.0, -1.0]})
+
+
+def test_run_that_ends_early_has_no_figures():
+    """An actuator that lifts the head out of the wire's clearance."""
+    actuator = {"force_limit": 5000.0}
+    (row,) = sweep({"policy.gain": [40.0]}, policies=["p"], actuator=actuator, **PAPER_3)
+    assert row["terminated"]
+    assert row["std"] != row["std"]
+
+
+def test_values_of_a_range_include_both_ends():
+    assert parse_values("x", "3000:5000:5") == [3000, 3500, 4000, 4500, 5000]
+    assert parse_values("x", "5:1:2") == [5, 1]
+    assert parse_values("x", "0.1,2e3") == [0.1, 2000]
+    for text in ("1:2", "1:2:1", "1:2:3:4", "1:2:2.5", "1,,2", "a", ""):
+        with pytest.raises(InputError, match="values of x must be"):
+            parse_values("x", text)
+
+
+def test_command_writes_the_rows_it_prints(tmp_path):
+    arguments = (
+        "sweep", "catenary.mean_stiffness=3000:5000:3", "speed_kmh=250,300", "--bilateral",
+        "--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--spans", "11-12",
+    )  # fmt: skip
+    result = panto(*arguments, "--output", tmp_path / "s.parquet", "--plot", tmp_path / "s.png", "--json")
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    written = pyarrow.parquet.read_table(tmp_path / "s.parquet").to_pylist()
+    assert [figures(row) for row in told] == [figures(row) for row in written]
+    assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
+    direct = sweep(
+        {"catenary.mean_stiffness": [3000.0]}, **PAPER_3, speed_kmh=250, spans=(11, 12), bilateral=True
+    )
+    assert figures(told[0]) == figures(direct[0])
+    result = panto(*arguments, "--output", tmp_path / "s.csv")
+    assert result.returncode == 0, result.stderr
+    assert "three-mass on periodic-stiffness" in result.stdout
+    assert "3000" in result.stdout
+    rows = pyarrow.csv.read_csv(tmp_path / "s.csv").to_pylist()
+    assert [row["std"] for row in rows] == pytest.approx([row["std"] for row in told])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["pantograph.masses.0"], "must read NAME=VALUES"),
+        (["speed_kmh=1:2"], "start:stop:count"),
+        (["speed_kmh=200", "speed_kmh=250"], "given twice"),
+        (["speed_kmh=200", "--speed", "250"], "swept already"),
+        (["pantograph.mases.0=5"], "did you mean 'pantograph.masses.0'"),
+        (["pantograph.masses.0=5,-5"], "pantograph.masses.0 can't be -5"),
+        (["speed_kmh=250", "--plot", "s.doc"], "must end in one of"),
+        (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .parquet"),
+    ],
+)
+def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path):
+    given = {"--output": "s.csv", "--plot": "s.png"}
+    rest = [part for name, file in given.items() if name not in arguments for part in (name, file)]
+    result = panto("sweep", *arguments, *rest, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.startswith("panto: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert message in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
+    from panto_env.files import write_rows
+
+    path = tmp_path / "s.parquet"
+    path.write_text("mine")
+    monkeypatch.setattr(pyarrow.parquet, "write_table", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_rows([{"a": 1.0}], path)
+    assert path.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_plot_shows_what_varies():
+    from panto_env.figures import plot_sweep
+
+    rows = sweep(
+        {"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3, policies=[None, "p"]
+    )
+    maps = plot_sweep(rows, ["catenary.mean_stiffness", "speed_kmh"])
+    images = [axis for axis in maps.axes if axis.get_title()]
+    assert len(images) == 6  # sigma, maximum and minimum of two policies
+    passive = {row["speed_kmh"]: [] for row in rows}
+    for row in rows:
+        if row["policy"] == "passive":
+            passive[row["speed_kmh"]].append(row["std"])
+    assert images[0].collections[0].get_array().tolist() == [passive[250.0], passive[300.0]]
+    one_speed = [row for row in rows if row["speed_kmh"] == 300]
+    lines = plot_sweep(one_speed, ["catenary.mean_stiffness", "speed_kmh"])
+    assert list(lines.axes[1].lines[0].get_ydata()) == passive[300.0]
+    assert "speed_kmh = 300" in lines.get_suptitle()
