@@ -257,14 +257,14 @@ def alike(body, block, begin, last):
 
 
 @kernel
-def advance(held, samples, command, steps):
-    """Advance every lane by ``steps`` steps under constant commands (lanes, 2) of force (N).
+def advance(held, samples, command, steps, first, last):
+    """Advance lanes from ``first`` to before ``last`` by ``steps`` under commands (lanes, 2) of force (N).
 
     held: line, wire, body, drive and run.
     """
     line, wire, body, drive, run = open_held(held)
     block = new_block(line)
-    begin, last = 0, body.lift.size
+    begin = first
     while begin < last:
         count = alike(body, block, begin, last)
         load_block(body, drive, run, block, begin, count)

@@ -72,5 +72,5 @@ def kernel(function: F) -> F:
 
 def part(function: F) -> F:
     """Compile a part of kernels with Numba, inlined where it is called."""
-    compiled: F = numba.njit(**PART)(function)
+    compiled: F = numba.njit(inline="always", **OPTIONS)(function)
     return compiled

@@ -191,5 +191,5 @@ class Plant:
         """
         if self._advance is None:
             fixed = (self.line, self.wire, self.body, self.drive, self.run)
-            self._advance = bind(coupling.advance, fixed, samples, command, steps)
-        self._advance(samples, command, steps)
+            self._advance = bind(coupling.advance, fixed, samples, command, steps, 0, 1)
+        self._advance(samples, command, steps, 0, self.lanes)

@@ -188,6 +188,15 @@ def finish(episode, scores, block, begin, count):
             last_action[i] = episode.action[begin : begin + count, a][i]
 
 
+@part
+def awake(idle, begin, limit):
+    """How many lanes from ``begin`` on, which is one, do not idle, up to a limit."""
+    count = 1
+    while count < limit and not idle[begin + count]:
+        count += 1
+    return count
+
+
 @kernel
 def control_step(held, first, last):
     """One control step of the lanes from ``first`` to before ``last`` under ``episode.action``.
@@ -204,11 +213,7 @@ def control_step(held, first, last):
                 episode.action[begin, a] = 0.0
             begin += 1
             continue
-        count = 1
-        for i in range(1, alike(body, block, begin, last)):
-            if episode.idle[begin + i]:
-                break
-            count += 1
+        count = awake(episode.idle, begin, alike(body, block, begin, last))
         load_block(body, drive, run, block, begin, count)
         load_scores(episode, scores, block, begin, count)
         if keep:
@@ -238,10 +243,11 @@ def first_look(held, first, last):
     """Observations of the lanes from ``first`` to before ``last`` as they stand; held: as above."""
     line, _, body, drive, run, _, episode, _ = open_held(held)
     block, scores = new_block(line), new_scores(line)
+    one = alike(body, block, first, first + 1)  # not the literal 1, for which all would be compiled anew
     for lane in range(first, last):
-        load_block(body, drive, run, block, lane, 1)
+        load_block(body, drive, run, block, lane, one)
         for c in range(CHANNELS):
             block.sample[c, 0] = episode.latest[c, lane]
         for k in range(READINGS):
             scores.reading[k, 0] = block.sample[SENSED[k], 0]
-        observe(episode, scores, block, body.state.shape[0], lane, 1)
+        observe(episode, scores, block, body.state.shape[0], lane, one)
