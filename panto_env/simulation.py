@@ -66,4 +66,4 @@ def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | N
             )
         task.step(action[None])
         if progress is not None:
-            progress(float(task.plant.run.step[0] / episode.end[0]))
+            progress(float(task.plant.step[0] / task.end(0)))

@@ -66,7 +66,7 @@ def plant_speed(settings: dict[str, Any], repeats: int, shown: str = "") -> tupl
         task.reset(0, np.random.default_rng(0))
         start = time.perf_counter()
         task.coast()
-        travelled = float(task.episode.end[0] * task.plant.time_step)
+        travelled = float(task.end(0) * task.plant.time_step)
         return time.perf_counter() - start
 
     first = run()

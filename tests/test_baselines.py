@@ -176,7 +176,7 @@ def test_feedforward_follows_the_equation_along_the_line(
     policy = FeedbackFeedforward(gain=0, theta=theta, **parameters)
     policy.reset(task.context(0))
     for _ in range(100):
-        x = task.plant.run.step[0] * task.plant.run.stride[0]
+        x = task.plant.step[0] * task.plant.stride[0]
         action = policy.act(task.episode.observation[0])
         expected = 10 * math.sin(2 * math.pi * turns_a_metre * x - theta)
         assert 100 * action[0] == pytest.approx(expected, abs=1e-6)

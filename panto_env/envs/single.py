@@ -142,8 +142,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task, episode = task, task.episode
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
-        self._latest, self._terms = episode.latest[:, 0], episode.terms[:, 0]
-        self._reward, self._ends = episode.reward, (episode.terminated, episode.truncated)
+        self._sample, self._terms = task.plant.sample[:, 0], task.terms[:, 0]
+        self._reward, self._ends = task.reward, (episode.terminated, episode.truncated)
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
         check_names(options, "option")
@@ -163,17 +163,17 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Hold ``action`` for one control interval. Raises InputError for an action that is not valid."""
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
-        task, run = self.task, self.task.plant.run
+        task, plant = self.task, self.task.plant
         task.step(checked(action, self._shape))
         terminated, truncated = self._ends[0].item(), self._ends[1].item()
-        latest = self._latest.tolist()
+        sample = self._sample.tolist()
         info: dict[str, Any] = {
-            "contact_force": latest[coupling.CONTACT_FORCE],
-            "head": latest[coupling.HEAD_HEIGHT],
-            "wire": latest[coupling.WIRE_HEIGHT],
-            "frame_force": latest[coupling.FRAME_FORCE],
-            "head_force": latest[coupling.HEAD_FORCE],
-            "position": run.step.item() * run.stride.item(),
+            "contact_force": sample[coupling.CONTACT_FORCE],
+            "head": sample[coupling.HEAD_HEIGHT],
+            "wire": sample[coupling.WIRE_HEIGHT],
+            "frame_force": sample[coupling.FRAME_FORCE],
+            "head_force": sample[coupling.HEAD_FORCE],
+            "position": plant.step.item() * plant.stride.item(),
             "reward_terms": dict(zip(TERMS, self._terms.tolist(), strict=True)),
         }
         if terminated or truncated:

@@ -64,6 +64,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._random: list[np.random.Generator] = []
         self._ended: Lanes = np.zeros(num_envs, dtype=np.bool_)
+        self._any_ended = False
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -97,28 +98,33 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
             raise InputError("No episode has begun; call reset before step.")
         task, episode = self.task, self.task.episode
         force = checked(actions, episode.action.shape)
-        if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._any_ended:
             raise InputError(
                 f"The episode of lane {np.flatnonzero(self._ended)[0]} has ended; "
                 "call reset with options={'reset_mask': ...}."
             )
-        waiting = self._ended.copy()  # in "NextStep": lanes that begin anew instead of stepping
-        if waiting.any():
+        waiting = None  # in "NextStep": lanes that begin anew instead of stepping
+        if self._any_ended:
+            waiting = self._ended.copy()
             self._restart(waiting)
         task.step(force, skip=waiting)
-        reward = np.where(waiting, 0.0, episode.reward)
+        reward = task.reward.astype(np.float64)
+        if waiting is not None:
+            reward[waiting] = 0.0
         terminated = episode.terminated.copy()
         truncated = episode.truncated & ~terminated
         self._ended = terminated | truncated
+        self._any_ended = bool(self._ended.any())
         infos: dict[str, Any] = {
-            "contact_force": task.plant.run.force.copy(),
-            "position": task.plant.run.step * task.plant.run.stride,
-            **dict(zip(TERMS, episode.terms.copy(), strict=True)),
+            "contact_force": task.plant.force.copy(),
+            "position": task.plant.step * task.plant.stride,
+            **dict(zip(TERMS, task.terms.copy(), strict=True)),
         }
-        for lane in np.flatnonzero(self._ended).tolist():
-            infos = self._add_info(infos, {"figures": task.figures(lane).as_dict()}, lane)
+        if self._any_ended:
+            for lane in np.flatnonzero(self._ended).tolist():
+                infos = self._add_info(infos, {"figures": task.figures(lane).as_dict()}, lane)
         observation = episode.observation.copy()
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._any_ended:
             observation, infos = self._same_step(observation, infos)
         return observation, reward, terminated, truncated, infos
 
@@ -145,6 +151,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         for lane in np.flatnonzero(lanes).tolist():
             self.task.reset(lane, self._random[lane])
             self._ended[lane] = False
+        self._any_ended = bool(self._ended.any())
 
     def _masked(self, mask: Any) -> Lanes:
         if mask is None:

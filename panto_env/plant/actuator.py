@@ -37,9 +37,8 @@ ACTUATORS = {
 
 
 class Drive(NamedTuple):
-    """Actuators of all lanes; parameters and forces have a row for frame and head."""
+    """Actuators of all lanes; all have a row for frame and head."""
 
-    force: Array  # (2, lanes): the force acting now (N)
     pending: Array  # (delay, 2, lanes): commands that have not arrived, the next to arrive first (N)
     follow: Array  # (2,): share of the way to the command gone in one step
     rate: Array  # (2,): largest change of force in one step (N)
@@ -52,7 +51,6 @@ def drive(actuator: Actuator, time_step: float, lanes: int) -> Drive:
     follow = 1.0 if actuator.lag == 0 else 1.0 - np.exp(-time_step / actuator.lag)
     rate = np.inf if actuator.rate_limit is None else actuator.rate_limit * time_step
     return Drive(
-        force=np.zeros((2, lanes)),
         pending=np.zeros((steps, 2, lanes)),
         follow=np.full(2, follow),
         rate=np.full(2, rate),
@@ -61,27 +59,26 @@ def drive(actuator: Actuator, time_step: float, lanes: int) -> Drive:
 
 
 def release(drive: Drive, lane: int) -> None:
-    """Put one lane's actuators at rest, nothing pending."""
-    drive.force[:, lane] = 0.0
+    """Let nothing be pending in one lane."""
     drive.pending[:, :, lane] = 0.0
 
 
 @part
-def actuate(drive, block, begin, count):
-    """Move the actuators of a block one step towards ``block.command`` (N); forces to ``block.drive``."""
+def actuate(drive, force, command, due, begin, count):
+    """Move the forces, (2, count), of lanes from ``begin`` on a step towards their commands (N)."""
     depth = drive.pending.shape[0]
     for c in range(2):
         follow, rate, limit = drive.follow[c], drive.rate[c], drive.limit[c]
         for i in range(count):
-            block.due[i] = block.command[c, i]
+            due[i] = command[c, i]
         if depth > 0:
             pending = drive.pending[:, c, begin : begin + count]
             for i in range(count):
-                block.due[i] = pending[0, i]
+                due[i] = pending[0, i]
                 for k in range(depth - 1):
                     pending[k, i] = pending[k + 1, i]
-                pending[depth - 1, i] = block.command[c, i]
+                pending[depth - 1, i] = command[c, i]
         for i in range(count):
-            target = min(max(block.due[i], -limit), limit)
-            change = follow * (target - block.drive[c, i])
-            block.drive[c, i] += min(max(change, -rate), rate)
+            target = min(max(due[i], -limit), limit)
+            change = follow * (target - force[c, i])
+            force[c, i] += min(max(change, -rate), rate)

@@ -64,7 +64,7 @@ class HeldTupleType(types.Type):  # type: ignore[misc]
         super().__init__(f"HeldTuple({form})")
 
 
-@typeof_impl.register(Held)
+@typeof_impl.register(Held)  # type: ignore[untyped-decorator]
 def _type_of(held: Held, context: Any) -> HeldType:
     return HeldType(tuple(numba.typeof(each) for each in held.arguments))
 
@@ -75,7 +75,7 @@ class _HeldModel(models.OpaqueModel):  # type: ignore[misc]
     """An address."""
 
 
-@unbox(HeldType)
+@unbox(HeldType)  # type: ignore[untyped-decorator]
 def _unbox(_: HeldType, held: Any, c: Any) -> NativeValue:
     number = c.pyapi.object_getattr_string(held, "address")
     address = c.pyapi.long_as_longlong(number)
@@ -93,9 +93,7 @@ def _constant(builder: Any, place: Any) -> Any:
 def _open(typing: Any, held: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         table = builder.bitcast(arguments[0], cgutils.voidptr_t.as_pointer())
-        places = [
-            _constant(builder, cgutils.gep_inbounds(builder, table, k)) for k in range(len(held.forms))
-        ]
+        places = [_constant(builder, cgutils.gep_inbounds(builder, table, k)) for k in range(len(held.forms))]
         return context.make_tuple(builder, signature.return_type, places)
 
     return types.Tuple(held.forms)(held), build
@@ -113,7 +111,7 @@ class _HeldFields(AttributeTemplate):  # type: ignore[misc]
         return held.form[held.form.fields.index(name)] if name in held.form.fields else None
 
 
-@lower_getattr_generic(HeldTupleType)
+@lower_getattr_generic(HeldTupleType)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, held: HeldTupleType, value: Any, name: str) -> Any:
     form = builder.bitcast(value, context.get_value_type(held.form).as_pointer())
     return _constant(builder, cgutils.gep_inbounds(builder, form, 0, held.form.fields.index(name)))

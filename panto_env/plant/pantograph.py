@@ -20,13 +20,11 @@ MAX_STATE = 16
 
 
 class Body(NamedTuple):
-    """Pantographs of all lanes. n masses: the state is n displacements, then n velocities.
+    """What the pantographs of all lanes are made of: all the same, or each a variety of its own.
 
-    Lanes share what they are made of, or each has a variety of its own.
+    n masses: the state is n displacements, then n velocities.
     """
 
-    state: Array  # (2n, lanes): displacement (m) and velocity (m/s), head first
-    lift: Array  # (lanes,): static and aerodynamic uplift on the lowest mass (N)
     variety: Index  # (lanes,): which of the varieties a lane has
     transition: Array  # (varieties, 2n, 2n): exp(A dt)
     contact_input: Array  # (varieties, 2n): change of the state by 1 N of contact force over a step
@@ -74,8 +72,6 @@ def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Arr
 def body(size: int, lanes: int, varieties: int = 1) -> Body:
     """Room for the pantographs of ``lanes`` lanes, of ``size`` entries of state; ``equip`` fills it."""
     return Body(
-        state=np.zeros((size, lanes)),
-        lift=np.zeros(lanes),
         variety=np.zeros(lanes, dtype=np.int64),
         transition=np.zeros((varieties, size, size)),
         contact_input=np.zeros((varieties, size)),
@@ -114,14 +110,13 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
 
 
 @part
-def move_free(body, variety, size, block, count):
-    """States of a block after a step without contact force, into ``block.free``."""
-    state, free = block.state, block.free
+def move_free(body, variety, state, free, lift, drive, count):
+    """States, (2n, count), after a step without contact force, into ``free``; drive: forces (N)."""
+    size = body.transition.shape[1]
     for r in range(size):
         frame_input, head_input = body.frame_input[variety, r], body.head_input[variety, r]
         for i in range(count):
-            lift = block.lift[i] + block.drive[FRAME, i]
-            free[r, i] = frame_input * lift + head_input * block.drive[HEAD, i]
+            free[r, i] = frame_input * (lift[i] + drive[FRAME, i]) + head_input * drive[HEAD, i]
         for j in range(0, size, 2):  # in pairs: there are as many velocities as displacements
             a, b = body.transition[variety, r, j], body.transition[variety, r, j + 1]
             for i in range(count):
@@ -129,9 +124,9 @@ def move_free(body, variety, size, block, count):
 
 
 @part
-def press(body, variety, size, block, count):
-    """End the step of a block: the free motion and what the contact force adds to it."""
-    for r in range(size):
+def press(body, variety, state, free, force, count):
+    """End the step: the free motion and what the contact force (N) adds to it."""
+    for r in range(body.transition.shape[1]):
         contact_input = body.contact_input[variety, r]
         for i in range(count):
-            block.state[r, i] = block.free[r, i] + contact_input * block.force[i]
+            state[r, i] = free[r, i] + contact_input * force[i]

@@ -17,6 +17,7 @@ from .coupling import CHANNELS, Run, Samples
 from .held import bind
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
+from .stack import WIDTH
 
 
 class Plant:
@@ -50,7 +51,8 @@ class Plant:
         self.time_step = numerics.time_step or self.model.TIME_STEP
         self.line = self.model.build(catenary, self.spans, numerics)
         self.wire = self.model.at_rest(self.line, lanes)
-        self.body = pantograph.body(2 * len(pantograph_data.masses), lanes, lanes if varied else 1)
+        size = 2 * len(pantograph_data.masses)
+        self.body = pantograph.body(size, lanes, lanes if varied else 1)
         if varied:
             self.body.variety[:] = np.arange(lanes)
         self._massless = isinstance(catenary, PeriodicStiffnessData)
@@ -65,15 +67,18 @@ class Plant:
             self._make_defective()
         self._advance: Callable[..., Any] | None = None
 
+        table = coupling.lane_table(coupling.STATE + size, lanes)
         self.run = Run(
-            step=np.zeros(lanes, dtype=np.int64),
-            stride=np.zeros(lanes),
-            force=np.zeros(lanes),
-            gap=np.zeros(lanes),
-            stiffness=np.zeros(lanes),
+            lanes=table,
             waves=np.zeros((self.condition.waves, 3, lanes)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
+
+        table = table[:, :lanes]
+        self.step, self.stride = table[coupling.STEP], table[coupling.STRIDE]
+        self.force, self.lift = table[coupling.FORCE], table[coupling.LIFT]
+        self.sample = table[:CHANNELS]  # of the last step
+        self.abreast = WIDTH.get(type(self.line), 1)  # lanes that go side by side
 
     def _equip(self, variety: int, data: PantographData) -> None:
         pantograph.equip(self.body, variety, data, self._massless, self.time_step)
@@ -97,7 +102,7 @@ class Plant:
     @property
     def lanes(self) -> int:
         """Number of lanes."""
-        return len(self.body.lift)
+        return len(self.body.variety)
 
     @property
     def line_end(self) -> float:
@@ -149,26 +154,21 @@ class Plant:
         strip = float(self.body.strip[variety, 0])
         compliance = strip + wire + spring
         lift = data.nominal_force(speed)
-        self.body.lift[lane] = lift
-        self.body.state[:, lane] = pantograph.rest(data, lift, height, compliance)
-        force = (self.body.state[0, lane] - height) / compliance
+        state = pantograph.rest(data, lift, height, compliance)
+        force = float(state[0] - height) / compliance
         self.model.settle(self.line, self.wire, lane, force)
         actuators.release(self.drive, lane)
-        run.step[lane] = 0
-        run.stride[lane] = speed * self.time_step
-        run.force[lane] = force
-        run.gap[lane] = force * (strip + spring)
-        run.stiffness[lane] = 1 / (strip + spring)
-
-    def first_sample(self, lane: int) -> Array:
-        """What a lane's sample would be at the start, (CHANNELS,)."""
-        state, half = self.body.state[:, lane], len(self.pantograph.masses)
-        sample = np.zeros(CHANNELS)
-        force = sample[coupling.CONTACT_FORCE] = self.run.force[lane]
-        sample[coupling.HEAD_HEIGHT] = state[0]
-        sample[coupling.FRAME_HEIGHT] = state[half - 1]
-        sample[coupling.WIRE_HEIGHT] = state[0] - force * self.body.strip[self.body.variety[lane], 0]
-        return sample
+        column = run.lanes[:, lane]
+        column[:] = 0.0
+        column[coupling.STRIDE] = speed * self.time_step
+        column[coupling.LIFT] = lift
+        column[[coupling.FORCE, coupling.CONTACT_FORCE]] = force
+        column[coupling.GAP] = force * (strip + spring)
+        column[coupling.STIFFNESS] = 1 / (strip + spring)
+        column[coupling.STATE :] = state
+        column[coupling.HEAD_HEIGHT] = state[0]
+        column[coupling.FRAME_HEIGHT] = state[len(state) // 2 - 1]
+        column[coupling.WIRE_HEIGHT] = state[0] - force * strip
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays of ``rows`` rows for ``advance`` to record in: one more than steps are to be kept."""

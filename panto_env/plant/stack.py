@@ -15,12 +15,15 @@ from numba.core import cgutils
 from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
+WIDTH: dict[type, int] = {}
+"""Lanes that go abreast by type of line, 1 unless named: many where the wire has no state of its own, so
+that they share vector instructions; one where a lane's wire fills the nearest cache."""
 
-def _stack(typing: Any, rows: Any, columns: Any) -> Any:
-    """Array of float64, (rows, columns), of arbitrary content; both numbers are constants."""
-    if not (isinstance(rows, types.IntegerLiteral) and isinstance(columns, types.IntegerLiteral)):
+
+def _stack(typing: Any, line: Any, rows: Any) -> Any:
+    if not isinstance(rows, types.IntegerLiteral):
         return None
-    shape = (rows.literal_value, columns.literal_value)
+    shape = (rows.literal_value, WIDTH.get(line.instance_class, 1))
     item = np.dtype(np.float64).itemsize
     array_type = types.Array(types.float64, 2, "C")
 
@@ -38,7 +41,8 @@ def _stack(typing: Any, rows: Any, columns: Any) -> Any:
         )
         return array._getvalue()
 
-    return array_type(rows, columns), build
+    return array_type(line, rows), build
 
 
 stack: Any = intrinsic(_stack)
+"""``stack(line, rows)``: float64 of arbitrary content, (rows, lanes abreast); rows is a constant."""

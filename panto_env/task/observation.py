@@ -13,23 +13,13 @@ from ..catalog.schema import PantographData
 from ..plant import coupling
 from ..plant.actuator import Actuator
 from ..plant.cosine import cosine_of_turns, sine_of_turns
-from ..plant.coupling import fetch
 from ..plant.jit import part
 from ..plant.sensor import Sensors
+from .scores import ENTRY, READING, READINGS
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
 OBSERVATIONS = ("measured", "full")
-# Channels of a sample that the sensors read, in the order of the entries; they carry noise.
-SENSED = (
-    coupling.HEAD_HEIGHT,
-    coupling.FRAME_HEIGHT,
-    coupling.HEAD_VELOCITY,
-    coupling.FRAME_VELOCITY,
-    coupling.CONTACT_FORCE,
-)
-READINGS = len(SENSED)
-MAX_ENTRIES = 32  # of an observation: eight masses give 25
 
 
 class Entry(NamedTuple):
@@ -100,41 +90,44 @@ def noise_scale(sensors: Sensors) -> Array:
 
 
 @part
-def observe(episode, scores, block, size, begin, count):
+def observe(episode, size, block, scores, begin, count):
     """Observation of a block into ``episode.observation`` as float32.
 
-    size: of the pantograph's state. ``scores.reading`` holds what the sensors read, ``block`` the rest.
+    size: of the pantograph's state.
     """
-    entries, scale, reading = scores.entries, episode.scale, scores.reading
+    entries, per_unit = scores[ENTRY:], episode.per_unit
     for k in range(READINGS):
-        noise = episode.noise[k, begin : begin + count]
+        if episode.noisy:
+            noise = episode.noise[k, begin : begin + count]
+            for i in range(count):
+                scores[READING + k, i] += noise[i]
+        factor = per_unit[k]
         for i in range(count):
-            entries[k, i] = (reading[k, i] + noise[i]) / scale[k]
+            entries[k, i] = scores[READING + k, i] * factor
+    spans, speed = 1.0 / episode.span, per_unit[7] / episode.time_step
     for i in range(count):
-        turns = block.stride[i] * block.step[i] / episode.span
+        turns = block[coupling.STRIDE, i] * block[coupling.STEP, i] * spans
         entries[5, i] = sine_of_turns(turns)
         entries[6, i] = cosine_of_turns(turns)
-        entries[7, i] = block.stride[i] / episode.time_step / scale[7]
+        entries[7, i] = block[coupling.STRIDE, i] * speed
     k = 8
     for a in range(episode.channels.size):
-        fetch(episode.action[:, a], entries[k], begin, count)
+        action = episode.action[begin : begin + count, a]
+        for i in range(count):
+            entries[k, i] = action[i]
         k += 1
     if episode.full:
-        half = size // 2
         for i in range(count):
-            entries[k, i] = block.sample[coupling.WIRE_HEIGHT, i] / scale[k]
-            entries[k + 1, i] = block.sample[coupling.FRAME_FORCE, i] / scale[k + 1]
-            entries[k + 2, i] = block.sample[coupling.HEAD_FORCE, i] / scale[k + 2]
+            entries[k, i] = block[coupling.WIRE_HEIGHT, i] * per_unit[k]
+            entries[k + 1, i] = block[coupling.FRAME_FORCE, i] * per_unit[k + 1]
+            entries[k + 2, i] = block[coupling.HEAD_FORCE, i] * per_unit[k + 2]
         k += 3
-        for m in range(1, half - 1):
+        for m in range(coupling.STATE + 1, coupling.STATE + size // 2 - 1):
             for i in range(count):
-                entries[k, i] = block.state[m, i] / scale[k]
-                entries[k + 1, i] = block.state[half + m, i] / scale[k + 1]
+                entries[k, i] = block[m, i] * per_unit[k]
+                entries[k + 1, i] = block[m + size // 2, i] * per_unit[k + 1]
             k += 2
     for r in range(k):
+        seen = episode.observation[begin : begin + count, r]
         for i in range(count):
-            entries[r, i] = min(max(entries[r, i], -BOUND), BOUND)
-    for i in range(count):
-        seen = episode.observation[begin + i]
-        for r in range(k):
-            seen[r] = entries[r, i]
+            seen[i] = min(max(entries[r, i], -BOUND), BOUND)

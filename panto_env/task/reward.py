@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
+from ..plant.coupling import FORCE, STEP, STRIDE
 from ..plant.jit import part
 from ..settings import NonNegative, Settings
+from .scores import BEFORE, COST, DISTANCE, GONE, LOST, NOMINAL, REWARD, TERM
 
 # Columns of the terms, each summed over one control step and not weighted.
 COST_FUNCTION, CONTACT_LOSS, EFFORT, RATE = 0, 1, 2, 3
@@ -25,21 +27,21 @@ class Reward(Settings):
 
 
 @part
-def judge_sample(scores, block, count):
+def judge_sample(block, scores, count):
     """Add the step that a block has just made to the cost and the loss of its control step."""
     for i in range(count):
-        force, nominal = block.force[i], scores.nominal[i]
+        force, nominal = block[FORCE, i], scores[NOMINAL, i]
         # An interval lies between two samples: before the first one there is none.
-        between = 1.0 if block.step[i] > 1.5 else 0.0
-        scores.cost[i] += between * (abs(scores.before[i] - nominal) + abs(force - nominal))
+        between = 1.0 if block[STEP, i] > 1.5 else 0.0
+        scores[COST, i] += between * (abs(scores[BEFORE, i] - nominal) + abs(force - nominal))
         lost = 1.0 if force <= 0.0 else 0.0
-        scores.gone[i] += lost
-        scores.lost[i] = lost * (scores.lost[i] + 1.0)
-        scores.before[i] = force
+        scores[GONE, i] += lost
+        scores[LOST, i] = lost * (scores[LOST, i] + 1.0)
+        scores[BEFORE, i] = force
 
 
 @part
-def judge(episode, scores, block, begin, count):
+def judge(episode, block, scores, begin, count):
     """Terms and reward of the control step that a block has just made.
 
     The terms "cost_function" (N m) and "contact_loss" (%) sum over an episode to the CF and CL of its
@@ -47,26 +49,25 @@ def judge(episode, scores, block, begin, count):
     """
     steps, weights = episode.control_steps, episode.weights
     for i in range(count):
-        scores.effort[i] = 0.0
-        scores.rate[i] = 0.0
+        scores[TERM + EFFORT, i] = 0.0
+        scores[TERM + RATE, i] = 0.0
     for a in range(episode.channels.size):
         action = episode.action[begin : begin + count, a]
         last_action = episode.last_action[begin : begin + count, a]
         for i in range(count):
-            scores.effort[i] += action[i] * action[i]
             change = 0.5 * (action[i] - last_action[i])
-            scores.rate[i] += change * change
+            scores[TERM + EFFORT, i] += action[i] * action[i]
+            scores[TERM + RATE, i] += change * change
+            last_action[i] = action[i]
     for i in range(count):
-        cost, gone = 0.5 * scores.cost[i], scores.gone[i]
-        scores.terms[COST_FUNCTION, i] = block.stride[i] * cost
-        scores.terms[CONTACT_LOSS, i] = 100.0 * gone * block.stride[i] / scores.distance[i]
-        scores.terms[EFFORT, i] = scores.effort[i]
-        scores.terms[RATE, i] = scores.rate[i]
-        scores.reward[i] = -(
-            weights[COST_FUNCTION] * cost / (scores.nominal[i] * steps)
+        cost, gone = 0.5 * scores[COST, i], scores[GONE, i]
+        scores[TERM + COST_FUNCTION, i] = block[STRIDE, i] * cost
+        scores[TERM + CONTACT_LOSS, i] = 100.0 * gone * block[STRIDE, i] / scores[DISTANCE, i]
+        scores[REWARD, i] = -(
+            weights[COST_FUNCTION] * cost / (scores[NOMINAL, i] * steps)
             + weights[CONTACT_LOSS] * gone / steps
-            + weights[EFFORT] * scores.effort[i]
-            + weights[RATE] * scores.rate[i]
+            + weights[EFFORT] * scores[TERM + EFFORT, i]
+            + weights[RATE] * scores[TERM + RATE, i]
         )
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,6 @@ import numpy as np
 from ..arrays import Array
 from ..catalog import load_catenary, load_pantograph
 from ..errors import InputError
-from ..machine import cores
 from ..metrics import Figures
 from ..plant import coupling
 from ..plant.actuator import ACTUATORS, Actuator
@@ -25,9 +22,11 @@ from ..settings import parse
 from ..trajectory import Trajectory
 from . import observation as obs
 from . import tally
-from .episode import Episode, Flags, control_step, first_look
+from .crew import crew
+from .episode import SENSED, Episode, Flags, control_step, first_look
 from .policy import Context
-from .reward import TERMS, Reward, weights
+from .reward import Reward, weights
+from .scores import DISTANCE, END, KEPT, NOMINAL, READINGS, REWARD, TERM
 
 CONTROL_INTERVAL = 0.01
 """Time between actions (s): published active pantographs are controlled at 50-100 Hz."""
@@ -37,8 +36,6 @@ LOST_FOR = 0.5
 """Time without contact (s) after which an episode ends."""
 DEFAULT_LINE = "en50318-2002"
 DEFAULT_SPEED_KMH = 300.0
-LANES_A_THREAD = 8
-"""Fewer lanes than this are not worth a thread of their own."""
 
 
 class Task:
@@ -118,7 +115,7 @@ class Task:
         self.layout = obs.layout(observation, self.actuator, panto)
         self.speed = np.zeros(lanes)  # m/s
         self.episode = self._episode(weights(reward_settings))
-        self._noisy = self.sensors.noisy
+        self.reward, self.terms = self.episode.lanes[REWARD, :lanes], self.episode.lanes[TERM:KEPT, :lanes]
         self._noise_scale = obs.noise_scale(self.sensors)
         self._random: list[np.random.Generator] = [np.random.default_rng(0)] * lanes
         self._record_droppers = record_droppers
@@ -128,7 +125,7 @@ class Task:
         self.samples = self.plant.samples(rows, tension=record_droppers)
         tallied = 0 if keep_samples else lanes
         self.tally = tally.tally(tallied, len(self.plant.supports), self.plant.time_step)
-        self._threads = _threads(lanes)
+        self._crew = crew(lanes, self.plant.abreast)
         self._bind()
 
     def _episode(self, reward_weights: Array) -> Episode:
@@ -140,21 +137,16 @@ class Task:
             last_action=np.zeros((lanes, actions)),
             channels=np.array(self.actuator.channels, dtype=np.int64),
             force_limit=self.actuator.force_limit,
-            nominal=np.zeros(lanes),
-            end=np.zeros(lanes, dtype=np.int64),
-            distance=np.zeros(lanes),
+            lanes=coupling.lane_table(KEPT, lanes),
             weights=reward_weights,
-            lost=np.zeros(lanes),
-            terms=np.zeros((len(TERMS), lanes)),
-            reward=np.zeros(lanes),
             idle=np.zeros(lanes, dtype=np.bool_),
             terminated=np.zeros(lanes, dtype=np.bool_),
             truncated=np.zeros(lanes, dtype=np.bool_),
-            latest=np.zeros((coupling.CHANNELS, lanes)),
-            past=np.zeros((late, obs.READINGS, lanes)),
+            past=np.zeros((late, READINGS, lanes)),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
-            noise=np.zeros((obs.READINGS, lanes)),
-            scale=self.layout.scale,
+            noisy=self.sensors.noisy,
+            noise=coupling.lane_table(READINGS, lanes),
+            per_unit=1 / self.layout.scale,
             read_at=self.control_steps - early,
             span=float(self.plant.catenary.span_length),
             time_step=time_step,
@@ -201,24 +193,28 @@ class Task:
         plant, episode = self.plant, self.episode
         plant.start(lane, speed, draw(self.condition, random, len(plant.droppers)))
         self.speed[lane] = speed
-        episode.nominal[lane] = plant.body.lift[lane]
-        episode.end[lane] = self._steps(speed)
-        episode.distance[lane] = episode.end[lane] * plant.run.stride[lane]
-        for array in (episode.action, episode.last_action, episode.lost, episode.reward):
-            array[lane] = 0
-        episode.terms[:, lane] = 0
+        end = self._steps(speed)
+        column = episode.lanes[:, lane]
+        column[:] = 0.0
+        column[NOMINAL] = plant.lift[lane]
+        column[END] = end
+        column[DISTANCE] = end * plant.stride[lane]
+        episode.action[lane] = episode.last_action[lane] = 0.0
         episode.terminated[lane] = episode.truncated[lane] = False
         plant.clear(self.samples, lane)
-        sample = episode.latest[:, lane] = plant.first_sample(lane)
-        episode.past[:, :, lane] = sample[list(obs.SENSED)]
+        sample = plant.sample[:, lane]
+        episode.past[:, :, lane] = sample[list(SENSED)]
         if self.keep_samples:
             self.samples.channels[lane, 0] = sample
         else:
             tally.clear(self.tally, lane)
         self._random[lane] = random
-        episode.idle[lane] = False
         self._draw_noise(lane, lane + 1)
         self._first_look(lane, lane + 1)
+
+    def end(self, lane: int) -> int:
+        """Plant steps that a lane's episode has."""
+        return int(self.episode.lanes[END, lane])
 
     def context(self, lane: int) -> Context:
         """What a policy may know of a lane's episode."""
@@ -230,7 +226,7 @@ class Task:
             control_interval=self.control_interval,
             speed=float(self.speed[lane]),
             span_length=self.plant.catenary.span_length,
-            nominal_force=float(self.episode.nominal[lane]),
+            nominal_force=float(self.plant.lift[lane]),
             catenary=self.plant.catenary,
             pantograph=self.plant.pantograph,
         )
@@ -239,30 +235,28 @@ class Task:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
         Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
-        Results are in ``episode``: observation, reward, terms, terminated, truncated.
+        Results are in ``episode`` (observation, terminated, truncated), ``reward`` and ``terms``.
         """
         if skip is not None:
             self.episode.idle[:] = skip
         self.episode.action[:] = action
-        if self._noisy:
+        if self.episode.noisy:
             self._draw_noise(0, self.lanes)
-        if self._threads is None:
+        if self._crew is None:
             self._control_step(0, self.lanes)
-            return
-        pool, bounds = self._threads
-        jobs = [pool.submit(self._control_step, first, last) for first, last in pairwise(bounds[1:])]
-        self._control_step(bounds[0], bounds[1])
-        for job in jobs:
-            job.result()
+        else:
+            self._crew.run(self._control_step)
+        if skip is not None:
+            self.episode.idle[:] = False
 
     def coast(self) -> None:
         """Run all lanes, reset to one speed, to the end without actuators, in one kernel call."""
-        self.plant.advance(np.zeros((self.lanes, 2)), int(self.episode.end[0]), self.samples)
+        self.plant.advance(np.zeros((self.lanes, 2)), self.end(0), self.samples)
 
     def _draw_noise(self, first: int, last: int) -> None:
         for lane in range(first, last):
-            if self._noisy and not self.episode.idle[lane]:
-                drawn = self._random[lane].standard_normal(obs.READINGS)
+            if self.episode.noisy and not self.episode.idle[lane]:
+                drawn = self._random[lane].standard_normal(READINGS)
                 self.episode.noise[:, lane] = self._noise_scale * drawn
 
     def figures(self, lane: int) -> Figures:
@@ -272,15 +266,15 @@ class Task:
         return tally.figures(
             self.tally,
             lane,
-            float(self.episode.nominal[lane]),
-            float(self.plant.run.stride[lane]),
+            float(self.plant.lift[lane]),
+            float(self.plant.stride[lane]),
             self.plant.time_step,
             self.plant.supports,
         )
 
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
         """Record of a lane's run so far."""
-        plant, steps = self.plant, int(self.plant.run.step[lane])
+        plant, steps = self.plant, int(self.plant.step[lane])
         rows = self.samples.channels[lane, 1 : steps + 1]
         middle = (np.arange(steps) + 0.5) * plant.time_step
         return Trajectory(
@@ -303,7 +297,7 @@ class Task:
             speed_kmh=3.6 * float(self.speed[lane]),
             span_length=plant.catenary.span_length,
             time_step=plant.time_step,
-            nominal_force=float(self.episode.nominal[lane]),
+            nominal_force=float(self.plant.lift[lane]),
             policy=policy,
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
@@ -318,12 +312,3 @@ def _whole_steps(control_interval: float, time_step: float) -> int:
             f"not {1e3 * control_interval:g} ms."
         )
     return steps
-
-
-def _threads(lanes: int) -> tuple[ThreadPoolExecutor, list[int]] | None:
-    """Threads that share the lanes, one beside the caller's for each further core, and the bounds."""
-    count = min(cores(), lanes // LANES_A_THREAD)
-    if count < 2:
-        return None
-    bounds = [lanes * k // count for k in range(count + 1)]
-    return ThreadPoolExecutor(count - 1, thread_name_prefix="panto"), bounds

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import LINE, Array, aligned_zeros
 from ...catalog.schema import FlexibleCatenaryData, Wire
 from ...errors import InputError
 from ..interpolation import stencil
@@ -197,27 +197,16 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
     """Wires of all lanes in their static shape."""
     nodes, count, real = line.mobility.shape[1], len(line.dropper_node), line.stencil.dtype
     return FlexibleWire(
-        displacement=_staggered((lanes, 2, nodes), real, 0),
-        increment=_staggered((lanes, 2, nodes), real, 1),
-        blend=_staggered((lanes, nodes), real, 2),
+        # The sweep reads and writes these side by side. Were they at the same place of a page, a processor
+        # would take a read of one for a read of what it has just written to another, and wait.
+        displacement=aligned_zeros((lanes, 2, nodes), real),
+        increment=aligned_zeros((lanes, 2, nodes), real, place=21 * LINE),
+        blend=aligned_zeros((lanes, nodes), real, place=42 * LINE),
         shifted=np.zeros(lanes, dtype=np.int64),
         support_past=np.zeros((lanes, len(line.support_node), 2)),
         extension=np.zeros((lanes, 2, count), dtype=real),
         change=np.zeros((lanes, count), dtype=real),
     )
-
-
-def _staggered(shape: tuple[int, ...], real: np.dtype[Any], place: int) -> Array:
-    """Zeros that begin ``place`` thirds of 4 KiB into a page.
-
-    The sweep reads and writes three arrays side by side. Were they at the same place of a page, a processor
-    would take a read of one for a read of what it has just written to another, and wait.
-    """
-    page = 4096
-    spare = np.zeros(int(np.prod(shape)) + 2 * page // real.itemsize, dtype=real)
-    wanted = place * page // 3 // 64 * 64
-    first = (wanted - spare.ctypes.data) % page // real.itemsize
-    return np.asarray(spare[first : first + int(np.prod(shape))].reshape(shape))
 
 
 def start_point(line: FlexibleLine) -> tuple[float, float, float]:

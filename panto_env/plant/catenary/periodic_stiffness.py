@@ -14,6 +14,7 @@ from .. import coupling
 from ..cosine import cosine_of_turns
 from ..jit import PART, part
 from ..numerics import Numerics
+from ..stack import WIDTH
 
 TIME_STEP = 5e-3
 """Unless told otherwise (s): forces within 0.2 % of the peak (tests/test_periodic_stiffness.py)."""
@@ -27,7 +28,7 @@ class PeriodicLine(NamedTuple):
     spans: float  # 1 / L, spans a metre (1/m)
 
 
-coupling.WIDTH[PeriodicLine] = 64
+WIDTH[PeriodicLine] = 64
 
 
 class PeriodicWire(NamedTuple):
