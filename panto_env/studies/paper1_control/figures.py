@@ -1,0 +1,115 @@
+"""Figs 13 to 18. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ...figures import mark_supports
+from .angles import sweep
+from .cases import (
+    DEFAULT_GAIN,
+    GAIN,
+    KMH,
+    REAL,
+    SHOWN_SPEEDS,
+    SPAN,
+    SPANS,
+    SPEEDS,
+    SWEEP_SPEEDS,
+    THETA,
+    THETAS,
+    Case,
+    control,
+)
+from .passes import Result, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Results = Mapping[Case, Result]
+SHOWN_SPANS = (9, 12)
+"""Spans of Figs 14 to 16."""
+# The paper's colours: without control red, with control blue, control force green.
+WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
+
+
+def figures(results: Results) -> dict[str, Figure]:
+    """All of them, by file name."""
+    shown = {f"fig{14 + k}-{speed}kmh": passage(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
+    return {
+        "fig13-phase-angle": phase_angle(results),
+        **shown,
+        "fig17-contact-loss": over_speed(results, "contact_loss", "contact loss ratio CL (%)"),
+        "fig18-cost-function": over_speed(results, "cost_function", "cost function CF (N m)"),
+    }
+
+
+def phase_angle(results: Results) -> Figure:
+    """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4.8), layout="constrained")
+    for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
+        for k, speed in enumerate(SWEEP_SPEEDS):
+            found = sweep(results, speed, GAIN, reading)
+            colour = f"C{k}"
+            axis.plot(
+                [math.degrees(theta) for theta in THETAS], found.cost, color=colour, label=f"{speed} km/h"
+            )
+            axis.plot(math.degrees(found.best), found.least, "o", color=colour)
+        axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
+        axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
+    figure.axes[0].set(ylabel="cost function CF over 750 m (N m)", ylim=(0, None))
+    figure.axes[1].legend(loc="lower right", ncols=2, fontsize="small")
+    figure.suptitle(f"Fig. 13: cost function for phase angle (dots: least), gain {GAIN}")
+    return figure
+
+
+def passage(speed: int) -> Figure:
+    """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
+    from matplotlib.figure import Figure
+
+    passive, active = make(Case(speed)), make(Case(speed, control()))
+    figure = Figure(figsize=(10, 5.6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
+    upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
+    upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
+    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 160))
+    lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
+    lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
+    for axis in (upper, lower):
+        mark_supports(axis, active)
+        axis.legend(loc="upper right", ncols=3, fontsize="small")
+    lower.set_xlim((SHOWN_SPANS[0] - 1) * active.span_length, SHOWN_SPANS[1] * active.span_length)
+    figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: simulation at {speed} km/h, gain {GAIN}")
+    return figure
+
+
+def over_speed(results: Results, name: str, label: str) -> Figure:
+    """Figs 17 and 18: a figure of merit over speed."""
+    from matplotlib.figure import Figure
+
+    curves = {
+        "without control": ([Case(speed) for speed in SPEEDS], WITHOUT, "o-"),
+        f"with control, gain {GAIN}": ([Case(speed, control()) for speed in SPEEDS], WITH, "s-"),
+        "with control, gain 1": ([Case(speed, control(DEFAULT_GAIN)) for speed in SPEEDS], "tab:cyan", "^--"),
+        f"with control, gain {GAIN}, realistic actuator": (
+            [Case(speed, control(), **REAL) for speed in SPEEDS],  # type: ignore[arg-type]
+            "0.5",
+            "x:",
+        ),
+    }
+    figure = Figure(figsize=(8, 4.8), layout="constrained")
+    axis = figure.subplots()
+    for told, (cases, colour, style) in curves.items():
+        values = [getattr(results[case].figures, name) for case in cases]
+        axis.plot(SPEEDS, values, style, color=colour, label=told)
+    number, what = {"contact_loss": (17, "contact loss ratio"), "cost_function": (18, "cost function")}[name]
+    axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if number == 18 else None, None))
+    axis.set_title(f"Fig. {number}: {what}, spans {SPANS[0]} to {SPANS[1]} (750 m)")
+    axis.legend(fontsize="small")
+    axis.grid(color="0.9")
+    return figure

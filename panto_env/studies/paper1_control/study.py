@@ -1,0 +1,43 @@
+"""Paper 1's active control: its claims tested on a stand-in for its line."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from ..study import Outcome, Report
+from .cases import SHOWN_SPEEDS, Case, all_cases, control
+from .comparisons import comparisons
+from .figures import figures
+from .passes import Result, run_all
+from .tables import tables
+
+
+def run(report: Report) -> Outcome:
+    """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
+    results = run_all(all_cases(), lambda share: report("passes along the line", 0.9 * share))
+    report("passes pressed to the same mean force", 0.9)
+    means = {speed: results[Case(speed, control())].figures.mean for speed in SHOWN_SPEEDS}
+    pressed = run_all(
+        [Case(speed, mean=mean) for speed, mean in means.items()],
+        lambda share: report("passes pressed to the same mean force", 0.9 + 0.05 * share),
+    )
+    report("figures", 0.95)
+    return Outcome(
+        title="Paper 1, active control (section 5, Figs 13 to 18)",
+        comparisons=comparisons(results),
+        tables=tables(results, {case.speed_kmh: result for case, result in pressed.items()}),
+        figures=figures(results),
+        numbers={"passes": [_plain(result) for result in (*results.values(), *pressed.values())]},
+    )
+
+
+def _plain(result: Result) -> dict[str, Any]:
+    """One pass for the JSON."""
+    return {
+        **dataclasses.asdict(result.case),
+        **result.figures.as_dict(),
+        "raw_std": result.raw_std,
+        "longest_loss": result.longest_loss,
+        "components": [abs(part) for part in result.components],
+    }
