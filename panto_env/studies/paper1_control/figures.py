@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 from ...figures import mark_supports
 from .angles import sweep
 from .cases import (
+    DAMPING,
     DEFAULT_GAIN,
     GAIN,
+    GENTLE_GAIN,
     KMH,
-    REAL,
+    SHIPPED,
     SHOWN_SPEEDS,
     SPAN,
     SPANS,
@@ -22,6 +24,7 @@ from .cases import (
     THETAS,
     Case,
     control,
+    sampled,
 )
 from .passes import Result, make
 
@@ -29,8 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Results = Mapping[Case, Result]
-SHOWN_SPANS = (9, 12)
+SHOWN_SPANS = (10, 12)
 """Spans of Figs 14 to 16."""
+COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
 # The paper's colours: without control red, with control blue, control force green.
 WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
 
@@ -50,7 +54,7 @@ def phase_angle(results: Results) -> Figure:
     """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 4.8), layout="constrained")
+    figure = Figure(figsize=(10, 5.2), layout="constrained")
     for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
         for k, speed in enumerate(SWEEP_SPEEDS):
             found = sweep(results, speed, GAIN, reading)
@@ -61,8 +65,9 @@ def phase_angle(results: Results) -> Figure:
             axis.plot(math.degrees(found.best), found.least, "o", color=colour)
         axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
-    figure.axes[0].set(ylabel="cost function CF over 750 m (N m)", ylim=(0, None))
-    figure.axes[1].legend(loc="lower right", ncols=2, fontsize="small")
+    figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=8, fontsize="small")
     figure.suptitle(f"Fig. 13: cost function for phase angle (dots: least), gain {GAIN}")
     return figure
 
@@ -72,12 +77,12 @@ def passage(speed: int) -> Figure:
     from matplotlib.figure import Figure
 
     passive, active = make(Case(speed)), make(Case(speed, control()))
-    figure = Figure(figsize=(10, 5.6), layout="constrained")
+    figure = Figure(figsize=(8, 5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
     upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
     upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
-    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 160))
+    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 140))
     lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
     lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
     for axis in (upper, lower):
@@ -92,16 +97,18 @@ def over_speed(results: Results, name: str, label: str) -> Figure:
     """Figs 17 and 18: a figure of merit over speed."""
     from matplotlib.figure import Figure
 
+    gentle, damped = control(GENTLE_GAIN), DAMPING[SHIPPED]
     curves = {
-        "without control": ([Case(speed) for speed in SPEEDS], WITHOUT, "o-"),
-        f"with control, gain {GAIN}": ([Case(speed, control()) for speed in SPEEDS], WITH, "s-"),
-        "with control, gain 1": ([Case(speed, control(DEFAULT_GAIN)) for speed in SPEEDS], "tab:cyan", "^--"),
-        f"with control, gain {GAIN}, realistic actuator": (
-            [Case(speed, control(), **REAL) for speed in SPEEDS],  # type: ignore[arg-type]
-            "0.5",
-            "x:",
+        "without control": ([Case(v) for v in SPEEDS], WITHOUT, "o-"),
+        f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
+        "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], "tab:cyan", "^--"),
+        f"with control, gain {GENTLE_GAIN}, realistic actuator": (
+            [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x:"
         ),
-    }
+        "feedback and frame damping (pd), realistic actuator": (
+            [sampled(v, damped, "realistic") for v in SPEEDS], "tab:olive", "d:"
+        ),
+    }  # fmt: skip
     figure = Figure(figsize=(8, 4.8), layout="constrained")
     axis = figure.subplots()
     for told, (cases, colour, style) in curves.items():
@@ -109,7 +116,7 @@ def over_speed(results: Results, name: str, label: str) -> Figure:
         axis.plot(SPEEDS, values, style, color=colour, label=told)
     number, what = {"contact_loss": (17, "contact loss ratio"), "cost_function": (18, "cost function")}[name]
     axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if number == 18 else None, None))
-    axis.set_title(f"Fig. {number}: {what}, spans {SPANS[0]} to {SPANS[1]} (750 m)")
+    axis.set_title(f"Fig. {number}: {what}, {COVERED}")
     axis.legend(fontsize="small")
     axis.grid(color="0.9")
     return figure

@@ -10,14 +10,12 @@ from ..study import Table
 from .angles import sweep
 from .cases import (
     ACTUATORS,
-    DAMPING,
     GAIN,
     GAINS,
-    LADDER,
     LOOPS,
+    ON_A_TRAIN,
     OTHER_LINE,
     PARTS,
-    SAMPLED,
     SHOWN_SPEEDS,
     SPANS,
     SPEEDS,
@@ -25,6 +23,7 @@ from .cases import (
     SWEEPS,
     Case,
     control,
+    sampled,
 )
 from .passes import Result
 
@@ -94,10 +93,8 @@ def _gains(results: Results) -> Table:
 
 def _actuators(results: Results) -> Table:
     rows = [
-        (f"{actuator}: {name}", speed, results[Case(speed, policy, "shinkansen-simple", actuator, SAMPLED)])
-        for actuator, (name, policy), speed in product(
-            ACTUATORS, (LADDER | DAMPING).items(), SHOWN_SPEEDS
-        )
+        (f"{actuator}: {name}", speed, results[sampled(speed, policy, actuator)])
+        for actuator, (name, policy), speed in product(ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
     ]
     return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *FIGURES), _rows(rows))
 
