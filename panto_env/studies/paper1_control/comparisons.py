@@ -60,7 +60,8 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
         )
         for gain in GAINS
     }
-    for named, ours in ((f"gain {GAIN}", worst[GAIN]), ("best gain", min(worst.values()))):
+    best = min(worst, key=worst.__getitem__)
+    for named, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
         quantity = f"largest CL with FB+FF, {named}, 300-400 km/h, realistic actuator"
         told.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
     return told

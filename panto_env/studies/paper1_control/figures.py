@@ -12,7 +12,7 @@ from .cases import (
     DAMPING,
     DEFAULT_GAIN,
     GAIN,
-    GENTLE_GAIN,
+    REAL_GAIN,
     KMH,
     SHIPPED,
     SHOWN_SPEEDS,
@@ -26,13 +26,13 @@ from .cases import (
     control,
     sampled,
 )
-from .passes import Result, make
+from .passes import Result, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Results = Mapping[Case, Result]
-SHOWN_SPANS = (10, 12)
+SHOWN_SPANS = (10, 11)
 """Spans of Figs 14 to 16."""
 COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
 # The paper's colours: without control red, with control blue, control force green.
@@ -76,13 +76,13 @@ def passage(speed: int) -> Figure:
     """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
     from matplotlib.figure import Figure
 
-    passive, active = make(Case(speed)), make(Case(speed, control()))
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    passive, active = records([Case(speed), Case(speed, control())])
+    figure = Figure(figsize=(7.5, 4.7), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
     upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
     upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
-    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 140))
+    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 120))
     lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
     lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
     for axis in (upper, lower):
@@ -97,12 +97,12 @@ def over_speed(results: Results, name: str, label: str) -> Figure:
     """Figs 17 and 18: a figure of merit over speed."""
     from matplotlib.figure import Figure
 
-    gentle, damped = control(GENTLE_GAIN), DAMPING[SHIPPED]
+    gentle, damped = control(REAL_GAIN), DAMPING[SHIPPED]
     curves = {
         "without control": ([Case(v) for v in SPEEDS], WITHOUT, "o-"),
         f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
         "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], "tab:cyan", "^--"),
-        f"with control, gain {GENTLE_GAIN}, realistic actuator": (
+        f"with control, gain {REAL_GAIN}, realistic actuator": (
             [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x:"
         ),
         "feedback and frame damping (pd), realistic actuator": (

@@ -1,27 +1,32 @@
-"""One pass and what is kept of it; all passes on all cores."""
+"""Passes along the line and what is kept of them; all on all cores."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from itertools import groupby
 from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...catalog import load_catenary, load_pantograph
 from ...errors import InputError
 from ...metrics import Figures
-from ...simulation import simulate
+from ...task import Task
+from ...task.policy import find_policy
 from ...trajectory import Trajectory
 from .cases import ACTUATORS, PANTOGRAPH, RUN_SPANS, SPANS, Case
 
 PER_SPAN = (1, 2, 3, 10)
 """Components of the contact force that are kept, in periods a span; `shinkansen-simple` has 10 droppers."""
+LANES = 12
+"""Passes made together in one process; from 16 on a task would take threads beside the processes."""
 
 
 @dataclass(frozen=True)
@@ -40,48 +45,15 @@ class Result:
         return self.figures.cost_function / self.figures.distance
 
 
-def make(case: Case) -> Trajectory:
-    """The whole record of a case."""
-    if case.mean is not None:
-        return _pressed(case.speed_kmh, case.line, case.mean)
-    return _simulate(case)
-
-
-def run(case: Case) -> Result:
-    """Run a case."""
-    return keep(case, make(case))
-
-
-def keep(case: Case, record: Trajectory) -> Result:
-    """What is kept of a record."""
-    inside = _inside(record)
-    force, position = record.contact_force[inside], record.position[inside]
-    turns = position / record.span_length
-    return Result(
-        case,
-        record.summary(SPANS),
-        float(force.std()),
-        longest(force <= 0) * record.time_step,
-        tuple(complex(2 * np.mean(force * np.exp(-2j * np.pi * n * turns))) for n in PER_SPAN),
-    )
-
-
-def longest(lost: Any) -> int:
-    """Most samples in a row that are true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
-
-
 def run_all(cases: Sequence[Case], progress: Callable[[float], None]) -> dict[Case, Result]:
     """Run cases on all cores; ``progress`` is told the share done. Raises InputError if a worker dies."""
     workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     results: dict[Case, Result] = {}
     # Spawned, not forked: threads of Numba do not survive a fork.
-    pool = ProcessPoolExecutor(min(workers, len(cases)), mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
     try:
-        for future in as_completed([pool.submit(run, case) for case in cases]):
-            result = future.result()
-            results[result.case] = result
+        for future in as_completed([pool.submit(run, batch) for batch in _batches(cases)]):
+            results |= {result.case: result for result in future.result()}
             progress(len(results) / len(cases))
     except BrokenProcessPool as error:
         raise InputError(
@@ -92,36 +64,93 @@ def run_all(cases: Sequence[Case], progress: Callable[[float], None]) -> dict[Ca
     return {case: results[case] for case in cases}
 
 
-def _simulate(case: Case, pantograph: Any = PANTOGRAPH) -> Trajectory:
+def run(cases: Sequence[Case]) -> list[Result]:
+    """Run cases that differ in their policy alone."""
+    return [keep(case, record) for case, record in zip(cases, records(cases), strict=True)]
+
+
+def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Trajectory]:
+    """Whole records of cases that differ in their policy alone: lanes of one task."""
+    case = cases[0]
     line = load_catenary(case.line)
-    return simulate(
-        line,
-        pantograph,
-        case.speed_kmh,
-        None if case.policy == "passive" else case.policy,
+    task = Task(
+        catenary=line,
+        pantograph=pantograph,
+        speed_kmh=case.speed_kmh,
         actuator=ACTUATORS[case.actuator],
         control_interval=case.control_interval,
         distance=RUN_SPANS * line.span_length,
-        record_droppers=False,
+        lanes=len(cases),
+    )
+    policies = [find_policy(each.policy) for each in cases]
+    for lane, policy in enumerate(policies):
+        task.reset(lane, np.random.default_rng(0))
+        policy.reset(task.context(lane))
+    episode = task.episode
+    action = np.zeros_like(episode.action)
+    while not episode.truncated[0]:
+        for lane, policy in enumerate(policies):
+            action[lane] = policy.act(episode.observation[lane])
+        task.step(action)
+        if episode.terminated.any():
+            gone = cases[int(np.argmax(episode.terminated))]
+            raise InputError(f"The pass {gone} left the valid range of the simulation; leave it out.")
+    return [task.trajectory(lane, policy=each.policy) for lane, each in enumerate(cases)]
+
+
+def pressed(speed_kmh: int, mean: float) -> Result:
+    """The passive pantograph under as much more static force as gives this mean force (N).
+
+    CF still counts from the nominal force that the pantograph has as it is.
+    """
+    case, as_it_is = Case(speed_kmh), load_pantograph(PANTOGRAPH)
+    (passive,) = records([case])
+    passive_mean = _mean(passive)
+    more = mean - passive_mean
+    for _ in range(3):  # the mean is all but linear in the static force
+        heavier = as_it_is.model_copy(update={"static_force": as_it_is.static_force + more})
+        (record,) = records([case], heavier)
+        more *= (mean - passive_mean) / (_mean(record) - passive_mean)
+    return keep(case, dataclasses.replace(record, nominal_force=passive.nominal_force))
+
+
+def keep(case: Case, record: Trajectory) -> Result:
+    """What is kept of a record."""
+    inside = _inside(record)
+    force, turns = record.contact_force[inside], record.position[inside] / record.span_length
+    return Result(
+        case,
+        record.summary(SPANS),
+        float(force.std()),
+        longest(force <= 0) * record.time_step,
+        tuple(complex(2 * np.mean(force * np.exp(-2j * np.pi * n * turns))) for n in PER_SPAN),
     )
 
 
-def _pressed(speed_kmh: int, line: str, mean: float) -> Trajectory:
-    """The passive pantograph under as much more static force as gives this mean force (N)."""
-    as_it_is = load_pantograph(PANTOGRAPH)
-    nominal = as_it_is.nominal_force(speed_kmh / 3.6)
-    case = Case(speed_kmh, line=line)
-    record = _simulate(case)
-    passive_mean = record.contact_force[_inside(record)].mean()
-    more = mean - passive_mean
-    for _ in range(3):  # the mean is all but linear in the static force
-        pantograph = as_it_is.model_copy(update={"static_force": as_it_is.static_force + more})
-        record = _simulate(case, pantograph)
-        more *= (mean - passive_mean) / (record.contact_force[_inside(record)].mean() - passive_mean)
-    return dataclasses.replace(record, nominal_force=nominal)  # CF still counts from the paper's 54 N
+def longest(lost: NDArray[np.bool_]) -> int:
+    """Most samples in a row that are true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _inside(record: Trajectory) -> Any:
+def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
+    """Cases that differ in their policy alone, LANES at a time, slow trains first: theirs take longest."""
+
+    def plant(case: Case) -> tuple[Any, ...]:
+        return case.speed_kmh, case.line, case.actuator, case.control_interval
+
+    for _, alike in groupby(sorted(cases, key=plant), key=plant):
+        together = list(alike)
+        for first in range(0, len(together), LANES):
+            yield tuple(together[first : first + LANES])
+
+
+def _mean(record: Trajectory) -> float:
+    return float(record.contact_force[_inside(record)].mean())
+
+
+def _inside(record: Trajectory) -> NDArray[np.bool_]:
     first, last = SPANS
     lowest, highest = (first - 1) * record.span_length, last * record.span_length
-    return (record.position >= lowest) & (record.position < highest)
+    inside: NDArray[np.bool_] = (record.position >= lowest) & (record.position < highest)
+    return inside
