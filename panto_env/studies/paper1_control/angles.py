@@ -54,8 +54,8 @@ def cancelling(results: Mapping[Case, Result], speed: int, gain: float) -> float
     Both are measured: the part with feedback alone, and what the feed-forward at angle 0 adds to it.
     Shifting A sin(kx) by theta turns what it adds by -theta.
     """
-    part = without_feedforward(results, speed, gain).components[0]
-    added = _result(results, speed, gain, AMPLITUDE, ZERO).components[0] - part
+    part = without_feedforward(results, speed, gain).once_per_span
+    added = _result(results, speed, gain, AMPLITUDE, ZERO).once_per_span - part
     return wrap(cmath.phase(added) - cmath.phase(-part))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...catalog import load_catenary, load_pantograph
 from ...errors import InputError
 from ...metrics import Figures
@@ -23,8 +24,8 @@ from ...task.policy import find_policy
 from ...trajectory import Trajectory
 from .cases import ACTUATORS, PANTOGRAPH, RUN_SPANS, SPANS, Case
 
-PER_SPAN = (1, 2, 3, 10)
-"""Components of the contact force that are kept, in periods a span; `shinkansen-simple` has 10 droppers."""
+BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
+"""Bands of frequency (Hz) by which the contact force is told apart; the mean belongs to none."""
 LANES = 12
 """Passes made together in one process; from 16 on a task would take threads beside the processes."""
 
@@ -37,7 +38,8 @@ class Result:
     figures: Figures
     raw_std: float  # of the unfiltered contact force (N)
     longest_loss: float  # longest time without contact (s)
-    components: tuple[complex, ...]  # of the contact force, PER_SPAN: amplitude (N) and phase
+    once_per_span: complex  # that part of the contact force: amplitude (N) and phase
+    bands: tuple[float, ...]  # rms of the unfiltered contact force in BANDS (N)
 
     @property
     def mean_deviation(self) -> float:
@@ -123,8 +125,16 @@ def keep(case: Case, record: Trajectory) -> Result:
         record.summary(SPANS),
         float(force.std()),
         longest(force <= 0) * record.time_step,
-        tuple(complex(2 * np.mean(force * np.exp(-2j * np.pi * n * turns))) for n in PER_SPAN),
+        complex(2 * np.mean(force * np.exp(-2j * np.pi * turns))),
+        tuple(band_rms(force, record.time_step, *band) for band in BANDS),
     )
+
+
+def band_rms(force: Array, time_step: float, lowest: float, highest: float) -> float:
+    """Rms (N) of what lies above ``lowest`` and up to ``highest`` (Hz)."""
+    parts = np.abs(np.fft.rfft(force)) / len(force)
+    frequencies = np.fft.rfftfreq(len(force), time_step)
+    return float(np.sqrt(2 * np.sum(parts[(frequencies > lowest) & (frequencies <= highest)] ** 2)))
 
 
 def longest(lost: NDArray[np.bool_]) -> int:

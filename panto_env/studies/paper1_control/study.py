@@ -38,5 +38,6 @@ def _plain(result: Result) -> dict[str, Any]:
         **result.figures.as_dict(),
         "raw_std": result.raw_std,
         "longest_loss": result.longest_loss,
-        "components": [abs(part) for part in result.components],
+        "once_per_span": abs(result.once_per_span),
+        "bands": result.bands,
     }

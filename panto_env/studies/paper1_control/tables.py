@@ -25,7 +25,8 @@ from .cases import (
     control,
     sampled,
 )
-from .passes import Result
+from .linear import amplification
+from .passes import BANDS, Result
 
 Results = Mapping[Case, Result]
 FIGURES = (
@@ -52,7 +53,8 @@ def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]
         _gains(results),
         _actuators(results),
         _angles(results),
-        _components(results),
+        _bands(results),
+        _amplification(),
         _speeds(results),
         _other_line(results),
     )
@@ -123,22 +125,29 @@ def _angles(results: Results) -> Table:
     )  # fmt: skip
 
 
-def _components(results: Results) -> Table:
+def _bands(results: Results) -> Table:
     shown = {name: PARTS[name] for name in ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")}
-    rows = [
-        (
-            name,
-            str(speed),
-            *(f"{abs(part):.1f}" for part in results[Case(speed, policy)].components),
-            f"{speed / 3.6 / 5:.1f}",
-        )
-        for speed, (name, policy) in product(SWEEP_SPEEDS, shown.items())
-    ]
+    rows = []
+    for speed, (name, policy) in product(SWEEP_SPEEDS, shown.items()):
+        result = results[Case(speed, policy)]
+        parts = (abs(result.once_per_span) / math.sqrt(2), *result.bands, result.raw_std)
+        rows.append((name, str(speed), *(f"{part:.1f}" for part in parts)))
     return Table(
-        "Components of the contact force (N) by periods a span",
-        ("control", "km/h", "1", "2", "3", "10: droppers", "dropper passing (Hz)"),
+        "What the contact force is made of: rms (N)",
+        ("control", "km/h", "once per span", *(f"{low:g}-{high:g} Hz" for low, high in BANDS), "all"),
         tuple(rows),
     )
+
+
+def _amplification() -> Table:
+    laws = {"FB, gain 1": (1.0, 0.0), f"FB, gain {GAIN}": (GAIN, 0.0), "damping 150 N s/m": (0.0, 150.0),
+            "both: gain 1, 150 N s/m": (1.0, 150.0)}  # fmt: skip
+    frequencies = (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 20, 25)
+    rows = tuple(
+        (f"{frequency}", *(f"{amplification(frequency, *law):.2f}" for law in laws.values()))
+        for frequency in frequencies
+    )
+    return Table("Linear model: contact force over the passive one's", ("frequency (Hz)", *laws), rows)
 
 
 def _speeds(results: Results) -> Table:
