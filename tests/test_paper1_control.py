@@ -222,6 +222,17 @@ def test_the_other_line_is_lost_at_400_kmh(outcome: Outcome) -> None:
 
 
 @pytest.mark.slow
+def test_a_finer_grid_and_time_step_say_the_same(outcome: Outcome) -> None:
+    found = table(outcome, "Time step and grid")
+    loss, cost = found.headings.index("CL (%)"), found.headings.index("CF (N m)")
+    for usual, fine in zip(found.rows[::2], found.rows[1::2], strict=True):
+        assert float(fine[loss]) == pytest.approx(float(usual[loss]), abs=0.5), usual[:2]
+        assert float(fine[cost]) == pytest.approx(float(usual[cost]), rel=0.02), usual[:2]
+        if "FB+FF" in str(usual[0]):
+            assert fine[loss] == "0.00"
+
+
+@pytest.mark.slow
 def test_the_outcome_is_written_with_a_picture_a_figure(
     outcome: Outcome, told: list[float], tmp_path: Path
 ) -> None:

@@ -62,6 +62,10 @@ DAMPING = {
 """What the paper does not have: feedback of the frame's velocity."""
 
 
+FINE: dict[str, Any] = {"time_step": 1e-3, "spacing": 0.25}
+"""Half the usual time step (s), and a finer grid (m), to see what depends on them."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One pass along the line."""
@@ -71,6 +75,7 @@ class Case:
     line: str = LINE
     actuator: str = "ideal"  # among ACTUATORS
     control_interval: float = EVERY_STEP  # s
+    fine: bool = False  # whether on the grid and time step of FINE
 
 
 def control(
@@ -125,6 +130,8 @@ def _cases() -> Iterator[Case]:
             yield Case(speed, control(gain, theta=theta, reading=reading))
     for speed, policy, line in product(SHOWN_SPEEDS, PARTS.values(), (LINE, OTHER_LINE)):
         yield Case(speed, policy, line)
+    for speed, policy in product(SHOWN_SPEEDS, ("passive", control())):
+        yield Case(speed, policy, fine=True)
     for (actuator, interval), speed, gain in product(LOOPS, SHOWN_SPEEDS, GAINS):
         yield Case(speed, control(gain), actuator=actuator, control_interval=interval)
     for actuator, speed, policy in product(ACTUATORS, SHOWN_SPEEDS, ON_A_TRAIN.values()):

@@ -22,7 +22,7 @@ from ...metrics import Figures
 from ...task import Task
 from ...task.policy import find_policy
 from ...trajectory import Trajectory
-from .cases import ACTUATORS, PANTOGRAPH, RUN_SPANS, SPANS, Case
+from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, Case
 
 BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
 """Bands of frequency (Hz) by which the contact force is told apart; the mean belongs to none."""
@@ -83,6 +83,7 @@ def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Traject
         control_interval=case.control_interval,
         distance=RUN_SPANS * line.span_length,
         lanes=len(cases),
+        **(FINE if case.fine else {}),
     )
     policies = [find_policy(each.policy) for each in cases]
     for lane, policy in enumerate(policies):
@@ -147,7 +148,7 @@ def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
     """Cases that differ in their policy alone, LANES at a time, slow trains first: theirs take longest."""
 
     def plant(case: Case) -> tuple[Any, ...]:
-        return case.speed_kmh, case.line, case.actuator, case.control_interval
+        return case.speed_kmh, case.line, case.actuator, case.control_interval, case.fine
 
     for _, alike in groupby(sorted(cases, key=plant), key=plant):
         together = list(alike)

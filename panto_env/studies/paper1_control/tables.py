@@ -10,6 +10,7 @@ from ..study import Table
 from .angles import sweep
 from .cases import (
     ACTUATORS,
+    FINE,
     GAIN,
     GAINS,
     LOOPS,
@@ -57,6 +58,7 @@ def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]
         _amplification(),
         _speeds(results),
         _other_line(results),
+        _fine(results),
     )
 
 
@@ -156,6 +158,15 @@ def _speeds(results: Results) -> Table:
         passive, active = results[Case(speed)], results[Case(speed, control())]
         rows += [("passive", speed, passive), (f"FB+FF, gain {GAIN}", speed, active)]
     return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *FIGURES), _rows(rows))
+
+
+def _fine(results: Results) -> Table:
+    told = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    rows = [
+        (f"{name}, {told[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
+        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), told)
+    ]
+    return Table("Time step and grid", ("control, time step, grid", "km/h", *FIGURES), _rows(rows))
 
 
 def _other_line(results: Results) -> Table:
