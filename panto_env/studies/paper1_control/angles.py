@@ -1,0 +1,71 @@
+"""The phase angle of the feed-forward: which is best, and which cancels what comes once per span."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .cases import AMPLITUDE, THETA, THETAS, Case, control
+from .passes import Result
+
+ZERO = THETAS[len(THETAS) // 2 - 1]  # the sweep's own 0, so that its pass is not run twice
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Cost function over the phase angle at one speed."""
+
+    cost: tuple[float, ...]  # CF at THETAS (N m)
+    best: float  # theta of the least CF (rad)
+    least: float  # CF there (N m)
+    without: float  # CF of the feedback alone (N m)
+    at_paper: float  # CF at the paper's pi/6 (N m)
+    cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
+
+
+def sweep(results: Mapping[Case, Result], speed: int, gain: float, reading: str) -> Sweep:
+    """The sweep at a speed (km/h)."""
+
+    def cost(amplitude: float, theta: float) -> float:
+        return _result(results, speed, gain, amplitude, theta, reading).figures.cost_function
+
+    costs = tuple(cost(AMPLITUDE, theta) for theta in THETAS)
+    least = min(costs)
+    return Sweep(
+        cost=costs,
+        best=THETAS[costs.index(least)],
+        least=least,
+        without=without_feedforward(results, speed, gain).figures.cost_function,
+        at_paper=cost(AMPLITUDE, min(THETAS, key=lambda theta: abs(theta - THETA))),
+        cancelling=cancelling(results, speed, gain),
+    )
+
+
+def without_feedforward(results: Mapping[Case, Result], speed: int, gain: float) -> Result:
+    """The feedback alone."""
+    return results[Case(speed, control(gain, amplitude=0.0))]
+
+
+def cancelling(results: Mapping[Case, Result], speed: int, gain: float) -> float:
+    """The angle (rad) at which the feed-forward, once per span, opposes the force's part once per span.
+
+    Both are measured: the part with feedback alone, and what the feed-forward at angle 0 adds to it.
+    Shifting A sin(kx) by theta turns what it adds by -theta.
+    """
+    part = without_feedforward(results, speed, gain).once_per_span
+    added = _result(results, speed, gain, AMPLITUDE, ZERO).once_per_span - part
+    return wrap(cmath.phase(added) - cmath.phase(-part))
+
+
+def wrap(angle: float) -> float:
+    """The same angle within -pi..pi."""
+    return math.remainder(angle, 2 * math.pi)
+
+
+def _result(
+    results: Mapping[Case, Result], speed: int, gain: float, amplitude: float, theta: float, reading: str = ""
+) -> Result:
+    shape = {"reading": reading} if reading else {}
+    return results[Case(speed, control(gain, amplitude, theta, **shape))]

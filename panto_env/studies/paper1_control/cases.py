@@ -1,0 +1,138 @@
+"""Which passes the study makes: the paper's control, and what it leaves open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+LINE = "shinkansen-simple"
+OTHER_LINE = "en50318-2002"
+PANTOGRAPH = "identified-2dof"
+SPANS = (6, 15)
+"""Spans that figures cover: the start has died out, the far anchor's reflection has not come yet."""
+RUN_SPANS = SPANS[1] + 2
+"""Spans that a run covers."""
+
+SPEEDS = tuple(range(100, 401, 25))
+"""km/h, Figs 17 and 18: the paper's range; the step is an own choice."""
+SWEEP_SPEEDS = tuple(range(100, 401, 50))
+"""km/h, Fig. 13."""
+SHOWN_SPEEDS = (300, 350, 400)
+"""km/h, Figs 14 to 16."""
+
+EVERY_STEP = 0.002
+"""Control interval (s): the paper names no sampling, so the control acts in every time step."""
+SAMPLED = 0.01
+"""Control interval (s) of published active pantographs, and of ``Pantograph-v0``."""
+
+DEFAULT_GAIN = 1.0
+"""The gain of the policy as shipped (N/N): the paper prints none."""
+GAIN = 1.75
+"""Calibrated: the least of ``GAINS`` that leaves no contact loss at 300, 350 and 400 km/h."""
+REAL_GAIN = 0.25
+"""The one of ``GAINS`` with the least of the largest losses at 300 to 400 km/h, realistic actuator."""
+GAINS = tuple(0.25 * k for k in range(1, 13))
+THETA = math.pi / 6  # the paper's, for all speeds
+AMPLITUDE = 10.0  # N, the paper's
+THETA_STEP = math.pi / 12
+THETAS = tuple(THETA_STEP * k for k in range(-11, 13))
+READINGS = {
+    "once per span": "reading=span",
+    "Eqs 11-12, v in km/h": "reading=printed,speed_unit=km/h",
+    "Eqs 11-12, v in m/s": "reading=printed,speed_unit=m/s",
+}
+"""Readings of the feed-forward, as parameters of the policy fb+ff."""
+SPAN, KMH, MS = READINGS
+
+ACTUATORS: dict[str, Any] = {
+    "ideal": "ideal",
+    "delay 5 ms": {"delay": 0.005},
+    "lag 15 ms": {"lag": 0.015},
+    "realistic": "realistic",  # both, and 2500 N/s
+}
+SHIPPED = "pd as shipped"
+DAMPING = {
+    "frame damping alone": "pd:gain=0.0,derivative=0.0",
+    "FB + frame damping": "pd:derivative=0.0",
+    SHIPPED: "pd",
+}
+"""What the paper does not have: feedback of the frame's velocity."""
+
+
+FINE: dict[str, Any] = {"time_step": 1e-3, "spacing": 0.25}
+"""Half the usual time step (s), and a finer grid (m), to see what depends on them."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One pass along the line."""
+
+    speed_kmh: int
+    policy: str = "passive"
+    line: str = LINE
+    actuator: str = "ideal"  # among ACTUATORS
+    control_interval: float = EVERY_STEP  # s
+    fine: bool = False  # whether on the grid and time step of FINE
+
+
+def control(
+    gain: float = GAIN, amplitude: float = AMPLITUDE, theta: float = THETA, reading: str = SPAN
+) -> str:
+    """The policy fb+ff with these parameters, by name."""
+    return f"fb+ff:gain={gain!r},amplitude={amplitude!r},theta={theta!r},{READINGS[reading]}"
+
+
+def sampled(speed_kmh: int, policy: str, actuator: str) -> Case:
+    """A pass as a train could run it: controlled at its sampling interval, through this actuator."""
+    return Case(speed_kmh, policy, actuator=actuator, control_interval=SAMPLED)
+
+
+PARTS = {
+    "passive": "passive",
+    "FB, gain 1": control(DEFAULT_GAIN, amplitude=0.0),
+    f"FB, gain {GAIN}": control(amplitude=0.0),
+    "FF": control(gain=0.0),
+    "FB+FF, gain 1": control(DEFAULT_GAIN),
+    f"FB+FF, gain {GAIN}": control(),
+    f"FB+FF, gain {GAIN}, {KMH}": control(reading=KMH),
+    f"FB+FF, gain {GAIN}, {MS}": control(reading=MS),
+}
+"""The control and its parts, each at every time step and with an ideal actuator."""
+ON_A_TRAIN = {
+    f"FB+FF, gain {REAL_GAIN}": control(REAL_GAIN),
+    "FB+FF, gain 1": control(DEFAULT_GAIN),
+    f"FB+FF, gain {GAIN}": control(),
+    **DAMPING,
+}
+"""Controls that are tried with each actuator, sampled."""
+SWEEPS = ((GAIN, SPAN), (DEFAULT_GAIN, SPAN), (GAIN, KMH))
+"""Gains and readings under which the phase angle is swept."""
+LOOPS = (("ideal", EVERY_STEP), ("ideal", SAMPLED), ("realistic", SAMPLED))
+"""Actuators and control intervals under which the gain is swept."""
+
+
+def all_cases() -> list[Case]:
+    """Every pass of the study but the pressed ones, each once."""
+    return list(dict.fromkeys(_cases()))
+
+
+def _cases() -> Iterator[Case]:
+    for speed, policy in product(SPEEDS, ("passive", control(), control(DEFAULT_GAIN))):  # Figs 17, 18
+        yield Case(speed, policy)
+    for speed, policy in product(SPEEDS, (control(REAL_GAIN), DAMPING[SHIPPED])):
+        yield sampled(speed, policy, "realistic")
+    for (gain, reading), speed in product(SWEEPS, SWEEP_SPEEDS):  # Fig. 13
+        yield Case(speed, control(gain, amplitude=0.0))
+        for theta in THETAS:
+            yield Case(speed, control(gain, theta=theta, reading=reading))
+    for speed, policy, line in product(SHOWN_SPEEDS, PARTS.values(), (LINE, OTHER_LINE)):
+        yield Case(speed, policy, line)
+    for speed, policy in product(SHOWN_SPEEDS, ("passive", control())):
+        yield Case(speed, policy, fine=True)
+    for (actuator, interval), speed, gain in product(LOOPS, SHOWN_SPEEDS, GAINS):
+        yield Case(speed, control(gain), actuator=actuator, control_interval=interval)
+    for actuator, speed, policy in product(ACTUATORS, SHOWN_SPEEDS, ON_A_TRAIN.values()):
+        yield sampled(speed, policy, actuator)

@@ -1,0 +1,167 @@
+"""Passes along the line and what is kept of them; all on all cores."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from itertools import groupby
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...catalog import load_catenary, load_pantograph
+from ...errors import InputError
+from ...metrics import Figures
+from ...task import Task
+from ...task.policy import find_policy
+from ...trajectory import Trajectory
+from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, Case
+
+BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
+"""Bands of frequency (Hz) by which the contact force is told apart; the mean belongs to none."""
+LANES = 12
+"""Passes made together in one process; from 16 on a task would take threads beside the processes."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What is kept of a pass, over ``SPANS``."""
+
+    case: Case
+    figures: Figures
+    raw_std: float  # of the unfiltered contact force (N)
+    longest_loss: float  # longest time without contact (s)
+    once_per_span: complex  # that part of the contact force: amplitude (N) and phase
+    bands: tuple[float, ...]  # rms of the unfiltered contact force in BANDS (N)
+
+    @property
+    def mean_deviation(self) -> float:
+        """CF over the distance: the mean of |F - F_N| (N)."""
+        return self.figures.cost_function / self.figures.distance
+
+
+def run_all(cases: Sequence[Case], progress: Callable[[float], None]) -> dict[Case, Result]:
+    """Run cases on all cores; ``progress`` is told the share done. Raises InputError if a worker dies."""
+    workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    results: dict[Case, Result] = {}
+    # Spawned, not forked: threads of Numba do not survive a fork.
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    try:
+        for future in as_completed([pool.submit(run, batch) for batch in _batches(cases)]):
+            results |= {result.case: result for result in future.result()}
+            progress(len(results) / len(cases))
+    except BrokenProcessPool as error:
+        raise InputError(
+            "A worker process died; in a script, call the study under `if __name__ == '__main__':`."
+        ) from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return {case: results[case] for case in cases}
+
+
+def run(cases: Sequence[Case]) -> list[Result]:
+    """Run cases that differ in their policy alone."""
+    return [keep(case, record) for case, record in zip(cases, records(cases), strict=True)]
+
+
+def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Trajectory]:
+    """Whole records of cases that differ in their policy alone: lanes of one task."""
+    case = cases[0]
+    line = load_catenary(case.line)
+    task = Task(
+        catenary=line,
+        pantograph=pantograph,
+        speed_kmh=case.speed_kmh,
+        actuator=ACTUATORS[case.actuator],
+        control_interval=case.control_interval,
+        distance=RUN_SPANS * line.span_length,
+        lanes=len(cases),
+        **(FINE if case.fine else {}),
+    )
+    policies = [find_policy(each.policy) for each in cases]
+    for lane, policy in enumerate(policies):
+        task.reset(lane, np.random.default_rng(0))
+        policy.reset(task.context(lane))
+    episode = task.episode
+    action = np.zeros_like(episode.action)
+    while not episode.truncated[0]:
+        for lane, policy in enumerate(policies):
+            action[lane] = policy.act(episode.observation[lane])
+        task.step(action)
+        if episode.terminated.any():
+            gone = cases[int(np.argmax(episode.terminated))]
+            raise InputError(f"The pass {gone} left the valid range of the simulation; leave it out.")
+    return [task.trajectory(lane, policy=each.policy) for lane, each in enumerate(cases)]
+
+
+def pressed(speed_kmh: int, mean: float) -> Result:
+    """The passive pantograph under as much more static force as gives this mean force (N).
+
+    CF still counts from the nominal force that the pantograph has as it is.
+    """
+    case, as_it_is = Case(speed_kmh), load_pantograph(PANTOGRAPH)
+    (passive,) = records([case])
+    passive_mean = _mean(passive)
+    more = mean - passive_mean
+    for _ in range(3):  # the mean is all but linear in the static force
+        heavier = as_it_is.model_copy(update={"static_force": as_it_is.static_force + more})
+        (record,) = records([case], heavier)
+        more *= (mean - passive_mean) / (_mean(record) - passive_mean)
+    return keep(case, dataclasses.replace(record, nominal_force=passive.nominal_force))
+
+
+def keep(case: Case, record: Trajectory) -> Result:
+    """What is kept of a record."""
+    inside = _inside(record)
+    force, turns = record.contact_force[inside], record.position[inside] / record.span_length
+    return Result(
+        case,
+        record.summary(SPANS),
+        float(force.std()),
+        longest(force <= 0) * record.time_step,
+        complex(2 * np.mean(force * np.exp(-2j * np.pi * turns))),
+        tuple(band_rms(force, record.time_step, *band) for band in BANDS),
+    )
+
+
+def band_rms(force: Array, time_step: float, lowest: float, highest: float) -> float:
+    """Rms (N) of what lies above ``lowest`` and up to ``highest`` (Hz)."""
+    parts = np.abs(np.fft.rfft(force)) / len(force)
+    frequencies = np.fft.rfftfreq(len(force), time_step)
+    return float(np.sqrt(2 * np.sum(parts[(frequencies > lowest) & (frequencies <= highest)] ** 2)))
+
+
+def longest(lost: NDArray[np.bool_]) -> int:
+    """Most samples in a row that are true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
+    """Cases that differ in their policy alone, LANES at a time, slow trains first: theirs take longest."""
+
+    def plant(case: Case) -> tuple[Any, ...]:
+        return case.speed_kmh, case.line, case.actuator, case.control_interval, case.fine
+
+    for _, alike in groupby(sorted(cases, key=plant), key=plant):
+        together = list(alike)
+        for first in range(0, len(together), LANES):
+            yield tuple(together[first : first + LANES])
+
+
+def _mean(record: Trajectory) -> float:
+    return float(record.contact_force[_inside(record)].mean())
+
+
+def _inside(record: Trajectory) -> NDArray[np.bool_]:
+    first, last = SPANS
+    lowest, highest = (first - 1) * record.span_length, last * record.span_length
+    inside: NDArray[np.bool_] = (record.position >= lowest) & (record.position < highest)
+    return inside

@@ -1,0 +1,177 @@
+"""The study's tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from itertools import product
+
+from ..study import Table
+from .angles import sweep
+from .cases import (
+    ACTUATORS,
+    FINE,
+    GAIN,
+    GAINS,
+    LOOPS,
+    ON_A_TRAIN,
+    OTHER_LINE,
+    PARTS,
+    SHOWN_SPEEDS,
+    SPANS,
+    SPEEDS,
+    SWEEP_SPEEDS,
+    SWEEPS,
+    Case,
+    control,
+    sampled,
+)
+from .linear import amplification
+from .passes import BANDS, Result
+
+Results = Mapping[Case, Result]
+FIGURES = (
+    "F_m (N)", "σ (N)", "raw σ (N)", "max (N)", "min (N)", "CL (%)", "longest loss (ms)", "CF (N m)",
+    "mean |F − F_N| (N)", "uplift (mm)", "effort (N)", "effort rate (N/s)",
+)  # fmt: skip
+
+
+def figures(result: Result) -> tuple[str, ...]:
+    """The cells under ``FIGURES``."""
+    of = result.figures
+    return (
+        f"{of.mean:.1f}", f"{of.std:.1f}", f"{result.raw_std:.1f}", f"{of.max:.0f}", f"{of.min:.0f}",
+        f"{of.contact_loss:.2f}", f"{1e3 * result.longest_loss:.0f}", f"{of.cost_function:.0f}",
+        f"{result.mean_deviation:.1f}", f"{1e3 * of.max_uplift:.0f}", f"{of.effort:.1f}",
+        f"{of.effort_rate:.0f}",
+    )  # fmt: skip
+
+
+def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]:
+    """All of them. pressed: the passive pantograph at the controlled one's mean force, by speed."""
+    return (
+        _parts(results, pressed),
+        _gains(results),
+        _actuators(results),
+        _angles(results),
+        _bands(results),
+        _amplification(),
+        _speeds(results),
+        _other_line(results),
+        _fine(results),
+    )
+
+
+def _rows(named: Iterable[tuple[str, int, Result]]) -> tuple[tuple[str, ...], ...]:
+    return tuple((name, str(speed), *figures(result)) for name, speed, result in named)
+
+
+def _parts(results: Results, pressed: Mapping[int, Result]) -> Table:
+    rows = []
+    for speed in SHOWN_SPEEDS:
+        rows += [(name, speed, results[Case(speed, policy)]) for name, policy in PARTS.items()]
+        rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, pressed[speed]))
+    return Table(
+        f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}",
+        ("control", "km/h", *FIGURES),
+        _rows(rows),
+    )
+
+
+def _gains(results: Results) -> Table:
+    headings = tuple(
+        f"{speed} km/h, {actuator}, {1e3 * interval:g} ms"
+        for (actuator, interval), speed in product(LOOPS, SHOWN_SPEEDS)
+    )
+    rows = []
+    for gain in GAINS:
+        losses = [
+            results[
+                Case(speed, control(gain), actuator=actuator, control_interval=interval)
+            ].figures.contact_loss
+            for (actuator, interval), speed in product(LOOPS, SHOWN_SPEEDS)
+        ]
+        rows.append((f"{gain:g}", *(f"{loss:.2f}" for loss in losses)))
+    return Table("CL (%) of FB+FF over the gain", ("gain (N/N)", *headings), tuple(rows))
+
+
+def _actuators(results: Results) -> Table:
+    rows = [
+        (f"{actuator}: {name}", speed, results[sampled(speed, policy, actuator)])
+        for actuator, (name, policy), speed in product(ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
+    ]
+    return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *FIGURES), _rows(rows))
+
+
+def _angles(results: Results) -> Table:
+    rows = []
+    for (gain, reading), speed in product(SWEEPS, SWEEP_SPEEDS):
+        found = sweep(results, speed, gain, reading)
+        span = reading == SWEEPS[0][1]
+        rows.append(
+            (
+                f"{reading}, gain {gain:g}",
+                str(speed),
+                f"{math.degrees(found.best):.0f}",
+                *(f"{value:.0f}" for value in (found.least, found.at_paper, max(found.cost), found.without)),
+                f"{math.degrees(found.cancelling):.0f}" if span else "–",
+            )
+        )
+    return Table(
+        "Phase angle of the feed-forward (Fig. 13)",
+        (
+            "reading", "km/h", "best θ (°)", "least CF (N m)", "CF at π/6", "largest CF", "CF of FB alone",
+            "θ that cancels once per span (°)",
+        ),
+        tuple(rows),
+    )  # fmt: skip
+
+
+def _bands(results: Results) -> Table:
+    shown = {name: PARTS[name] for name in ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")}
+    rows = []
+    for speed, (name, policy) in product(SWEEP_SPEEDS, shown.items()):
+        result = results[Case(speed, policy)]
+        parts = (abs(result.once_per_span) / math.sqrt(2), *result.bands, result.raw_std)
+        rows.append((name, str(speed), *(f"{part:.1f}" for part in parts)))
+    return Table(
+        "What the contact force is made of: rms (N)",
+        ("control", "km/h", "once per span", *(f"{low:g}-{high:g} Hz" for low, high in BANDS), "all"),
+        tuple(rows),
+    )
+
+
+def _amplification() -> Table:
+    laws = {"FB, gain 1": (1.0, 0.0), f"FB, gain {GAIN}": (GAIN, 0.0), "damping 150 N s/m": (0.0, 150.0),
+            "both: gain 1, 150 N s/m": (1.0, 150.0)}  # fmt: skip
+    frequencies = (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 20, 25)
+    rows = tuple(
+        (f"{frequency}", *(f"{amplification(frequency, *law):.2f}" for law in laws.values()))
+        for frequency in frequencies
+    )
+    return Table("Linear model: contact force over the passive one's", ("frequency (Hz)", *laws), rows)
+
+
+def _speeds(results: Results) -> Table:
+    rows = []
+    for speed in SPEEDS:
+        passive, active = results[Case(speed)], results[Case(speed, control())]
+        rows += [("passive", speed, passive), (f"FB+FF, gain {GAIN}", speed, active)]
+    return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *FIGURES), _rows(rows))
+
+
+def _fine(results: Results) -> Table:
+    told = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    rows = [
+        (f"{name}, {told[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
+        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), told)
+    ]
+    return Table("Time step and grid", ("control, time step, grid", "km/h", *FIGURES), _rows(rows))
+
+
+def _other_line(results: Results) -> Table:
+    rows = [
+        (name, speed, results[Case(speed, policy, OTHER_LINE)])
+        for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
+    ]
+    return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *FIGURES), _rows(rows))
