@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ from ..errors import InputError
 from .output import Json, Plot, console, number, print_json, progress_console
 
 
-class Method(str, Enum):
+class Method(StrEnum):
     """The methods by short names."""
 
     printed = "equation-error"
@@ -66,7 +66,14 @@ def identify(
     chosen = found.fits.get(names[method])
     if chosen is None and (output is not None or plot is not None or not found.fits):
         raise InputError(f"{names[method].capitalize()}: {found.failures[names[method]]}")
-    checked = ident.matches(record, chosen.parameters) if chosen is not None else []
+    checked: list[Any] = []
+    if chosen is not None:
+        try:
+            checked = ident.matches(record, chosen.parameters)
+        except InputError as error:
+            if plot is not None:
+                raise
+            found.failures[f"the model by {chosen.method}"] = str(error)
     if output is not None and chosen is not None:
         force, source = _static_force(static_force, record.force, file)
         ident.write_pantograph(chosen, output, record=file.name, static_force=force, force_source=source)
@@ -116,8 +123,8 @@ def _static_force(given: float | None, force: Any, file: Path) -> tuple[float, s
 def _told(found: Any, checked: list[Any], method: Method) -> dict[str, Any]:
     return {
         "band": found.band,
-        "fits": {short.value: fit.as_dict() for short, fit in zip_methods(found.fits)},
-        "failures": {short.value: text for short, text in zip_methods(found.failures)},
+        "fits": {short.value: fit.as_dict() for short, fit in _by_short_name(found.fits)},
+        "failures": {short.value: text for short, text in _by_short_name(found.failures)},
         "method": method.value,
         "matches": [
             {
@@ -132,7 +139,7 @@ def _told(found: Any, checked: list[Any], method: Method) -> dict[str, Any]:
     }
 
 
-def zip_methods(by_method: dict[str, Any]) -> list[tuple[Method, Any]]:
+def _by_short_name(by_method: dict[str, Any]) -> list[tuple[Method, Any]]:
     """What is kept by a method's full name, by its short one."""
     from ..identification import METHODS
 
@@ -142,29 +149,30 @@ def zip_methods(by_method: dict[str, Any]) -> list[tuple[Method, Any]]:
 def _print(found: Any, checked: list[Any], chosen: str) -> None:
     from ..identification import UNITS
 
-    table = Table(title=f"Identified, excitation up to {found.band:.4g} Hz; ± 95 %, then RSD (%)")
-    table.add_column("parameter")
-    for method in found.fits:
-        table.add_column(method, justify="right")
-        table.add_column("RSD", justify="right")
+    table = Table(
+        title=f"Identified, ± 95 %, relative standard deviation; excitation up to {found.band:.4g} Hz"
+    )
+    table.add_column("")
+    for short, _ in _by_short_name(found.fits):
+        table.add_column(short.value, justify="right")
     names = next(iter(found.fits.values())).names
     for k, name in enumerate(names):
-        cells = [f"{name} ({UNITS[name]})"]
+        cells = []
         for fit in found.fits.values():
             half = (fit.interval[k, 1] - fit.interval[k, 0]) / 2
-            cells += [f"{fit.values[k]:.5g} ± {half:.2g}", number(fit.rsd[k], 2)]
-        table.add_row(*cells)
-    conditions = [cell for fit in found.fits.values() for cell in (f"{fit.condition:.5g}", "")]
-    table.add_row("condition number", *conditions)
+            cells.append(f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %")
+        table.add_row(f"{name} ({UNITS[name]})", *cells)
+    table.add_row("condition number", *(f"{fit.condition:.5g}" for fit in found.fits.values()))
     console.print(table)
     for fit in found.fits.values():
         if fit.undetermined:
             console.print(
-                f"[bold red]Warning:[/] {fit.method}: {', '.join(fit.undetermined)} not determined, the 95 % "
-                f"interval holds 0 (condition number {fit.condition:.4g}); excite more frequencies, or longer."
+                f"[bold red]Warning:[/] {fit.method}: {', '.join(fit.undetermined)} not determined, the "
+                f"95 % interval holds 0 (condition number {fit.condition:.4g}); excite more frequencies, "
+                "or record longer."
             )
     for method, text in found.failures.items():
-        console.print(f"[bold red]Warning:[/] {method} found nothing: {text}")
+        console.print(f"[bold red]Warning:[/] {method}: {text}")
     if not checked:
         return
     table = Table(title=f"Model by {chosen} beside the record")

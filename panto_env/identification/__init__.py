@@ -9,9 +9,10 @@ from .methods import METHODS, Identification, identify
 from .model import IDENTIFIED, MEASURED, UNITS, parameters_of
 from .output_error import OUTPUT_ERROR, fit_output_error
 from .pantograph_file import write_pantograph
-from .performance import Match, matches
+from .performance import Match, force_matches, matches
 from .record import Record
 from .record_file import read_record, write_record
+from .workers import pool
 
 __all__ = [
     "EXPERIMENTS",
@@ -35,10 +36,12 @@ __all__ = [
     "excited_band",
     "fit_equation_error",
     "fit_output_error",
+    "force_matches",
     "identify",
     "low_pass",
     "matches",
     "parameters_of",
+    "pool",
     "read_record",
     "run_trials",
     "three_points",

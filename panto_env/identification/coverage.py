@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Array
-from .experiments import DISPLACEMENT_NOISE, Excitation, add_noise, clean_record
+from .experiments import Excitation, add_noise, clean_record
 from .methods import identify
 from .model import IDENTIFIED, MEASURED, Parameters
 
@@ -37,25 +35,21 @@ def run_trials(
     tasks: list[tuple[Excitation, bool]],
     truth: Parameters,
     trials: int,
+    executor: Executor,
     *,
-    noise: float = DISPLACEMENT_NOISE,
-    workers: int | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> list[dict[str, Trials]]:
     """Trials of each excitation, with or without free offset, by method; seeds 0 to ``trials`` - 1.
 
-    noise: of the displacements, rms (m). workers: processes, one a core unless given.
+    The noise is that of ``add_noise``. executor: as ``workers.pool`` gives it. report: told the share done.
     """
     seeds = [range(first, min(first + CHUNK, trials)) for first in range(0, trials, CHUNK)]
     found: dict[tuple[int, int], dict[str, list[Array]]] = {}
     jobs = [(k, c) for k in range(len(tasks)) for c in range(len(seeds))]
-    with ProcessPoolExecutor(
-        workers or os.cpu_count(), mp_context=multiprocessing.get_context("spawn")
-    ) as executor:
-        futures = {executor.submit(_chunk, *tasks[k], dict(truth), seeds[c], noise): (k, c) for k, c in jobs}
-        for future in as_completed(futures):
-            found[futures[future]] = future.result()
-            report(len(found) / len(jobs))
+    futures = {executor.submit(_chunk, *tasks[k], dict(truth), seeds[c]): (k, c) for k, c in jobs}
+    for future in as_completed(futures):
+        found[futures[future]] = future.result()
+        report(len(found) / len(jobs))
     results = []
     for k in range(len(tasks)):
         methods = found[k, 0]
@@ -65,7 +59,7 @@ def run_trials(
 
 
 def _chunk(
-    excitation: Excitation, free_offset: bool, truth: Parameters, seeds: range, noise: float
+    excitation: Excitation, free_offset: bool, truth: Parameters, seeds: range
 ) -> dict[str, list[Array]]:
     """Values, standard deviations and whether inside, (3, 5) a trial, by method."""
     clean = clean_record(excitation, truth)
@@ -73,7 +67,7 @@ def _chunk(
     true = np.array([truth[name] for name in IDENTIFIED])
     rows: dict[str, list[Array]] = {}
     for seed in seeds:
-        noisy = add_noise(clean, np.random.default_rng(seed), displacement=noise)
+        noisy = add_noise(clean, np.random.default_rng(seed))
         found = identify(noisy, known, free_offset=free_offset)
         for method, fit in found.fits.items():
             low, high = fit.interval.T

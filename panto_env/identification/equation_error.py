@@ -59,39 +59,44 @@ def fit_equation_error(
     Raises InputError where the record does not determine the parameters at all.
     """
     known = check_known(known)
-    stride = 1
-    if band is not None:
-        record, stride = low_pass(record, band)
+    if band is None:
+        return solve(record, known, 1, free_offset, PRINTED)
+    kept, stride = low_pass(record, band)
+    return solve(kept, known, stride, free_offset, FILTERED)
+
+
+def solve(record: Record, known: Parameters, stride: int, free_offset: bool, method: str) -> Fit:
+    """Least squares on every ``stride``-th pair of equations; known values as ``check_known`` gives them.
+
+    Raises InputError where the columns of A depend on each other, or the equations are too few.
+    """
+    names = free_names(known)
     a, y = equations(record, known)
     a, y = a[:, ::stride], y[:, ::stride]
-    names = free_names(known)
     for name in set(IDENTIFIED) - set(names):
         y = y - known[name] * a[:, :, IDENTIFIED.index(name)]
     a = a[:, :, [IDENTIFIED.index(name) for name in names]]
     if free_offset:  # the same as a column of ones for each equation
         a, y = a - a.mean(axis=1, keepdims=True), y - y.mean(axis=1, keepdims=True)
     a, y = a.reshape(-1, len(names)), y.ravel()
-    dependence = _dependence(a, names)
-    # Columns of length 1: the same solution, without losing digits to units.
-    length = np.linalg.norm(a, axis=0)
-    q, r = np.linalg.qr(a / length)
-    values = np.linalg.solve(r, q.T @ y) / length
     freedom = len(y) - len(names) - 2 * free_offset
     if freedom < 1:
         raise InputError(f"The record leaves {len(y)} equations for {len(names)} parameters; record longer.")
-    variance = float(np.sum((y - a @ values) ** 2)) / freedom
-    inverse = np.linalg.inv(r)
-    std = np.sqrt(variance * (inverse**2).sum(axis=1)) / length
-    method = PRINTED if band is None else FILTERED
-    return Fit(method, known, names, values, std, float(np.linalg.cond(a)), dependence)
-
-
-def _dependence(a: Array, names: tuple[str, ...]) -> float:
-    """Condition number with columns of length 1. Raises InputError where they depend on each other."""
     length = np.linalg.norm(a, axis=0)
     if (length == 0).any():
         raise InputError(f"The record holds no motion that {names[int(np.argmin(length))]} acts on.")
-    _, singular, rows = np.linalg.svd(a / length, full_matrices=False)
+    # Columns of length 1: the same solution, without losing digits to units.
+    q, r = np.linalg.qr(a / length)
+    dependence = _dependence(r, names)
+    values = np.linalg.solve(r, q.T @ y) / length
+    variance = float(np.sum((y - a @ values) ** 2)) / freedom
+    std = np.sqrt(variance * (np.linalg.inv(r) ** 2).sum(axis=1)) / length
+    return Fit(method, known, names, values, std, float(np.linalg.cond(r * length)), dependence)
+
+
+def _dependence(r: Array, names: tuple[str, ...]) -> float:
+    """Condition number of R, (p, p), columns of length 1. Raises InputError where they are dependent."""
+    _, singular, rows = np.linalg.svd(r)
     dependence = float(singular[0] / singular[-1]) if singular[-1] > 0 else float("inf")
     if dependence > DEPENDENT:
         involved = [name for name, share in zip(names, rows[-1], strict=True) if abs(share) > 0.1]

@@ -62,9 +62,11 @@ def plot_matches(time: np.ndarray, found: Sequence[Match], title: str, first: fl
         )  # fmt: skip
         axis.set(ylabel=f"${name}$ ({unit})")
         axis.set_title(
-            f"fitting performance {match.performance:.1f} %, mean error {scale * match.mean_error:.3g} {unit}",
-            loc="right", fontsize="small",
-        )  # fmt: skip
+            f"fitting performance {match.performance:.1f} %, "
+            f"mean error {scale * match.mean_error:.3g} {unit}",
+            loc="right",
+            fontsize="small",
+        )
         axis.grid(color="0.9")
     axes[0].legend(loc="upper right", ncols=2, fontsize="small")
     axes[-1].set(xlabel="time (s)", xlim=(first, last))

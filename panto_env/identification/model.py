@@ -35,7 +35,7 @@ UNITS = {
 def check_known(known: Parameters) -> dict[str, float]:
     """Values known beforehand, all of MEASURED among them; any of IDENTIFIED may be fixed too.
 
-    Raises InputError for an unknown name, a missing one, a value that makes no sense, or nothing left to find.
+    Raises InputError for an unknown or missing name, a value that makes no sense, or nothing left to find.
     """
     for name, value in known.items():
         if name not in UNITS:

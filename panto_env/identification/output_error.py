@@ -12,10 +12,10 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
-from .equation_error import fit_equation_error
+from .equation_error import FILTERED, solve
 from .fit import Fit, free_names
 from .low_pass import low_pass
-from .model import IDENTIFIED, Parameters, check_known, matrices
+from .model import Parameters, check_known, matrices
 from .record import Record
 from .response import polynomials, respond
 
@@ -45,14 +45,14 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     from scipy.optimize import least_squares  # slow to import
 
     known = check_known(known)
-    start = fit_equation_error(record, known, band=band, free_offset=free_offset)
+    kept, stride = low_pass(record, band)
+    start = solve(kept, known, stride, free_offset, FILTERED)
     if start.dependence > IDENTIFIABLE:
         raise InputError(
-            f"The record does not determine {', '.join(start.names)} all at once: their columns nearly depend "
-            f"on each other (condition number {start.dependence:.2g}, lengths 1). Excite several frequencies, "
-            "as a sweep does, or measure one of them and give it with --measured."
+            f"The record does not determine {', '.join(start.names)} all at once: their columns nearly "
+            f"depend on each other (condition number {start.dependence:.2g}, lengths 1). Excite several "
+            "frequencies, as a sweep does, or measure one of them and give it with --measured."
         )
-    kept, stride = low_pass(record, band)
     guess = {n: max(v, START[n]) for n, v in zip(start.names, start.values, strict=True)}
     misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
@@ -69,12 +69,13 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     if not found.success:
         raise InputError(f"The output-error fit does not settle ({found.message}); check the record's units.")
     p = len(start.names)
+    values = np.where(found.active_mask[:p] == -1, 0.0, solution[:p]) * misfit.scale
     std = np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / length
     return Fit(
         OUTPUT_ERROR,
         known,
         start.names,
-        solution[:p] * misfit.scale,
+        values,
         std[:p] * misfit.scale,
         dependence,
         dependence,

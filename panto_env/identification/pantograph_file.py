@@ -41,9 +41,10 @@ def write_pantograph(
                 parts.append(f"{name} measured")
         return "; ".join(parts)
 
+    description = f"Identified from {record} by {fit.method}; two masses, no aerodynamic uplift."
     lines = [
         'kind = "pantograph"',
-        f"description = {_text(f'Identified from {record} by {fit.method}; two masses. No aerodynamic uplift.')}",
+        f"description = {_text(description)}",
         _entry("masses", [p["m2"], p["m3"]], source("m2", "m3")),
         _entry("stiffnesses", [p["k2"], p["k3"]], source("k2", "k3")),
         _entry("dampings", [p["c2"], p["c3"]], source("c2", "c3")),

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
-from .model import Parameters
+from .model import Parameters, matrices
 from .record import Record
-from .response import contact_force, rest_on_plate, under_force, under_plate
+from .response import contact_force, fitted_response, force_matrices
 
 
 @dataclass(frozen=True)
@@ -40,27 +40,39 @@ class Match:
 
 
 def matches(record: Record, parameters: Parameters) -> list[Match]:
-    """The model driven by the recorded plate, and by the recorded contact force where that is possible.
+    """The model driven by the recorded plate and, where it was recorded, by the contact force.
 
-    The force drives only a model whose parameters are all above 0; the paper validates so. The model
-    starts at rest, so the first second is the start's, not the model's.
+    The paper validates by the force. The state at the first sample, which nobody measures, is the one
+    that matches best. Raises InputError where the model is not stable.
     """
-    initial = rest_on_plate(parameters, float(record.plate[0]))
-    states = under_plate(parameters, record.plate, record.time_step, initial)
+    step = record.time_step
+    recorded = np.column_stack([record.head, record.support, record.plate])
+    states = fitted_response(*matrices(parameters), record.plate, step, [0, 1], recorded[:, :2])
     found = [
         Match("y_p2", "plate", record.head, states[:, 0]),
         Match("y_p3", "plate", record.support, states[:, 1]),
     ]
     if record.force is None:
         return found
-    force = contact_force(parameters, record.plate, states, record.time_step)
+    force = contact_force(parameters, record.plate, states, step)
     found.append(Match("force", "plate", record.force, force))
-    try:
-        driven = under_force(parameters, record.force, record.time_step)
-    except InputError:
-        return found
-    for k, (name, shown) in enumerate(
-        (("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support))
-    ):
-        found.append(Match(name, "force", shown, driven[:, k]))
+    if parameters["c1T"] > 0:
+        found += force_matches(record, parameters)
     return found
+
+
+def force_matches(record: Record, parameters: Parameters) -> list[Match]:
+    """y_p1, y_p2 and y_p3 of the model driven by the recorded contact force, as in paper 1's Table 5.
+
+    Raises InputError where no force was recorded, c1T is not above 0, or the model is not stable.
+    """
+    if record.force is None:
+        raise InputError("The record has no contact force to drive the model with.")
+    recorded = np.column_stack([record.head, record.support, record.plate])
+    a, b = force_matrices(parameters)
+    states = fitted_response(a, b, record.force, record.time_step, [0, 1, 4], recorded)
+    return [
+        Match("y_p1", "force", record.plate, states[:, 4]),
+        Match("y_p2", "force", record.head, states[:, 0]),
+        Match("y_p3", "force", record.support, states[:, 1]),
+    ]

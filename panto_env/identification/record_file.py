@@ -43,7 +43,7 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     lines = _lines(path)
     header, body = lines[0][1], lines[1:]
     columns = _columns(path, header, dict(units or {}))
-    values = {name: np.empty(len(body)) for name in columns}
+    values: dict[str, Array] = {name: np.empty(len(body)) for name in columns}
     for row, (number, cells) in enumerate(body):
         for name, (place, scale) in columns.items():
             text = cells[place].strip() if place < len(cells) else ""

@@ -69,24 +69,40 @@ def contact_force(parameters: Parameters, plate: Array, states: Array, time_step
     return np.asarray(parameters["k1T"] * (plate - states[:, 0]) + parameters["c1T"] * (speed - states[:, 2]))
 
 
-def under_force(parameters: Parameters, force: Array, time_step: float) -> Array:
-    """Displacements y_p1, y_p2, y_p3 (m), (n, 3), under a recorded contact force (N): paper 1's validation.
+def force_matrices(parameters: Parameters) -> tuple[Array, Array]:
+    """A, (5, 5), and B, (5, 2), under a contact force f: states [y_p2, y_p3, y_p2', y_p3', y_p1].
 
-    Starts at rest under the mean force. Raises InputError where a damper or spring is not above 0: the
-    plate is then without an equation of its own.
+    The plate has no mass: c1T (y_p1' - y_p2') = f - k1T (y_p1 - y_p2). Raises InputError where c1T is
+    not above 0: the plate is then without an equation of its own.
     """
-    if not min(parameters.values()) > 0:
-        raise InputError(
-            "The model can be driven by the contact force only if all its parameters are above 0."
-        )
-    k1, c1, m2 = (parameters[name] for name in ("k1T", "c1T", "m2"))
+    k1, c1 = parameters["k1T"], parameters["c1T"]
+    if not c1 > 0:
+        raise InputError(f"The contact force can drive the model only if c1T is above 0, not {c1:g}.")
     a, b = matrices(parameters)
-    # The plate has no mass: c1T (y_p1' - y_p2') = f - k1T (y_p1 - y_p2).
     whole, gain = np.zeros((5, 5)), np.zeros((5, 2))
-    whole[:4, :4] = a + np.outer(b[:, 1], [k1 / c1, 0.0, 1.0, 0.0])
-    whole[:4, 4] = b[:, 0] - b[:, 1] * k1 / c1
-    whole[4] = [k1 / c1, 0.0, 1.0, 0.0, -k1 / c1]
-    gain[2, 0], gain[4, 0] = 1 / m2, 1 / c1
-    initial = np.linalg.solve(whole, -gain[:, 0] * force.mean())
-    states = respond(whole, gain, polynomials(force, time_step), time_step, initial)
-    return states[:, [4, 0, 1]]
+    rate = np.array([k1 / c1, 0.0, 1.0, 0.0, -k1 / c1])
+    whole[:4, :4], whole[:4, 4] = a, b[:, 0]
+    whole[:4] += np.outer(b[:, 1], rate)
+    whole[4] = rate
+    gain[:4, 0] = b[:, 1] / c1
+    gain[4, 0] = 1 / c1
+    return whole, gain
+
+
+def fitted_response(
+    a: Array, b: Array, driver: Array, time_step: float, shown: list[int], recorded: Array
+) -> Array:
+    """States, (n, m), of x' = a x + b [u, u'], started so that states ``shown`` best match ``recorded``.
+
+    recorded: (n, len(shown)). Raises InputError where the model is not stable.
+    """
+    if np.linalg.eigvals(a).real.max() > 0:
+        raise InputError("The model is not stable with these parameters: its motion grows by itself.")
+    size = len(a)
+    inputs = polynomials(driver, time_step)
+    forced = respond(a, b, inputs, time_step, np.zeros(size))
+    free = np.array([respond(a, b, 0 * inputs, time_step, unit) for unit in np.eye(size)])
+    left = (recorded - forced[:, shown]).ravel()
+    columns = free[:, :, shown].reshape(size, -1).T
+    start = np.linalg.lstsq(columns, left, rcond=None)[0]
+    return np.asarray(forced + np.tensordot(start, free, 1))

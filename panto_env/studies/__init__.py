@@ -10,7 +10,7 @@ from .study import Comparison, Outcome, Report, Study, Table, write
 
 __all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
 
-STUDIES: tuple[str, ...] = ()
+STUDIES: tuple[str, ...] = ("paper1-identification",)
 """Names of all studies; the module of "paper3-parameters" is ``paper3_parameters``."""
 
 
