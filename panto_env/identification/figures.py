@@ -13,7 +13,7 @@ from .record import Record
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN = 4000
+SHOWN = 2000
 """Points drawn of a series at most: more cannot be seen and make files large."""
 
 
@@ -24,7 +24,7 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
     inside = record.time <= record.start + seconds
     step = max(1, int(inside.sum()) // SHOWN)
     time = record.time[inside][::step]
-    figure = Figure(figsize=(8, 7), layout="constrained")
+    figure = Figure(figsize=(7, 6.2), layout="constrained")
     series = [("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support)]
     forces = [] if record.force is None else [("f_1", record.force)]
     axes = figure.subplots(len(forces) + 3, 1, sharex=True)
@@ -46,29 +46,29 @@ def plot_matches(time: np.ndarray, found: Sequence[Match], title: str, first: fl
 
     inside = (time >= first) & (time <= last)
     step = max(1, int(inside.sum()) // SHOWN)
-    figure = Figure(figsize=(8, 0.8 + 1.9 * len(found)), layout="constrained")
+    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(found)), layout="constrained")
     axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
     for axis, match in zip(axes, found, strict=True):
         force = match.channel == "force"
         scale, unit = (1.0, "N") if force else (1e3, "mm")
         name = "f_1" if force else f"y_{{{match.channel[2:]}}}"
         axis.plot(
-            time[inside][::step], scale * match.recorded[inside][::step], color="0.6", linewidth=2.5,
-            label="record",
+            time[inside][::step], scale * match.recorded[inside][::step], color="tab:orange", linewidth=3,
         )  # fmt: skip
         axis.plot(
-            time[inside][::step], scale * match.modelled[inside][::step], color="tab:red", linewidth=1,
-            linestyle="--", label=f"model, driven by the {match.driven_by}",
+            time[inside][::step], scale * match.modelled[inside][::step], color="black", linewidth=0.8,
         )  # fmt: skip
         axis.set(ylabel=f"${name}$ ({unit})")
         axis.set_title(
-            f"fitting performance {match.performance:.1f} %, "
+            f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
             f"mean error {scale * match.mean_error:.3g} {unit}",
             loc="right",
             fontsize="small",
         )
         axis.grid(color="0.9")
-    axes[0].legend(loc="upper right", ncols=2, fontsize="small")
+    axes[0].plot([], [], color="tab:orange", linewidth=3, label="record")
+    axes[0].plot([], [], color="black", linewidth=0.8, label="model")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
     axes[-1].set(xlabel="time (s)", xlim=(first, last))
-    figure.suptitle(title)
+    figure.suptitle(title, fontsize="medium")
     return figure

@@ -45,7 +45,8 @@ SAMPLINGS = (200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
 
 NOISES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 SEEDS = 5  # a point of a figure or a median
-LAST_FREQUENCIES = (0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+LAST_FREQUENCIES = (0.3, 0.31, 0.33, 0.36, 0.4, 0.5, 0.7, 1.0, 2.0, 4.0)
+"""Of sweeps from 0.3 Hz; the first is no sweep but a sine."""
 
 
 def run(report: Report) -> Outcome:

@@ -16,7 +16,7 @@ from .paper1_published import PUBLISHED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SECONDS = 5.0
+SECONDS = 4.0
 """Shown of a record. Own choice: the paper's figures are not at hand, only their captions."""
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green")
@@ -76,11 +76,13 @@ def stiffness(
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
-    for (name, shown), colour in zip(list(clean.items())[::-1], ("tab:orange", "tab:blue"), strict=True):
+    for (name, shown), colour, width in zip(
+        list(clean.items())[::-1], ("tab:orange", "tab:blue"), (0.6, 2.5), strict=True
+    ):
         columns = equations(shown, known)[0][1]
         label = "sweep 0.3 to 4 Hz" if name == SWEEP.name else f"Experiment {name}, 1.42 Hz"
         displacement = 1e3 * (columns[:, 4] - columns[:, 4].mean())
-        left.plot(displacement[::4], columns[::4, 2], color=colour, linewidth=1.2, label=label)
+        left.plot(displacement[::4], columns[::4, 2], color=colour, linewidth=width, label=label)
     left.set(
         xlabel="column of $k_3$: $y_{p3}$ about its mean (mm)",
         ylabel="column of $m_3$: acceleration (m/s²)",
@@ -91,9 +93,12 @@ def stiffness(
     right.plot(last, sweeps[False], "s-", color="tab:green", label="offset kept, as printed")
     right.axhline(PUBLISHED[0].rsd[-1], color="0.3", linestyle=":", label="paper, Experiment I: one sine")
     right.set(
-        yscale="log", xlabel="last frequency of a sweep from 0.3 Hz (Hz)", ylabel="RSD of $k_3$ (%)",
+        xscale="log", yscale="log",
+        xlabel="last frequency of a sweep from 0.3 Hz (Hz)", ylabel="RSD of $k_3$ (%)",
         title="A sweep tells $k_3$ from $m_3$",
     )  # fmt: skip
+    right.set_xticks([0.3, 0.5, 1.0, 2.0, 4.0], ["0.3: a sine", "0.5", "1", "2", "4"])
+    right.minorticks_off()
     right.legend(fontsize="small")
     for axis in (left, right):
         axis.grid(color="0.9")
@@ -109,17 +114,18 @@ def convergence(
     """Errors of the equations as printed over the sampling step, and of all methods over the noise."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    figure = Figure(figsize=(11.5, 3.7), layout="constrained")
     axes = figure.subplots(1, 3)
     steps = 1e3 / np.array(rates)
     for name, errors in sampling.items():
-        axes[0].loglog(steps, np.abs(errors).max(axis=1), "o-", label=f"{name}, worst parameter (c2)")
+        axes[0].loglog(steps, np.abs(errors).max(axis=1), "o-", label=f"{name}: c2, the worst")
         axes[0].loglog(
             steps, np.abs(errors[:, 2:]).max(axis=1), "--", color=axes[0].lines[-1].get_color(), linewidth=0.9
         )
+    axes[0].plot([], [], "--", color="0.5", label="worst of m3, c3, k3")
     axes[0].set(
         xlabel="sampling step (ms)", ylabel="error (%)",
-        title="No noise, as printed; dashed: worst of m3, c3, k3",
+        title="No noise, as printed", ylim=(1e-6, 1e6),
     )  # fmt: skip
     for axis, (name, methods) in zip(axes[1:], noise.items(), strict=True):
         for method, colour in zip(METHODS, COLOURS, strict=True):
@@ -127,10 +133,11 @@ def convergence(
         label = "sweep, offset free" if name == SWEEP.name else f"Experiment {name}, offset kept"
         axis.set(xlabel="noise of the displacements, rms (µm)", ylabel="error of the worst parameter (%)")
         axis.set_title(f"{label}, 1 kHz")
+        axis.set_ylim(top=1e9)  # room for the legend
     for axis in axes:
         axis.axhline(0.5, color="0.3", linestyle=":", label="0.5 %")
         axis.grid(color="0.9")
-        axis.legend(fontsize="x-small")
+        axis.legend(fontsize="x-small", loc="upper left")
     return figure
 
 
