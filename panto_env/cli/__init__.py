@@ -15,7 +15,7 @@ def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
     import typer
 
-    from . import catalogue, reproduce, simulate, speed, sweep, validate
+    from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
         name="panto",
@@ -30,6 +30,7 @@ def main() -> None:
     app.command()(simulate.simulate)
     app.command()(sweep.sweep)
     app.command()(validate.validate)
+    app.command()(identify.identify)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     for point in sorted(entry_points(group=COMMANDS), key=lambda point: point.name):

@@ -10,7 +10,7 @@ from .study import Comparison, Outcome, Report, Study, Table, write
 
 __all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
 
-STUDIES: tuple[str, ...] = ("paper1-control", "paper3-parameters")
+STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper3-parameters")
 """Names of all studies; the module of "paper3-parameters" is ``paper3_parameters``."""
 
 

@@ -1,0 +1,50 @@
+"""Identification of a pantograph from records of a rig (paper 1, sections 2 to 4), and beyond."""
+
+from .coverage import Trials, run_trials
+from .equation_error import FILTERED, PRINTED, equations, fit_equation_error, three_points
+from .experiments import EXPERIMENTS, SWEEP, Excitation, add_noise, clean_record
+from .fit import Fit
+from .low_pass import excited_band, low_pass
+from .methods import METHODS, Identification, identify
+from .model import IDENTIFIED, MEASURED, UNITS, parameters_of
+from .output_error import OUTPUT_ERROR, fit_output_error
+from .pantograph_file import write_pantograph
+from .performance import Match, force_matches, matches
+from .record import Record
+from .record_file import read_record, write_record
+from .workers import pool
+
+__all__ = [
+    "EXPERIMENTS",
+    "FILTERED",
+    "IDENTIFIED",
+    "MEASURED",
+    "METHODS",
+    "OUTPUT_ERROR",
+    "PRINTED",
+    "SWEEP",
+    "UNITS",
+    "Excitation",
+    "Fit",
+    "Identification",
+    "Match",
+    "Record",
+    "Trials",
+    "add_noise",
+    "clean_record",
+    "equations",
+    "excited_band",
+    "fit_equation_error",
+    "fit_output_error",
+    "force_matches",
+    "identify",
+    "low_pass",
+    "matches",
+    "parameters_of",
+    "pool",
+    "read_record",
+    "run_trials",
+    "three_points",
+    "write_pantograph",
+    "write_record",
+]

@@ -1,0 +1,74 @@
+"""Pictures of records and of models beside them. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .performance import Match
+from .record import Record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = 2000
+"""Points drawn of a series at most: more cannot be seen and make files large."""
+
+
+def plot_record(record: Record, title: str, seconds: float) -> Figure:
+    """Contact force and displacements over the first ``seconds``, as paper 1's Figs 6 to 8."""
+    from matplotlib.figure import Figure
+
+    inside = record.time <= record.start + seconds
+    step = max(1, int(inside.sum()) // SHOWN)
+    time = record.time[inside][::step]
+    figure = Figure(figsize=(7, 6.2), layout="constrained")
+    series = [("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support)]
+    forces = [] if record.force is None else [("f_1", record.force)]
+    axes = figure.subplots(len(forces) + 3, 1, sharex=True)
+    for axis, (name, values) in zip(axes, forces + series, strict=True):
+        force = name.startswith("f")
+        axis.plot(time, (values if force else 1e3 * values)[inside][::step], color="tab:blue", linewidth=1)
+        axis.set(
+            ylabel=f"${name[:2] + '{' + name[2:] + '}' if not force else name}$ ({'N' if force else 'mm'})"
+        )
+        axis.grid(color="0.9")
+    axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
+    figure.suptitle(title)
+    return figure
+
+
+def plot_matches(time: np.ndarray, found: Sequence[Match], title: str, first: float, last: float) -> Figure:
+    """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
+    from matplotlib.figure import Figure
+
+    inside = (time >= first) & (time <= last)
+    step = max(1, int(inside.sum()) // SHOWN)
+    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(found)), layout="constrained")
+    axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, match in zip(axes, found, strict=True):
+        force = match.channel == "force"
+        scale, unit = (1.0, "N") if force else (1e3, "mm")
+        name = "f_1" if force else f"y_{{{match.channel[2:]}}}"
+        axis.plot(
+            time[inside][::step], scale * match.recorded[inside][::step], color="tab:orange", linewidth=3,
+        )  # fmt: skip
+        axis.plot(
+            time[inside][::step], scale * match.modelled[inside][::step], color="black", linewidth=0.8,
+        )  # fmt: skip
+        axis.set(ylabel=f"${name}$ ({unit})")
+        axis.set_title(
+            f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
+            f"mean error {scale * match.mean_error:.3g} {unit}",
+            loc="right",
+            fontsize="small",
+        )
+        axis.grid(color="0.9")
+    axes[0].plot([], [], color="tab:orange", linewidth=3, label="record")
+    axes[0].plot([], [], color="black", linewidth=0.8, label="model")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
+    axes[-1].set(xlabel="time (s)", xlim=(first, last))
+    figure.suptitle(title, fontsize="medium")
+    return figure

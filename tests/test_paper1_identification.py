@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+
+from panto_env import studies
+from panto_env.catalog import load_pantograph
+from panto_env.identification import IDENTIFIED, parameters_of
+from panto_env.studies.paper1_published import (
+    PUBLISHED,
+    best_performance,
+    dry_friction,
+    expected,
+    largest_mean_error,
+)
+
+TRUTH = parameters_of(load_pantograph("identified-2dof"))
+
+DIFFER = {
+    # Table 2's parameters do not give Table 1's motion.
+    "I, f_1, amplitude",
+    "II, f_1, amplitude",
+    "III, f_1, amplitude",
+    "I, y_p3, amplitude",
+    "II, y_p3, amplitude",
+    "III, y_p3, amplitude",
+    "I, best P_f of y_p1 by Tables 1 and 2",
+    "II, best P_f of y_p1 by Tables 1 and 2",
+    "III, best P_f of y_p1 by Tables 1 and 2",
+    # Table 5 against Eq. 9.
+    "I, y_p1, largest mean error that the printed P_f allows",
+    # Noise and sampling of the paper's records are not known.
+    "I, condition number",
+    "II, condition number",
+    "III, condition number",
+    # Least squares on derivatives of noise.
+    "lowest coverage, equation error",
+    "lowest coverage, equation error, low-passed",
+}
+
+
+def test_catalogue_holds_table_2():
+    assert tuple(TRUTH[name] for name in IDENTIFIED) == PUBLISHED[0].values
+
+
+def test_offsets_of_table_1_follow_from_table_2():
+    for printed in PUBLISHED:
+        _, *displacements = expected(TRUTH, printed)
+        for _, _, ours, _, paper in displacements:
+            assert ours == pytest.approx(paper, abs=0.1)
+
+
+def test_force_of_table_1_needs_about_one_newton_of_dry_friction():
+    friction = [dry_friction(TRUTH, printed) for printed in PUBLISHED]
+    np.testing.assert_allclose(friction, [0.979, 1.172, 1.083], atol=0.002)
+    best = [best_performance(TRUTH, printed) for printed in PUBLISHED]
+    np.testing.assert_allclose(best, [-37.4, -158.0, -49.0], atol=0.2)
+
+
+def test_dry_friction_found_by_harmonic_balance_gives_the_force_back():
+    """A square wave of friction added to the sine, its first harmonic by quadrature."""
+    phase = np.linspace(0, 2 * np.pi, 20_001)[:-1]
+    for printed in PUBLISHED:
+        amplitude = expected(TRUTH, printed)[0][1]
+        force = 1e-3 * printed.amplitudes[0] * _complex_force(printed)
+        assert abs(force) == pytest.approx(amplitude)
+        wave = (force * np.exp(1j * phase)).imag + dry_friction(TRUTH, printed) * np.sign(np.cos(phase))
+        harmonic = 2 * np.mean(wave * np.exp(-1j * phase))
+        assert abs(harmonic) == pytest.approx(printed.force[0], rel=1e-3)
+
+
+def _complex_force(printed):
+    from panto_env.studies.paper1_published import per_plate
+
+    return per_plate(TRUTH, printed.frequency)[0]
+
+
+def test_mean_error_of_experiment_1_exceeds_what_eq_9_allows():
+    assert [largest_mean_error(PUBLISHED[0], k) for k in range(3)] == pytest.approx(
+        [0.1715, 0.1757, 0.1674], abs=1e-4
+    )
+    assert all(largest_mean_error(PUBLISHED[0], k) < PUBLISHED[0].mean_error[k] - 0.05 for k in range(3))
+    assert all(largest_mean_error(PUBLISHED[1], k) > PUBLISHED[1].mean_error[k] for k in range(3))
+
+
+@pytest.fixture(scope="module")
+def outcome():
+    return studies.find_study("paper1-identification")(lambda what, share: None)
+
+
+@pytest.mark.slow
+def test_comparisons_agree_but_for_those_named(outcome):
+    assert {each.quantity for each in outcome.comparisons if not each.agrees} == DIFFER
+    assert all(each.note for each in outcome.comparisons if not each.agrees)
+
+
+@pytest.mark.slow
+def test_numbers_are_those_of_the_document(outcome):
+    ours = {each.quantity: each.ours for each in outcome.comparisons}
+    for quantity, value, within in (
+        ("I, condition number", 969.4, 10),
+        ("II, condition number", 1977, 30),
+        ("III, condition number", 1715, 30),
+        ("I, f_1, amplitude", 0.7708, 1e-3),
+        ("lowest coverage, output error", 94.0, 2.0),
+        ("lowest coverage, equation error", 0.0, 0.0),
+        ("lowest fitting performance", 99.59, 0.05),
+    ):
+        assert ours[quantity] == pytest.approx(value, abs=within), quantity
+    for name, least in (("I", 100), ("II", 100), ("III", 100)):
+        assert ours[f"{name}, RSD of k3"] > least
+    sweeps = outcome.numbers["sweep_rsd_k3"]["free"]
+    assert sweeps[0] > 100  # a sine
+    assert sweeps[-1] < 0.2  # a sweep to 4 Hz
+    errors = np.abs(outcome.numbers["sampling"]["errors_percent"]["I"]).max(axis=1)
+    assert errors[-1] < 0.5 < errors[-3]
+
+
+@pytest.mark.slow
+def test_figures_and_numbers_are_written(outcome, tmp_path):
+    files = {path.name for path in studies.write(outcome, tmp_path)}
+    assert {f"figure-{k}.png" for k in range(6, 12)} < files
+    assert {
+        "numbers.json",
+        "rsd-and-condition.png",
+        "stiffness-k3.png",
+        "convergence.png",
+        "coverage.png",
+    } < files
+    assert max((tmp_path / name).stat().st_size for name in files) < 150_000
