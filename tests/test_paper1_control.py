@@ -22,6 +22,7 @@ from panto_env.studies.paper1_control.cases import (
     SAMPLED,
     SHOWN_SPEEDS,
     THETAS,
+    USUAL,
     Case,
     all_cases,
     control,
@@ -66,7 +67,7 @@ def test_a_lane_is_the_pass_that_simulate_makes() -> None:
     for case, record in zip(cases, records(cases), strict=True):
         alone = simulate(
             LINE, PANTOGRAPH, 400, case.policy, actuator="realistic", control_interval=SAMPLED,
-            distance=record.position[-1],
+            distance=record.position[-1], **USUAL,
         )  # fmt: skip
         n = len(alone.contact_force)
         assert n > 0.98 * len(record.contact_force)

@@ -22,7 +22,7 @@ from ...metrics import Figures
 from ...task import Task
 from ...task.policy import find_policy
 from ...trajectory import Trajectory
-from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, Case
+from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, USUAL, Case
 
 BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
 """Bands of frequency (Hz) by which the contact force is told apart; the mean belongs to none."""
@@ -83,7 +83,7 @@ def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Traject
         control_interval=case.control_interval,
         distance=RUN_SPANS * line.span_length,
         lanes=len(cases),
-        **(FINE if case.fine else {}),
+        **(FINE if case.fine else USUAL),
     )
     policies = [find_policy(each.policy) for each in cases]
     for lane, policy in enumerate(policies):
