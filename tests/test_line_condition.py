@@ -82,7 +82,7 @@ def test_many_slack_droppers_agree_with_finite_elements(name):
     data, condition = load_catenary(name), LineCondition(dropper_scatter=0.02)
     system, line = build(data, 6, 0.1), DefectiveLine(data, 6, condition)
     for seed in range(5):
-        scatter = draw(condition, np.random.default_rng(seed), 54).scatter
+        scatter = draw([condition], np.random.default_rng(seed), 54).scatter
         state = line.solve(scatter)
         change, tension = judged(system, data, condition, scatter=scatter)
         np.testing.assert_allclose(state.tension, tension, atol=0.5)
@@ -130,7 +130,9 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     data = load_catenary(BENCHMARK)
     data = data.model_copy(update={"damping": Rayleigh(alpha=2.0, beta=1e-4)})
     condition = LineCondition(miscut_droppers=[(3, 4, 0.02)])
-    plant = Plant(data, load_pantograph(BENCHMARK), spans=5, numerics=Numerics(**WHOLE), condition=condition)
+    plant = Plant(
+        data, load_pantograph(BENCHMARK), spans=5, numerics=Numerics(**WHOLE), conditions=[condition]
+    )
     at, system = 2 * 55 + 21.75, build(data, 5, 0.25)
     node = int(np.argmin(np.abs(system.nodes - at)))
     heights, slack = np.zeros(5000), []
@@ -257,11 +259,11 @@ def test_lanes_with_droppers_of_their_own_equal_single_runs_bit_for_bit():
 
 def test_scatter_is_drawn_after_the_phases():
     fair, scattered = LineCondition(irregularity=1.0), LineCondition(irregularity=1.0, dropper_scatter=0.01)
-    plain, drawn = (draw(c, np.random.default_rng(3), 90) for c in (fair, scattered))
+    plain, drawn = (draw([c], np.random.default_rng(3), 90) for c in (fair, scattered))
     np.testing.assert_array_equal(plain.waves, drawn.waves)
     assert plain.scatter is None
     assert drawn.scatter.std() == pytest.approx(0.01, rel=0.2)
-    np.testing.assert_array_equal(drawn.scatter, draw(scattered, np.random.default_rng(3), 90).scatter)
+    np.testing.assert_array_equal(drawn.scatter, draw([scattered], np.random.default_rng(3), 90).scatter)
 
 
 @pytest.mark.parametrize(

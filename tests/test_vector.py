@@ -128,3 +128,42 @@ def test_bad_resets_are_refused():
     env.reset(seed=0)
     with pytest.raises(InputError, match="reset_mask must be 3 booleans"):
         env.reset(options={"reset_mask": np.ones(2, bool)})
+
+
+def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
+    scattered = {
+        "pantograph_scatter": 0.1,
+        "line_condition": ["new", "worn", {"broken_droppers": [(2, 4)]}],
+        "speed_kmh": (200, 320),
+    }
+    env = gymnasium.make_vec(
+        "Pantograph-v0", num_envs=5, vectorization_mode="vector_entry_point", distance=200.0, **scattered
+    )
+    observations, _ = env.reset(seed=3)
+    singles = [gymnasium.make("Pantograph-v0", distance=200.0, **scattered) for _ in range(5)]
+    for lane, single in enumerate(singles):
+        np.testing.assert_array_equal(observations[lane], single.reset(seed=3 + lane)[0])
+    actions = np.random.default_rng(0).uniform(-1, 1, (5, 1)).astype(np.float32)
+    for _ in range(150):
+        observations, rewards, *_ = env.step(actions)
+        for lane, single in enumerate(singles):
+            seen, reward, *_ = single.step(actions[lane])
+            np.testing.assert_array_equal(observations[lane], seen)
+            assert rewards[lane] == reward
+    body = env.unwrapped.task.plant.body
+    assert len({body.transition[variety].tobytes() for variety in body.variety}) == 5
+    waves = env.unwrapped.task.plant.run.waves
+    assert {int(np.count_nonzero(waves[:, 0, lane])) for lane in range(5)} == {0, 4}
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"pantograph_scatter": 2}, "pantograph_scatter must lie in 0 to 0.3, not 2"),
+        ({"line_condition": []}, "line_condition must name at least one condition"),
+        ({"line_condition": ["new", "rusty"]}, "line_condition must be 'new' or"),
+    ],
+)
+def test_scatter_that_is_not_valid(settings, message):
+    with pytest.raises(InputError, match=message):
+        gymnasium.make("Pantograph-v0", **settings)

@@ -25,6 +25,7 @@ SETTINGS = (
     "actuator",
     "sensors",
     "line_condition",
+    "pantograph_scatter",
     "observation",
     "reward",
     "distance",
@@ -89,10 +90,11 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Arguments
     `catenary`, `pantograph` (catalogue names or TOML files), `speed_kmh` (a number or a range to draw
     from), `actuator` ("ideal", "realistic" or a table), `sensors` (likewise), `line_condition` ("new",
-    "fair", "worn" or a table), `observation` ("measured" or "full"), `reward` (a table of weights),
-    `distance` (m), `spans`, `control_interval` (s), `time_step` (s), `spacing` (grid, m),
-    `window` (spans computed about the train), `precision`, `bilateral`
-    (let the contact pull, as paper 3's equations do), `render_mode` (None or "rgb_array").
+    "fair", "worn" or a table; of a list one is drawn for each episode), `pantograph_scatter` (rms
+    relative difference of masses, springs and dampers, drawn for each episode), `observation` ("measured"
+    or "full"), `reward` (a table of weights), `distance` (m), `spans`, `control_interval` (s),
+    `time_step` (s), `spacing` (grid, m), `window` (spans computed about the train), `precision`,
+    `bilateral` (let the contact pull, as paper 3's equations do), `render_mode` (None or "rgb_array").
     `reset(options=...)` takes the same for one episode, but those that change a space.
 
     ## Version History

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
@@ -73,14 +74,18 @@ LINE_CONDITIONS = {
 
 @dataclass(frozen=True)
 class DrawnLine:
-    """What is random about one line, drawn."""
+    """One line in a condition, with what is random about it drawn."""
 
-    waves: Array  # (waves, 3): irregularity as amplitude (m), turns a metre (1/m), phase in turns
+    condition: LineCondition
+    waves: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(waves, 3): irregularity as amplitude (m), turns a metre (1/m), phase in turns."""
     scatter: Array | None = None  # (droppers,): length errors (m); None where there are none
 
 
-def draw(condition: LineCondition, random: np.random.Generator, droppers: int = 0) -> DrawnLine:
-    """Draw one line of so many droppers in this condition."""
+def draw(conditions: Sequence[LineCondition], random: np.random.Generator, droppers: int = 0) -> DrawnLine:
+    """Draw one line of so many droppers in one of these conditions."""
+    choice = int(random.integers(len(conditions))) if len(conditions) > 1 else 0
+    condition = conditions[choice]
     rows = []
     if condition.irregularity > 0:
         phases = random.uniform(0, 1, len(IRREGULARITY))
@@ -91,5 +96,5 @@ def draw(condition: LineCondition, random: np.random.Generator, droppers: int = 
         rows.append((condition.wear_depth / 2, 1 / condition.wear_wavelength, 0.5))
     waves = np.array(rows).reshape(-1, 3)
     if condition.dropper_scatter == 0:
-        return DrawnLine(waves)
-    return DrawnLine(waves, condition.dropper_scatter * random.standard_normal(droppers))
+        return DrawnLine(condition, waves)
+    return DrawnLine(condition, waves, condition.dropper_scatter * random.standard_normal(droppers))

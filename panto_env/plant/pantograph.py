@@ -94,6 +94,16 @@ def equip(body: Body, variety: int, pantograph: PantographData, massless: bool, 
     body.strip[variety] = compliance, pantograph.contact_damping / time_step
 
 
+def vary(pantograph: PantographData, scatter: float, random: np.random.Generator) -> PantographData:
+    """A pantograph whose masses, springs and dampers differ at random, by ``scatter`` rms (relative)."""
+
+    def drawn(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(np.asarray(values) * np.exp(scatter * random.standard_normal(len(values))))
+
+    chain = {name: drawn(getattr(pantograph, name)) for name in ("masses", "stiffnesses", "dampings")}
+    return pantograph.model_copy(update=chain)
+
+
 def rest(pantograph: PantographData, lift: float, wire: float, compliance: float) -> Array:
     """State, (2n,), in static equilibrium under ``lift`` (N) against a point of the wire.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,15 +32,16 @@ class Plant:
         spans: int | None = None,
         numerics: Numerics | None = None,
         actuator: actuators.Actuator | None = None,
-        condition: LineCondition | None = None,
+        conditions: Sequence[LineCondition] = (LineCondition(),),
         bilateral: bool = False,
         varied: bool = False,
     ) -> None:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
-        condition: what differs from the line as designed. bilateral: let the contact pull, as paper 3's
-        equations do. varied: each lane may have a pantograph that differs in its values. Raises
-        InputError where grid and step are not usable, or the line has not what is said to be defective.
+        conditions: what may differ from the line as designed, one for each run. bilateral: let the
+        contact pull, as paper 3's equations do. varied: each lane may have a pantograph that differs in
+        its values. Raises InputError where grid and step are not usable, or the line has not what is said
+        to be defective.
         """
         numerics = numerics or Numerics()
         if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
@@ -61,16 +62,17 @@ class Plant:
         self.drive = actuators.drive(self.actuator, self.time_step, lanes)
         self.supports = self.model.supports(catenary, self.spans)
         self.droppers = self.model.droppers(catenary, self.spans)
-        self.condition = condition or LineCondition()
+        self._conditions = tuple(conditions)
         self._static_tension = self.model.static_tension(catenary, self.spans)[None]
-        if self.condition.defective:
+        self._defective: dict[LineCondition, Any] = {}
+        if any(condition.defective for condition in self._conditions):
             self._make_defective()
         self._advance: Callable[..., Any] | None = None
 
         table = coupling.lane_table(coupling.STATE + size, lanes)
         self.run = Run(
             lanes=table,
-            waves=np.zeros((self.condition.waves, 3, lanes)),
+            waves=np.zeros((max(condition.waves for condition in self._conditions), 3, lanes)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
 
@@ -90,14 +92,18 @@ class Plant:
                 "Only a flexible catenary has droppers and supports that can be defective, and line "
                 f"'{self.catenary.name}' is none."
             )
-        self._defective = self.model.DefectiveLine(self.catenary, self.spans, self.condition)
-        rows = self.lanes if self.condition.dropper_scatter else 1
-        self.line = self._defective.room(self.line, rows)
+        for condition in self._conditions:
+            self._defective[condition] = self.model.DefectiveLine(self.catenary, self.spans, condition)
+        first = self._conditions[0]
+        self._lines_differ = len(self._conditions) > 1 or first.dropper_scatter > 0
+        rows = self.lanes if self._lines_differ else 1
+        self.line = self._defective[first].room(self.line, rows)
         self._static_tension = np.repeat(self._static_tension, rows, axis=0)
-        self._impose_defects(0, None)
+        self._impose_defects(0, DrawnLine(first))
 
-    def _impose_defects(self, row: int, scatter: Array | None) -> None:
-        self._static_tension[row] = self._defective.impose(self.line, row, scatter).tension
+    def _impose_defects(self, row: int, drawn: DrawnLine) -> None:
+        state = self._defective[drawn.condition].impose(self.line, row, drawn.scatter)
+        self._static_tension[row] = state.tension
 
     @property
     def lanes(self) -> int:
@@ -146,9 +152,11 @@ class Plant:
         data = pantograph_data or self.pantograph
         if pantograph_data is not None:
             self._equip(variety, data)
-        run.waves[:, :, lane] = 0.0 if drawn is None else drawn.waves
-        if self.condition.dropper_scatter:
-            self._impose_defects(lane, None if drawn is None else drawn.scatter)
+        drawn = drawn or DrawnLine(self._conditions[0])
+        run.waves[:, :, lane] = 0.0
+        run.waves[: len(drawn.waves), :, lane] = drawn.waves
+        if self._defective and self._lines_differ:
+            self._impose_defects(lane, drawn)
         height, wire, spring = self.model.start_point(self.line)
         height += float(run.waves[:, 0, lane] @ np.cos(2 * np.pi * run.waves[:, 2, lane]))
         strip = float(self.body.strip[variety, 0])

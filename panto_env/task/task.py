@@ -16,6 +16,7 @@ from ..plant.actuator import ACTUATORS, Actuator
 from ..plant.held import bind
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from ..plant.numerics import Numerics
+from ..plant.pantograph import vary
 from ..plant.plant import Plant
 from ..plant.sensor import SENSORS, Sensors
 from ..settings import parse
@@ -50,6 +51,7 @@ class Task:
         actuator: Any = "ideal",
         sensors: Any = "ideal",
         line_condition: Any = "new",
+        pantograph_scatter: float = 0.0,
         observation: str = "measured",
         reward: Any = None,
         distance: float | None = None,
@@ -66,18 +68,24 @@ class Task:
     ) -> None:
         """Build the plant and the arrays of an episode.
 
-        catenary, pantograph: catalogue names, TOML files or entries. speed_kmh: a number or a range
-        to draw from. actuator, sensors, line_condition, reward: a preset's name, a table, or the
-        settings. distance: of an episode (m), to the end of the line by default; a line too short
-        for it gets more spans. time_step (s), spacing (m), window, precision: see ``Numerics``.
-        bilateral: let the contact pull, as paper 3's equations do. keep_samples: keep those of a whole
-        episode, for ``trajectory``; without them figures are kept as the episode runs.
-        Raises InputError for what is not valid.
+        catenary, pantograph: catalogue names, TOML files or entries. speed_kmh: a number or a range to
+        draw from. actuator, sensors, line_condition, reward: a preset's name, a table, or the settings;
+        of a list of line conditions one is drawn for each episode. pantograph_scatter: rms difference of
+        masses, springs and dampers, relative, drawn likewise. distance: of an episode (m), to the end of
+        the line by default; a line too short for it gets more spans. time_step (s), spacing (m), window,
+        precision: see ``Numerics``. bilateral: let the contact pull, as paper 3's equations do.
+        keep_samples: keep those of a whole episode, for ``trajectory``; without them figures are kept as
+        the episode runs. Raises InputError for what is not valid.
         """
         line, panto = load_catenary(catenary), load_pantograph(pantograph)
         self.actuator = parse(Actuator, actuator, "actuator", ACTUATORS)
         self.sensors = parse(Sensors, sensors, "sensors", SENSORS)
-        self.condition = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
+        conditions = line_condition if isinstance(line_condition, list | tuple) else [line_condition]
+        self._conditions = [
+            parse(LineCondition, condition, "line_condition", LINE_CONDITIONS) for condition in conditions
+        ]
+        if not self._conditions:
+            raise InputError("line_condition must name at least one condition.")
         reward_settings = parse(Reward, {} if reward is None else reward, "reward")
         if observation not in obs.OBSERVATIONS:
             raise InputError(
@@ -85,6 +93,9 @@ class Task:
             )
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
+        if not (isinstance(pantograph_scatter, int | float) and 0 <= pantograph_scatter <= 0.3):
+            raise InputError(f"pantograph_scatter must lie in 0 to 0.3, not {pantograph_scatter!r}.")
+        self._pantograph_scatter = pantograph_scatter
         if distance is not None:
             if not (isinstance(distance, int | float) and math.isfinite(distance) and distance > 0):
                 raise InputError(f"distance must be a positive number (m), not {distance!r}.")
@@ -99,8 +110,9 @@ class Task:
             spans=spans,
             numerics=numerics,
             actuator=self.actuator,
-            condition=self.condition,
+            conditions=self._conditions,
             bilateral=bilateral,
+            varied=pantograph_scatter > 0,
         )
         self.lanes = lanes
         self.distance = self.plant.line_end if distance is None else float(distance)
@@ -187,11 +199,15 @@ class Task:
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
     def reset(self, lane: int, random: np.random.Generator) -> None:
-        """Start an episode in one lane: draw its speed and its line."""
+        """Start an episode in one lane: draw its speed, its line and its pantograph."""
         low, high = self.speed_range
         speed = low if low == high else float(random.uniform(low, high))
         plant, episode = self.plant, self.episode
-        plant.start(lane, speed, draw(self.condition, random, len(plant.droppers)))
+        line = draw(self._conditions, random, len(plant.droppers))
+        pantograph = None
+        if self._pantograph_scatter > 0:
+            pantograph = vary(plant.pantograph, self._pantograph_scatter, random)
+        plant.start(lane, speed, line, pantograph)
         self.speed[lane] = speed
         end = self._steps(speed)
         column = episode.lanes[:, lane]
