@@ -23,8 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # nothing, so without Numba's run-time they need not count references to the arrays they are given.
 OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
 PART: dict[str, Any] = OPTIONS | {"forceinline": True}
-"""Options of a part of a kernel: always inlined, since passing tuples of arrays by value costs more
-than most parts do."""
+"""Options of a catenary's overloads: inlined by the compiler, as a call costs as much as most parts do."""
 
 
 @cache
@@ -71,6 +70,6 @@ def kernel(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """Compile a part of kernels with Numba, inlined where it is called."""
+    """A part of kernels, inlined where it is called before types are known, as if it were written there."""
     compiled: F = numba.njit(inline="always", **OPTIONS)(function)
     return compiled
