@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from .catalog import load_catenary
+from .catalog.schema import FlexibleCatenaryData
 from .metrics import low_pass
+from .plant.catenary import flexible
 from .plant.numerics import Numerics
 from .simulation import simulate
 from .trajectory import Trajectory
@@ -78,13 +81,23 @@ DISCRETISATIONS = (
     Numerics(spacing=0.125, time_step=2.5e-4, window=WHOLE, precision="double"),
     Numerics(spacing=0.25, time_step=5e-4, window=WHOLE, precision="double"),
     Numerics(spacing=0.25, time_step=1e-3, window=WHOLE, precision="double"),
-    Numerics(spacing=0.5, time_step=2e-3, window=WHOLE, precision="double"),
-    Numerics(spacing=1 / 3, time_step=2e-3, window=WHOLE, precision="double"),
-    Numerics(spacing=1 / 3, time_step=2e-3, window=WHOLE, precision="single"),
+    Numerics(spacing=1 / 3, time_step=2e-3, window=WHOLE, precision="double"),  # the default until 2.5 ms
+    Numerics(spacing=0.5, time_step=2.5e-3, window=WHOLE, precision="double"),
+    Numerics(window=WHOLE, precision="double"),
+    Numerics(window=WHOLE),
     Numerics(),
     Numerics(window=5),
 )
 """Rows of the convergence table; the first is taken as converged."""
+
+
+def in_use(numerics: Numerics) -> Numerics:
+    """The same with the time step and the grid that the reference line takes where they are None."""
+    line, step = load_catenary(REFERENCE_MODEL), numerics.time_step or flexible.TIME_STEP
+    assert isinstance(line, FlexibleCatenaryData)
+    spacing = line.span_length / flexible.nodes_per_span(line, numerics.spacing, step)
+    return numerics.model_copy(update={"time_step": step, "spacing": spacing})
+
 
 WINDOWS = (3, 5, 7, 9, 11)
 WINDOW_LINES = (("en50318-2002", "en50318-2002"), ("benchmark-2015", "benchmark-2015"))

@@ -74,7 +74,7 @@ def _print_checks(checks: list[validation.Check]) -> None:
 def _convergence() -> list[dict[str, Any]]:
     rows = []
     for numerics in validation.DISCRETISATIONS:
-        keys = numerics.model_dump()
+        keys = validation.in_use(numerics).model_dump()
         with progress_console.status(str(numerics)):
             runs = validation.reference_runs(**keys)
         for run in runs:
@@ -96,7 +96,7 @@ def _print_convergence(rows: list[dict[str, Any]]) -> None:
             values = (row["mean"], row["std"], relative, row["max"], row["min"], 1e3 * row["max_uplift"])
             table.add_row(
                 f"{speed:g}",
-                "auto" if row["spacing"] is None else f"{row['spacing']:.3g}",
+                f"{row['spacing']:.3g}",
                 f"{1e3 * row['time_step']:g}",
                 str(row["window"] or "all"),
                 row["precision"],
