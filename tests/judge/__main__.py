@@ -1,4 +1,4 @@
-"""The flexible catenary beside its judge: ``python -m tests.judge``."""
+"""The flexible catenary, by default and converged, beside its judge: ``python -m tests.judge``."""
 
 from __future__ import annotations
 
