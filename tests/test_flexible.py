@@ -137,6 +137,15 @@ def test_default_grid_and_step_are_converged(speed):
     assert run.summary((5, 6)).std == pytest.approx(fine.summary((5, 6)).std, rel=0.01)
 
 
+def test_default_is_three_per_cent_low_at_350_kmh():
+    """As docs/validation.md says: waves ahead of the train are short there."""
+    runs = [
+        simulate(speed_kmh=350.0, **each) for each in ({}, {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE)
+    ]
+    ours, fine = (run.summary((5, 6)).std for run in runs)
+    assert 100 * (ours / fine - 1) == pytest.approx(-3.09, abs=0.2)
+
+
 def test_droppers_go_slack_under_the_pantograph(reference_run):
     assert reference_run.dropper_force.min() == 0.0
     assert 0.001 < (reference_run.dropper_force == 0).mean() < 0.2

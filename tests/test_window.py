@@ -23,7 +23,7 @@ def swinging(line, wire):
     u, d = wire.displacement[0].astype(float), wire.increment[0].astype(float)
     total = 0.0
     for w, (mass, tension) in enumerate(((1.35, 20e3), (1.07, 16e3))):
-        total += mass * line.spacing * (d[w] ** 2).sum() / 2 / 2e-3**2
+        total += mass * line.spacing * (d[w] ** 2).sum() / 2 / flexible.TIME_STEP**2
         total += tension * (np.diff(u[w]) ** 2).sum() / 2 / line.spacing
     return total
 
@@ -41,7 +41,7 @@ def test_ends_let_waves_out(precision):
     middle = 13.5 * line.span_length
     wait(built, wire, middle, 1)
     before = swinging(built, wire)
-    wait(built, wire, middle, 1250)  # 2.5 s: the pulse has met each end once
+    wait(built, wire, middle, round(2.5 / flexible.TIME_STEP))  # 2.5 s: the pulse has met each end once
     assert swinging(built, wire) < 1e-5 * before
 
 
@@ -68,4 +68,5 @@ def test_default_window_agrees_with_the_whole_line(catenary, pantograph, speed):
     (check,) = validation.check_windows(catenary, pantograph, speed, [Numerics().window])
     assert abs(check.std) < 2
     assert abs(check.max) < 2
-    assert abs(check.min) < 2.1  # % of the mean force; 2.0 at 200 km/h on benchmark-2015
+    assert abs(check.min) < 2.1  # % of the mean force; 2.03 at 200 km/h on benchmark-2015
+    assert abs(check.uplift) < 2

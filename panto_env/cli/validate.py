@@ -18,6 +18,9 @@ def validate(
     window: Annotated[
         bool, typer.Option("--window", help="Print how travelling windows compare with a whole line.")
     ] = False,
+    wear: Annotated[
+        bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -34,17 +37,21 @@ def validate(
         figures.save(figures.plot_forces(runs, labels, validation.SPANS, title), plot)
     table = _convergence() if convergence else []
     windows = _windows() if window else []
+    worn = _worn() if wear else []
     passed = all(check.inside for check in checks)
     if json:
         rows = [vars(check) | {"inside": check.inside} for check in checks]
         told = {"passed": passed, "checks": rows, "convergence": table}
-        print_json(told | {"windows": [vars(each) for each in windows]})
+        told |= {"windows": [vars(each) for each in windows]}
+        print_json(told | {"wear": [vars(each) for each in worn]})
     else:
         _print_checks(checks)
         if convergence:
             _print_convergence(table)
         if window:
             _print_windows(windows)
+        if wear:
+            _print_wear(worn)
         console.print("All figures inside." if passed else "[bold red]Not all figures are inside.")
     if not passed:
         raise typer.Exit(1)
@@ -74,9 +81,9 @@ def _print_checks(checks: list[validation.Check]) -> None:
 def _convergence() -> list[dict[str, Any]]:
     rows = []
     for numerics in validation.DISCRETISATIONS:
-        keys = numerics.model_dump()
+        keys = validation.in_use(numerics).model_dump()
         with progress_console.status(str(numerics)):
-            runs = validation.reference_runs(**keys)
+            runs = validation.reference_runs(validation.CONVERGENCE_SPEEDS_KMH, **keys)
         for run in runs:
             figures = run.summary(validation.SPANS).as_dict()
             rows.append(keys | {"speed_kmh": run.speed_kmh} | figures)
@@ -89,14 +96,14 @@ def _print_convergence(rows: list[dict[str, Any]]) -> None:
         table.add_column(heading, justify="right")
     for heading in ("σ\n(%)", "max\n(N)", "min\n(N)", "uplift\n(mm)"):
         table.add_column(heading, justify="right")
-    for speed in validation.SPEEDS_KMH:
+    for speed in validation.CONVERGENCE_SPEEDS_KMH:
         own = [row for row in rows if row["speed_kmh"] == speed]
         for row in own:
             relative = 100 * (row["std"] / own[0]["std"] - 1)
             values = (row["mean"], row["std"], relative, row["max"], row["min"], 1e3 * row["max_uplift"])
             table.add_row(
                 f"{speed:g}",
-                "auto" if row["spacing"] is None else f"{row['spacing']:.3g}",
+                f"{row['spacing']:.3g}",
                 f"{1e3 * row['time_step']:g}",
                 str(row["window"] or "all"),
                 row["precision"],
@@ -136,5 +143,38 @@ def _print_windows(checks: list[validation.WindowCheck]) -> None:
             *shown,
             number(check.rms),
             end_section=check.window == validation.WINDOWS[-1],
+        )
+    console.print(table)
+
+
+def _worn() -> list[validation.WearCheck]:
+    checks = []
+    for condition in validation.WEAR:
+        for numerics in validation.WEAR_DISCRETISATIONS:
+            with progress_console.status(f"{condition}, {numerics}"):
+                checks.append(validation.check_wear(condition, numerics))
+    return checks
+
+
+def _print_wear(checks: list[validation.WearCheck]) -> None:
+    first, last = validation.WEAR_SPANS
+    table = Table(
+        title=f"Worn line of EN 50318:2002 at {validation.WEAR_SPEED_KMH:g} km/h, spans {first} to {last}; "
+        f"mean ± standard deviation over {validation.WEAR_SEEDS} seeds"
+    )
+    for heading in ("wave\n(m)", "depth\n(mm)", "grid\n(m)", "step\n(ms)", "steps\na wave"):
+        table.add_column(heading, justify="right")
+    for heading in ("σ\n(N)", "max\n(N)", "min\n(N)", "raw max\n(N)", "CL\n(%)"):
+        table.add_column(heading, justify="right")
+    for check in checks:
+        forces = (check.std, check.max, check.min, check.raw_max)
+        table.add_row(
+            f"{check.wavelength:g}",
+            f"{1e3 * check.depth:g}",
+            f"{check.spacing:.3g}",
+            f"{1e3 * check.time_step:g}",
+            f"{check.steps:.1f}",
+            *(f"{mean:.1f} ± {spread:.1f}" for mean, spread in forces),
+            "{:.2f} ± {:.2f}".format(*check.contact_loss),
         )
     console.print(table)

@@ -10,13 +10,20 @@ from ..settings import Positive, Settings
 
 
 class Numerics(Settings):
-    """Discretisation. docs/validation.md shows how the defaults were chosen."""
+    """Discretisation. docs/validation.md shows what the defaults cost in accuracy.
+
+    A pantograph at 300 km/h goes 0.21 m in a step of 2.5 ms: short wear waves and contact loss on a worn
+    line want a shorter one (``panto validate --wear``).
+    """
 
     time_step: Positive | None = Field(
-        None, description="time step (s); None: 2.5 ms, or 5 ms under a wire that has no mass"
+        None,
+        description="time step (s); None: 2.5 ms, or 5 ms on a line of periodic stiffness, which has no mass",
     )
     spacing: Positive | None = Field(
-        None, description="grid of the flexible catenary (m); None: 1/3 m, or the finest that is stable"
+        None,
+        description="grid of the flexible catenary (m); None: 1/3 m, or the finest above it that is stable "
+        "with the time step (0.375 m on en50318-2002)",
     )
     window: int = Field(
         7, description="spans of the flexible catenary computed about the train, odd; 0: the whole line"

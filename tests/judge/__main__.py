@@ -1,4 +1,4 @@
-"""The flexible catenary beside its judge: ``python -m tests.judge``."""
+"""The flexible catenary, by default and converged, beside its judge: ``python -m tests.judge``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from rich.table import Table
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
+from panto_env.validation import in_use
 
 from . import finite_element
 
@@ -21,14 +22,14 @@ def main() -> None:
     line, pantograph = load_catenary(NAME), load_pantograph(NAME)
     table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
     for speed in (250.0, 300.0):
-        for numerics in OURS:
+        for numerics in map(in_use, OURS):
             figures = simulate(NAME, NAME, speed, **numerics.model_dump()).summary((5, 6))
             values = (figures.mean, figures.std, figures.max, figures.min)
             row = (f"{value:.2f}" for value in values)
             table.add_row(
                 f"{speed:g}",
                 "finite differences",
-                f"{numerics.spacing or 1 / 3:.3g}",
+                f"{numerics.spacing:.3g}",
                 f"{1e3 * numerics.time_step:g}",
                 *row,
             )

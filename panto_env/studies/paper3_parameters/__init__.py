@@ -10,7 +10,17 @@ from ...sweep import sweep
 from ..study import Outcome, Report
 from . import tables
 from .equations import Equations
-from .passes import CATENARY, PANTOGRAPH, SPANS, SPEED_KMH, SPEEDS_KMH, Passes, influences, run_pass
+from .passes import (
+    CATENARY,
+    PANTOGRAPH,
+    SPANS,
+    SPEED_KMH,
+    SPEEDS_KMH,
+    TIME_STEP,
+    Passes,
+    influences,
+    run_pass,
+)
 from .pictures import figure_name, pictures
 from .sensitivity import SHARE, SHARES, measure
 from .statements import statements
@@ -42,6 +52,7 @@ def run(report: Report) -> Outcome:
             pantograph=PANTOGRAPH,
             spans=SPANS,
             bilateral=bilateral,
+            time_step=TIME_STEP,
         )
         for bilateral in (True, False)
     }

@@ -1,0 +1,77 @@
+import json
+
+import pytest
+
+from panto_env import simulate, validation
+from panto_env.cli import validate
+from panto_env.plant.numerics import Numerics
+
+from .judge import __main__ as judge
+
+
+def test_numerics_in_use_are_those_that_a_run_takes():
+    used = validation.in_use(Numerics())
+    assert (used.spacing, used.time_step) == (0.375, 2.5e-3)
+    default, told = simulate(distance=120.0), simulate(distance=120.0, **used.model_dump())
+    assert default.time_step == used.time_step
+    assert (default.contact_force == told.contact_force).all()
+    asked = Numerics(spacing=0.25, time_step=1e-3, window=9, precision="double")
+    assert validation.in_use(asked) == asked
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Tables of one row."""
+    monkeypatch.setattr(validation, "DISCRETISATIONS", (Numerics(),))
+    monkeypatch.setattr(validation, "CONVERGENCE_SPEEDS_KMH", (300.0,))
+    monkeypatch.setattr(validation, "WEAR", validation.WEAR[:1])
+    monkeypatch.setattr(validation, "WEAR_DISCRETISATIONS", (Numerics(),))
+    monkeypatch.setattr(validation, "WEAR_SEEDS", 2)
+
+
+def row_of(output, first):
+    """Cells of the row of a table whose first cell is given."""
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in output.splitlines()]
+    return next(row for row in rows if row[0] == first)
+
+
+def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch):
+    monkeypatch.setattr(validate.console, "_width", 150)
+    validate.validate(convergence=True, wear=True)
+    printed = capsys.readouterr().out
+    assert row_of(printed, "300")[1:5] == ["0.375", "2.5", "7", "single"]
+    assert row_of(printed, "0.8")[1:5] == ["0.3", "0.375", "2.5", "3.8"]
+
+
+def test_json_holds_the_same_tables(short, capsys):
+    validate.validate(convergence=True, wear=True, json=True)
+    told = json.loads(capsys.readouterr().out)
+    (converged,), (worn,) = told["convergence"], told["wear"]
+    assert (converged["spacing"], converged["time_step"]) == (worn["spacing"], worn["time_step"])
+    assert converged["std"] == simulate().summary(validation.SPANS).std
+    assert worn["std"][1] > 0
+
+
+def test_judge_prints_the_default_s_grid_and_step(monkeypatch, capsys):
+    monkeypatch.setattr(judge, "JUDGE", ())
+    monkeypatch.setattr(judge, "OURS", (Numerics(),))
+    monkeypatch.setenv("COLUMNS", "120")
+    judge.main()
+    assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.375", "2.5"]
+
+
+def test_a_long_step_keeps_low_passed_figures_on_a_worn_line_and_loses_contact_loss():
+    """What docs/validation.md says of waves of 0.8 m, of the preset's depth and of 2 mm."""
+    fine, *_, default = validation.WEAR_DISCRETISATIONS
+    preset, deep, short = (
+        [validation.check_wear(each, n) for n in (fine, default)] for each in validation.WEAR
+    )
+    for true, ours in (preset, deep, short):
+        assert ours.std[0] == pytest.approx(true.std[0], rel=0.005)
+        assert ours.max[0] == pytest.approx(true.max[0], abs=1.0)
+        assert ours.min[0] == pytest.approx(true.min[0], abs=1.0)
+        assert ours.raw_max[0] < true.raw_max[0]
+    assert deep[0].contact_loss[0] == pytest.approx(1.18, abs=0.1)
+    assert deep[1].contact_loss[0] == pytest.approx(0.25, abs=0.05)
+    assert short[1].steps < 2
+    assert short[0].contact_loss[0] > 0 == short[1].contact_loss[0]
