@@ -95,22 +95,44 @@ def mark_supports(axis: Axes, run: Trajectory) -> None:
 
 
 def plot_speed(result: dict[str, Any]) -> Figure:
-    """Steps a second over lanes, and the cost of the flexible plant's settings."""
+    """How cost grows: plants over spans and modes, vector environments over lanes and cores."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    axes = figure.subplots(2, 2)
+    scaling = result["scaling"]
+    names = {"spans": "spans computed, flexible catenary", "modes": "modes, three-span catenary"}
+    for axis, (key, label) in zip(axes[0], names.items(), strict=True):
+        at = [row[key] for row in scaling[key]]
+        axis.plot(at, [1e3 / row["times_real_time"] for row in scaling[key]], "o-")
+        axis.set(xlabel=label, ylabel="one core, ms a simulated second", xticks=at)
+        axis.set(xlim=(0, None), ylim=(0, None))
     vectors = [row for row in result["environments"] if row["lanes"] is not None]
-    for name in dict.fromkeys(row["id"] for row in vectors):
-        own = [row for row in vectors if row["id"] == name]
-        rates = [row["steps_per_second"] for row in own]
-        left.loglog([row["lanes"] for row in own], rates, "o-", label=name)
-    left.set(xlabel="lanes", ylabel="environment steps a second", title="Native vector environments")
-    left.legend(fontsize="small")
-    rows = result["scaling"][::-1]
-    right.barh([row["settings"] for row in rows], [row["times_real_time"] for row in rows], color="tab:blue")
-    right.set(xlabel="times real time, one core", title="Flexible plant by its settings")
+    _rates(axes[1, 0], vectors, "lanes", [row["id"] for row in vectors])
+    axes[1, 0].set(xscale="log", yscale="log", xlabel="lanes, on all cores")
+    rows = scaling["cores"]
+    if rows:
+        _rates(axes[1, 1], rows, "cores", [f"{row['id']}, {row['lanes']} lanes" for row in rows])
+        counts = sorted({row["cores"] for row in rows})
+        axes[1, 1].set(xscale="log", yscale="log", xlabel="cores")
+        axes[1, 1].set_xticks(counts, labels=map(str, counts))
+        axes[1, 1].set_xticks([], minor=True)
+    else:
+        axes[1, 1].set_axis_off()
+        axes[1, 1].text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
+    for axis in axes.flat:
+        axis.grid(color="0.9")
+    figure.suptitle(f"{result['machine']['processor']}, medians of {result['repeats']}")
     return figure
+
+
+def _rates(axis: Axes, rows: Sequence[Mapping[str, Any]], key: str, labels: Sequence[str]) -> None:
+    """Steps a second of vector environments, a curve for each label."""
+    for label in dict.fromkeys(labels):
+        own = [row for row, named in zip(rows, labels, strict=True) if named == label]
+        axis.plot([row[key] for row in own], [row["steps_per_second"] for row in own], "o-", label=label)
+    axis.set(ylabel="environment steps a second")
+    axis.legend(fontsize="small")
 
 
 SWEPT = (
