@@ -107,31 +107,34 @@ def plot_speed(result: dict[str, Any]) -> Figure:
         axis.plot(at, [1e3 / row["times_real_time"] for row in scaling[key]], "o-")
         axis.set(xlabel=label, ylabel="one core, ms a simulated second", xticks=at)
         axis.set(xlim=(0, None), ylim=(0, None))
+    by_lanes, by_cores = axes[1]
     vectors = [row for row in result["environments"] if row["lanes"] is not None]
-    _rates(axes[1, 0], vectors, "lanes", [row["id"] for row in vectors])
-    axes[1, 0].set(xscale="log", yscale="log", xlabel="lanes, on all cores")
-    rows = scaling["cores"]
-    if rows:
-        _rates(axes[1, 1], rows, "cores", [f"{row['id']}, {row['lanes']} lanes" for row in rows])
-        counts = sorted({row["cores"] for row in rows})
-        axes[1, 1].set(xscale="log", yscale="log", xlabel="cores")
-        axes[1, 1].set_xticks(counts, labels=map(str, counts))
-        axes[1, 1].set_xticks([], minor=True)
-    else:
-        axes[1, 1].set_axis_off()
-        axes[1, 1].text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
+    for name in dict.fromkeys(row["id"] for row in vectors):
+        own = [row for row in vectors if row["id"] == name]
+        rates = [row["steps_per_second"] for row in own]
+        by_lanes.loglog([row["lanes"] for row in own], rates, "o-", label=name)
+    by_lanes.set(xlabel="lanes, on all cores", ylabel="environment steps a second")
+    by_lanes.legend(fontsize="small")
+    _plot_cores(by_cores, scaling["cores"])
     for axis in axes.flat:
         axis.grid(color="0.9")
     figure.suptitle(f"{result['machine']['processor']}, medians of {result['repeats']}")
     return figure
 
 
-def _rates(axis: Axes, rows: Sequence[Mapping[str, Any]], key: str, labels: Sequence[str]) -> None:
-    """Steps a second of vector environments, a curve for each label."""
-    for label in dict.fromkeys(labels):
-        own = [row for row, named in zip(rows, labels, strict=True) if named == label]
-        axis.plot([row[key] for row in own], [row["steps_per_second"] for row in own], "o-", label=label)
-    axis.set(ylabel="environment steps a second")
+def _plot_cores(axis: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Steps a second over those on one core, the first row of each environment."""
+    if not rows:
+        axis.set_axis_off()
+        axis.text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
+        return
+    counts = sorted({row["cores"] for row in rows})
+    for name in dict.fromkeys(row["id"] for row in rows):
+        own = [row for row in rows if row["id"] == name]
+        gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
+        axis.plot([row["cores"] for row in own], gain, "o-", label=f"{name}, {own[0]['lanes']} lanes")
+    axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
+    axis.set(xlabel="cores", ylabel="steps a second over those on one core", xticks=counts, ylim=(0, None))
     axis.legend(fontsize="small")
 
 
