@@ -134,8 +134,8 @@ def _plot_cores(axis: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
         gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
         axis.plot([row["cores"] for row in own], gain, "o-", label=f"{name}, {own[0]['lanes']} lanes")
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
-    axis.set(xlabel="cores", ylabel="steps a second over those on one core", xticks=counts, ylim=(0, None))
-    axis.legend(fontsize="small")
+    axis.set(xlabel="cores", ylabel="steps a second, times one core's", xticks=counts, ylim=(0, None))
+    axis.legend(fontsize="small", loc="lower left")
 
 
 SWEPT = (
