@@ -95,22 +95,47 @@ def mark_supports(axis: Axes, run: Trajectory) -> None:
 
 
 def plot_speed(result: dict[str, Any]) -> Figure:
-    """Steps a second over lanes, and the cost of the flexible plant's settings."""
+    """How cost grows: plants over spans and modes, vector environments over lanes and cores."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    axes = figure.subplots(2, 2)
+    scaling = result["scaling"]
+    names = {"spans": "spans computed, flexible catenary", "modes": "modes, three-span catenary"}
+    for axis, (key, label) in zip(axes[0], names.items(), strict=True):
+        at = [row[key] for row in scaling[key]]
+        axis.plot(at, [1e3 / row["times_real_time"] for row in scaling[key]], "o-")
+        axis.set(xlabel=label, ylabel="one core, ms a simulated second", xticks=at)
+        axis.set(xlim=(0, None), ylim=(0, None))
+    by_lanes, by_cores = axes[1]
     vectors = [row for row in result["environments"] if row["lanes"] is not None]
     for name in dict.fromkeys(row["id"] for row in vectors):
         own = [row for row in vectors if row["id"] == name]
         rates = [row["steps_per_second"] for row in own]
-        left.loglog([row["lanes"] for row in own], rates, "o-", label=name)
-    left.set(xlabel="lanes", ylabel="environment steps a second", title="Native vector environments")
-    left.legend(fontsize="small")
-    rows = result["scaling"][::-1]
-    right.barh([row["settings"] for row in rows], [row["times_real_time"] for row in rows], color="tab:blue")
-    right.set(xlabel="times real time, one core", title="Flexible plant by its settings")
+        by_lanes.loglog([row["lanes"] for row in own], rates, "o-", label=name)
+    by_lanes.set(xlabel="lanes, on all cores", ylabel="environment steps a second")
+    by_lanes.legend(fontsize="small")
+    _plot_cores(by_cores, scaling["cores"])
+    for axis in axes.flat:
+        axis.grid(color="0.9")
+    figure.suptitle(f"{result['machine']['processor']}, medians of {result['repeats']}")
     return figure
+
+
+def _plot_cores(axis: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Steps a second over those on one core, the first row of each environment."""
+    if not rows:
+        axis.set_axis_off()
+        axis.text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
+        return
+    counts = sorted({row["cores"] for row in rows})
+    for name in dict.fromkeys(row["id"] for row in rows):
+        own = [row for row in rows if row["id"] == name]
+        gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
+        axis.plot([row["cores"] for row in own], gain, "o-", label=f"{name}, {own[0]['lanes']} lanes")
+    axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
+    axis.set(xlabel="cores", ylabel="steps a second, times one core's", xticks=counts, ylim=(0, None))
+    axis.legend(fontsize="small", loc="lower left")
 
 
 SWEPT = (

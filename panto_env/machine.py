@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+CAN_CHOOSE_CORES = hasattr(os, "sched_setaffinity")
+"""Whether a process can say on which cores it runs: Linux has it, macOS and Windows have not."""
 
 
 def cores() -> int:
@@ -10,3 +15,17 @@ def cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+@contextmanager
+def on_cores(count: int) -> Iterator[None]:
+    """Within the body the caller's thread, and threads that it starts there, have but ``count`` cores.
+
+    They are the first of those that the process may use, which must be so many, where cores can be chosen.
+    """
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(allowed)[:count])
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)

@@ -13,23 +13,33 @@ import gymnasium
 import numpy as np
 
 from . import roofline
+from .catalog import load_catenary
 from .envs import IDS
+from .machine import CAN_CHOOSE_CORES, cores, on_cores
 from .task import Task
 
 SPEED_KMH = 300.0
 LANES = (1, 16, 256, 4096)
-SCALING: tuple[dict[str, Any], ...] = (
-    {"window": 3},
-    {"window": 5},
-    {"window": 7},
-    {"window": 11},
-    {"window": 0},
+LINE_SPANS = 12
+"""Spans of the flexible line whose settings are compared, so that the widest window has room."""
+WINDOWS = (3, 5, 7, 11, 0)
+MODES = (10, 20, 40, 80)
+DISCRETISATIONS: tuple[dict[str, Any], ...] = (
+    {},
     {"precision": "double"},
     {"spacing": 0.25, "time_step": 1e-3},
     {"spacing": 0.25, "time_step": 1e-3, "precision": "double"},
     {"spacing": 0.5},
 )
 """Settings of the flexible plant whose cost is compared; what is not named is at its default."""
+SINGLE_YARDSTICK, VECTOR_YARDSTICK = "Pendulum-v1", "CartPole-v1"
+"""Gymnasium's own environments beside which ours stand: written in Python, and native as a vector."""
+SHARED = (("Pantograph-v0", 256), ("PantographStiffness-v0", 4096))
+"""Vector environments, and their lanes, whose speed is measured on one core and more."""
+
+
+Report = Callable[[str], None]
+"""Told what is being measured."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +48,6 @@ class PlantSpeed:
 
     catenary: str
     pantograph: str
-    settings: str
     times_real_time: float  # median
     slowest: float  # of the repeats
     fastest: float
@@ -51,12 +60,13 @@ class EnvSpeed:
 
     id: str
     lanes: int | None  # None: a single environment
+    cores: int  # that the process may use
     steps_per_second: float  # median
     slowest: float
     fastest: float
 
 
-def plant_speed(settings: dict[str, Any], repeats: int, shown: str = "") -> tuple[PlantSpeed, Task]:
+def plant_speed(settings: dict[str, Any], repeats: int) -> tuple[PlantSpeed, Task]:
     """Times real time of whole passes at 300 km/h without a policy, on one core; and the task."""
     task = Task(**settings, speed_kmh=SPEED_KMH)
     travelled = 0.0
@@ -74,7 +84,6 @@ def plant_speed(settings: dict[str, Any], repeats: int, shown: str = "") -> tupl
     speed = PlantSpeed(
         catenary=task.plant.catenary.name,
         pantograph=task.plant.pantograph.name,
-        settings=shown,
         times_real_time=statistics.median(factors),
         slowest=min(factors),
         fastest=max(factors),
@@ -106,16 +115,16 @@ def env_speed(name: str, repeats: int, lanes: int | None = None) -> EnvSpeed:
     run()
     rates = [(lanes or 1) * count / run() for _ in range(repeats)]
     env.close()
-    return EnvSpeed(name, lanes, statistics.median(rates), min(rates), max(rates))
+    return EnvSpeed(name, lanes, cores(), statistics.median(rates), min(rates), max(rates))
 
 
-def measure(repeats: int = 5, report: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
+def measure(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
     """Everything, as plain data; ``report`` is told what is being measured."""
     plants = []
     for name, settings in IDS.items():
         report(f"the plant of {name}")
         speed, task = plant_speed(dict(settings), repeats)
-        plants.append(asdict(speed))
+        plants.append({"id": name} | asdict(speed))
         if name == "Pantograph-v0":
             line, single = task.plant.line, task.plant.line.stencil.itemsize == 4
             limits = roofline.measure(
@@ -125,27 +134,66 @@ def measure(repeats: int = 5, report: Callable[[str], None] = lambda _: None) ->
                 speed.times_real_time,
                 single,
             )
-    scaling = []
-    for settings in SCALING:
-        shown = ", ".join(f"{key} {value or 'all'}" for key, value in settings.items())
-        report(f"the flexible plant with {shown}")
-        scaling.append(asdict(plant_speed({"spans": 12} | settings, repeats, shown)[0]))
+    scaling = _scaling(repeats, report)
     envs = []
-    for name in (*IDS, "Pendulum-v1"):
+    for name in (*IDS, SINGLE_YARDSTICK):
         report(f"{name}, single")
         envs.append(asdict(env_speed(name, repeats)))
-    for name in (*IDS, "CartPole-v1"):
+    for name in (*IDS, VECTOR_YARDSTICK):
         for lanes in LANES:
             report(f"{name}, {lanes} lanes")
             envs.append(asdict(env_speed(name, repeats, lanes)))
     return {
-        "machine": {"processor": _processor(), "python": platform.python_version()},
+        "machine": {"processor": _processor(), "cores": cores(), "python": platform.python_version()},
         "repeats": repeats,
         "plants": plants,
         "roofline": asdict(limits),
-        "scaling": scaling,
+        "scaling": scaling | {"cores": _over_cores(repeats, report)},
         "environments": envs,
     }
+
+
+def _scaling(repeats: int, report: Report) -> dict[str, list[dict[str, Any]]]:
+    """Cost of plants over their settings."""
+
+    def timed(settings: dict[str, Any], shown: str) -> tuple[dict[str, Any], Task]:
+        report(shown)
+        speed, task = plant_speed(settings, repeats)
+        return asdict(speed), task
+
+    flexible = {"spans": LINE_SPANS}
+    three_span = dict(IDS["PantographThreeSpan-v0"])
+    line = load_catenary(three_span["catenary"])
+    spans, modes, discretisations = [], [], []
+    for window in WINDOWS:
+        speed, _ = timed(flexible | {"window": window}, f"{window or LINE_SPANS} spans computed")
+        spans.append({"spans": window or LINE_SPANS, "whole_line": window == 0} | speed)
+    for count in MODES:
+        entry = line.model_copy(update={"modes": count})
+        speed, _ = timed(three_span | {"catenary": entry}, f"{count} modes of the three-span catenary")
+        modes.append({"modes": count} | speed)
+    for settings in DISCRETISATIONS:
+        shown = ", ".join(f"{key} {value}" for key, value in settings.items())
+        speed, task = timed(flexible | settings, f"the flexible plant, {shown or 'defaults'}")
+        plant = task.plant
+        used = {"spacing": plant.line.spacing, "time_step": plant.time_step}
+        precision = "single" if plant.line.stencil.itemsize == 4 else "double"
+        discretisations.append(used | {"precision": precision} | speed)
+    return {"spans": spans, "modes": modes, "discretisation": discretisations}
+
+
+def _over_cores(repeats: int, report: Report) -> list[dict[str, Any]]:
+    """Vector environments on 1, 2, 4, ... and all cores; no rows where cores can't be chosen."""
+    if not CAN_CHOOSE_CORES:
+        return []
+    counts = sorted({2**k for k in range(cores().bit_length())} | {cores()})
+    rows = []
+    for name, lanes in SHARED:
+        for count in counts:
+            report(f"{name}, {lanes} lanes on {count} cores")
+            with on_cores(count):  # the environment shares its lanes among as many threads when made
+                rows.append(asdict(env_speed(name, repeats, lanes)))
+    return rows
 
 
 def _processor() -> str:

@@ -100,8 +100,9 @@ DISCRETISATIONS = (
 
 def in_use(numerics: Numerics) -> Numerics:
     """The same with the time step and the grid that the reference line takes where they are None."""
-    line, step = load_catenary(REFERENCE_MODEL), numerics.time_step or flexible.TIME_STEP
+    line = load_catenary(REFERENCE_MODEL)
     assert isinstance(line, FlexibleCatenaryData)  # the standard's line is no other
+    step = flexible.time_step(line, numerics)
     spacing = line.span_length / flexible.nodes_per_span(line, numerics.spacing, step)
     return numerics.model_copy(update={"time_step": step, "spacing": spacing})
 

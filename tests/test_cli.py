@@ -105,14 +105,3 @@ def test_unwritable_output_is_refused(tmp_path):
     assert result.returncode == 2
     assert "cannot be written" in result.stderr
     assert target.read_text() == "mine"
-
-
-def test_speed_reports_every_plant_and_environment():
-    told = json.loads(panto("speed", "--repeats", 1, "--json").stdout)
-    assert {row["catenary"] for row in told["plants"]} == {
-        "en50318-2002",
-        "periodic-stiffness",
-        "ohl-three-span",
-    }
-    assert all(row["times_real_time"] > 1 for row in told["plants"])
-    assert "Pendulum-v1" in {row["id"] for row in told["environments"]}

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import sys
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
+from ..errors import InputError
 from .output import Json, Plot, console, print_json, progress_console
+
+if TYPE_CHECKING:
+    from .speed_tables import Sheet
 
 
 def speed(
     repeats: Annotated[int, typer.Option(min=1, help="Repeats to take the median of.")] = 9,
     plot: Plot = None,
     json: Json = False,
+    markdown: Annotated[
+        bool,
+        typer.Option("--markdown", help="Print what README.md, then what docs/speed.md holds of it."),
+    ] = False,
 ) -> None:
     """Measure times real time of each plant on one core, and environment steps a second.
 
-    Beside them stand Gymnasium's own Pendulum and native CartPole, and the limits of the machine.
+    Beside them stand Gymnasium's own Pendulum and native CartPole, and the limits of the machine; then
+    how the cost grows with spans, modes, grid, lanes and cores.
     """
+    if json and markdown:
+        raise InputError("Give one of --json and --markdown, not both.")
     from ..speed import measure
+    from . import speed_tables
 
     if plot is not None:
         from ..figures import check_picture
@@ -33,40 +46,18 @@ def speed(
         save(plot_speed(result), plot)
     if json:
         print_json(result)
-        return
-    console.print(f"{result['machine']['processor']}, Python {result['machine']['python']}")
-    console.print(_plants(result["plants"], f"Plants, one core, 300 km/h, median of {repeats}", "catenary"))
-    limits = result["roofline"]
-    console.print(
-        f"Flexible plant: {limits['arithmetic']:.1f} GFLOP/s of {limits['multiply_add']:.0f} that one core "
-        f"multiplies and adds in registers, {limits['traffic']:.0f} GB/s of {limits['cache']:.0f} that it "
-        f"moves in the nearest cache; at the nearer limit it would run {limits['bound']:.0f} × real time."
-    )
-    console.print(_plants(result["scaling"], "Flexible plant, cost of its settings (12 spans)", "settings"))
-    console.print(_environments(result["environments"], repeats))
+    elif markdown:
+        sys.stdout.write("\n".join(speed_tables.markdown(result)))
+    else:
+        console.print(speed_tables.machine(result))
+        for part in (speed_tables.summary(result), *speed_tables.details(result)):
+            console.print(part if isinstance(part, str) else _table(part))
 
 
-def _plants(rows: list[dict[str, Any]], title: str, key: str) -> Table:
-    table = Table(title=title)
-    table.add_column(key)
-    for heading in ("× real time", "slowest", "fastest", "first call (s)"):
-        table.add_column(heading, justify="right")
-    for row in rows:
-        factors = (f"{row[name]:.0f}" for name in ("times_real_time", "slowest", "fastest"))
-        table.add_row(row[key], *factors, f"{row['first_call']:.2f}")
-    return table
-
-
-def _environments(rows: list[dict[str, Any]], repeats: int) -> Table:
-
-    table = Table(title=f"Environments, steps a second, median of {repeats}")
-    table.add_column("id")
-    for heading in ("lanes", "steps/s", "slowest", "fastest"):
-        table.add_column(heading, justify="right")
-    for row in rows:
-        lanes = "single" if row["lanes"] is None else str(row["lanes"])
-        rates = (f"{row[name]:,.0f}" for name in ("steps_per_second", "slowest", "fastest"))
-        table.add_row(
-            row["id"], lanes, *rates, end_section=row["lanes"] == 4096 or row["id"] == "Pendulum-v1"
-        )
+def _table(sheet: Sheet) -> Table:
+    table = Table(title=sheet.title)
+    for k, heading in enumerate(sheet.headings):
+        table.add_column(heading, justify="right" if k else "left")
+    for row in sheet.rows:
+        table.add_row(*(cell.replace("`", "") for cell in row))
     return table

@@ -49,7 +49,7 @@ class Plant:
         self.catenary, self.pantograph = catenary, pantograph_data
         self.spans = spans or catenary.spans
         self.model = MODELS[catenary.kind]  # type: ignore[attr-defined]
-        self.time_step = numerics.time_step or self.model.TIME_STEP
+        self.time_step = self.model.time_step(catenary, numerics)
         self.line = self.model.build(catenary, self.spans, numerics)
         self.wire = self.model.at_rest(self.line, lanes)
         size = 2 * len(pantograph_data.masses)

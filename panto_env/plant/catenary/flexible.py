@@ -28,11 +28,13 @@ from .flexible_state import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .static_shape import StaticShape, solve
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
-FINEST = 1 / 3
-"""Grid (m) unless told otherwise, where it is stable. With TIME_STEP it is so on no line of the catalogue:
-the finest that is, 0.375 m on en50318-2002 and up to 0.45 m on others, is taken (docs/validation.md)."""
-TIME_STEP = 2.5e-3
-"""Unless told otherwise (s): docs/validation.md shows what it costs."""
+TIME_STEPS = (2.5e-3, 2e-3, 5e-3 / 3)
+"""Unless told otherwise the first of these (s) with a stable grid fine enough for the line's droppers, or the
+last: docs/validation.md shows what it costs."""
+RESOLUTION = 16
+"""Nodes between droppers, on average, that are fine enough."""
+FINEST = 18
+"""As many are taken unless told otherwise, or the most that are stable."""
 QUIET = 1e-25
 """Load (m a step) that keeps quiet wires away from subnormal numbers; it moves a wire by less than
 1e-15 m."""
@@ -76,7 +78,7 @@ def build(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> Flexibl
     """
     shape = solve(data)
     window = min(numerics.window or spans, spans)
-    step, beta = numerics.time_step or TIME_STEP, data.damping.beta
+    step, beta = time_step(data, numerics), data.damping.beta
     per_span = nodes_per_span(data, numerics.spacing, step)
     dx = data.span_length / per_span
     nodes = window * per_span + 1 + 2 * PAD
@@ -154,30 +156,50 @@ def _added_mass(
     return added
 
 
-def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
-    """Intervals a span of the grid asked for (m), or of the finest up to FINEST that is stable.
+def time_step(data: FlexibleCatenaryData, numerics: Numerics) -> float:
+    """Time step (s) asked for, or the longest usual one that the line's droppers and the grid allow."""
+    if numerics.time_step is not None:
+        return numerics.time_step
+    for step in TIME_STEPS:
+        if numerics.spacing is not None:
+            if stable(data, data.span_length / _nodes(data, numerics.spacing), step):
+                return step
+        elif _most_nodes(data, step) >= RESOLUTION * (len(data.droppers.positions) + 1):
+            return step
+    return TIME_STEPS[-1]
 
-    Raises InputError where the time step (s) is too long for the grid asked for, or for any.
-    """
-    if spacing is not None:
-        nodes = int(np.ceil(data.span_length / spacing - 1e-9))
-        if not stable(data, data.span_length / nodes, step):
-            raise InputError(
-                f"A time step of {1e3 * step:g} ms is unstable on a grid of "
-                f"{data.span_length / nodes:g} m for line '{data.name}'; take a shorter step or a "
-                "coarser grid."
-            )
-        return nodes
-    for nodes in range(int(np.ceil(data.span_length / FINEST - 1e-9)), 7, -1):
+
+def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
+    """Nodes a span of the grid asked for (m), or of the finest up to FINEST that is stable."""
+    if spacing is None:
+        return _most_nodes(data, step)
+    nodes = _nodes(data, spacing)
+    if not stable(data, data.span_length / nodes, step):
+        raise InputError(
+            f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m for "
+            f"line '{data.name}'; take a shorter step or a coarser grid."
+        )
+    return nodes
+
+
+def _nodes(data: FlexibleCatenaryData, spacing: float) -> int:
+    return int(np.ceil(data.span_length / spacing - 1e-9))
+
+
+def _most_nodes(data: FlexibleCatenaryData, step: float) -> int:
+    for nodes in range(FINEST * (len(data.droppers.positions) + 1), 7, -1):
         if stable(data, data.span_length / nodes, step):
             return nodes
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
-    """Whether the shortest wave of the grid (m) does not grow: omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
+    """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
+    angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
     for wire in (data.contact_wire, data.messenger_wire):
-        if 4 * weights_of(wire, dx, step)[0] * (1 + 2 * data.damping.beta / step) > 4:
+        near, far = weights_of(wire, dx, step)
+        squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+        if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
             return False
     return True
 

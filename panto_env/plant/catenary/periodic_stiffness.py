@@ -52,6 +52,11 @@ def line_end(data: PeriodicStiffnessData, spans: int) -> float:
     return spans * data.span_length
 
 
+def time_step(data: PeriodicStiffnessData, numerics: Numerics) -> float:
+    """Time step (s) asked for, or the usual one."""
+    return numerics.time_step or TIME_STEP
+
+
 def build(data: PeriodicStiffnessData, spans: int, numerics: Numerics) -> PeriodicLine:
     """Constants of the line; there is no grid, and any time step will do."""
     return PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)

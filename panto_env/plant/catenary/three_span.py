@@ -91,6 +91,11 @@ def mode_shapes(data: ThreeSpanData, vectors: Array, positions: Array) -> Array:
     return np.asarray(np.sqrt(2 / (data.wire.mass * length)) * sines @ vectors)
 
 
+def time_step(data: ThreeSpanData, numerics: Numerics) -> float:
+    """Time step (s) asked for, or the usual one."""
+    return numerics.time_step or TIME_STEP
+
+
 def build(data: ThreeSpanData, spans: int, numerics: Numerics) -> ThreeSpanLine:
     """Constants of the line; there is no grid, and modes propagate exactly over any time step (s)."""
     frequency, vectors = modes(data)
@@ -103,7 +108,7 @@ def build(data: ThreeSpanData, spans: int, numerics: Numerics) -> ThreeSpanLine:
     moved = mode_shapes(data, vectors, everywhere + span)
     moved[everywhere > 2 * span + 1e-9] = 0.0
     project = np.linalg.lstsq(mode_shapes(data, vectors, everywhere), moved, rcond=None)[0]
-    free, forced = _propagation(frequency, data.damping_ratio, numerics.time_step or TIME_STEP)
+    free, forced = _propagation(frequency, data.damping_ratio, time_step(data, numerics))
     return ThreeSpanLine(
         span=span,
         shape=mode_shapes(data, vectors, positions),

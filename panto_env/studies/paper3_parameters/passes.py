@@ -17,8 +17,6 @@ from ...simulation import simulate
 CATENARY, PANTOGRAPH = "periodic-stiffness", "three-mass"
 SPEED_KMH = 300.0
 """Train speed of every figure but those over speed (section 3)."""
-TIME_STEP = 2e-3
-"""Finer than needed (s), for smooth curves."""
 SPANS = (11, 12)
 """What the figures show: 500 to 600 m (section 3)."""
 SPEEDS_KMH = (200.0, 250.0, 300.0, 350.0)

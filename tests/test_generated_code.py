@@ -1,0 +1,78 @@
+"""The loops that the speed rests on became vector instructions."""
+
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import llvmlite.binding
+import pytest
+
+import panto_env
+
+PACKAGE = Path(panto_env.__file__).parent
+# Numba can't show the code of kernels that it read from disk, so a fresh process compiles them anew.
+CODE = """
+import json, sys
+from panto_env.task import Task
+from panto_env.task.episode import control_step
+Task(**json.loads(sys.argv[1]))
+(assembly,) = control_step.inspect_asm().values()
+print(assembly)
+"""
+FEATURES = llvmlite.binding.get_host_cpu_features()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        platform.machine() not in ("x86_64", "AMD64") or not (FEATURES.get("avx2") and FEATURES.get("fma")),
+        reason="the instructions looked for are those of x86-64 processors with AVX2 and FMA",
+    ),
+]
+
+
+def loops(settings, cache):
+    """Bodies of the innermost loops of the control step: blocks that jump back to their own label."""
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent), "PANTO_CACHE_DIR": str(cache)}
+    result = subprocess.run(
+        [sys.executable, "-c", CODE, json.dumps(settings)],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=True,
+    )
+    blocks = re.split(r"^(\.LBB\w+):", result.stdout, flags=re.MULTILINE)
+    return [
+        body
+        for label, body in zip(blocks[1::2], blocks[2::2], strict=True)
+        if re.search(rf"^\s+j\w+\s+{re.escape(label)}$", body, re.MULTILINE)
+    ]
+
+
+def packed(body, mnemonic):
+    """How many such instructions a loop has on vectors of 256 bits or more."""
+    return len(re.findall(rf"^\s+{mnemonic}\s.*%[yz]mm", body, re.MULTILINE))
+
+
+# With Numba's loop vectoriser switched off (NUMBA_LOOP_VECTORIZE=0) neither line has any such loop left.
+
+
+def test_sweep_of_the_flexible_wires_is_vectorised(tmp_path):
+    """The stencil: five differences, and multiply-adds; with and without masses on the wire."""
+    sweeps = [
+        body
+        for body in loops({}, tmp_path)
+        if packed(body, "vsubps") >= 5 and packed(body, r"vfn?madd\w+ps") >= 2
+    ]
+    assert len(sweeps) >= 2
+
+
+def test_lanes_under_a_massless_line_share_vector_instructions(tmp_path):
+    """The contact law divides by the yield of both sides; here lane beside lane."""
+    settings = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "lanes": 64}
+    bodies = loops(settings, tmp_path)
+    assert any(packed(body, "vdivpd") and packed(body, r"vfn?madd\w+pd") for body in bodies)
+    # Contact, stiffness, irregularity, pantograph, actuators, scores: not the contact alone.
+    assert sum(packed(body, r"v(add|sub|mul|fn?madd\w+)pd") > 0 for body in bodies) >= 10
