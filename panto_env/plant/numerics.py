@@ -18,13 +18,13 @@ class Numerics(Settings):
 
     time_step: Positive | None = Field(
         None,
-        description="time step (s); None: 2.5 ms, shorter on lines whose droppers stand closer, 5 ms on a line "
-        "of periodic stiffness, which has no mass",
+        description="time step (s); None: 2.5 ms, or 2 ms on a flexible line that needs a finer grid for it, "
+        "or 5 ms on a line of periodic stiffness",
     )
     spacing: Positive | None = Field(
         None,
-        description="grid of the flexible catenary (m); None: 18 nodes between droppers on average, or the "
-        "most that are stable with the time step (16 on en50318-2002, 0.375 m)",
+        description="grid of the flexible catenary (m); None: 1/3 m, or the finest above it that is stable "
+        "with the time step (0.375 m on en50318-2002)",
     )
     window: int = Field(
         7, description="spans of the flexible catenary computed about the train, odd; 0: the whole line"

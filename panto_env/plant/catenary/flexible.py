@@ -28,13 +28,11 @@ from .flexible_state import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .static_shape import StaticShape, solve
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
-TIME_STEPS = (2.5e-3, 2e-3, 5e-3 / 3)
-"""Unless told otherwise the first of these (s) with a stable grid fine enough for the line's droppers, or the
-last: docs/validation.md shows what it costs."""
-RESOLUTION = 16
-"""Nodes between droppers, on average, that are fine enough."""
-FINEST = 18
-"""As many are taken unless told otherwise, or the most that are stable."""
+FINEST, FINE_ENOUGH = 1 / 3, 0.375
+"""Grid (m) unless told otherwise, where it is stable, and the coarsest for which the longer time step is
+taken: docs/validation.md shows what it costs."""
+LONG_STEP, SHORT_STEP = 2.5e-3, 2e-3
+"""Time steps (s) unless told otherwise."""
 QUIET = 1e-25
 """Load (m a step) that keeps quiet wires away from subnormal numbers; it moves a wire by less than
 1e-15 m."""
@@ -157,40 +155,31 @@ def _added_mass(
 
 
 def time_step(data: FlexibleCatenaryData, numerics: Numerics) -> float:
-    """Time step (s) asked for, or the longest usual one that the line's droppers and the grid allow."""
+    """Time step (s) asked for, or the longer usual one where a grid fine enough is stable with it."""
     if numerics.time_step is not None:
         return numerics.time_step
-    for step in TIME_STEPS:
-        if numerics.spacing is not None:
-            if stable(data, data.span_length / _nodes(data, numerics.spacing), step):
-                return step
-        elif _most_nodes(data, step) >= RESOLUTION * (len(data.droppers.positions) + 1):
-            return step
-    return TIME_STEPS[-1]
+    grid = numerics.spacing or FINE_ENOUGH
+    return LONG_STEP if stable(data, data.span_length / _nodes(data, grid), LONG_STEP) else SHORT_STEP
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
     """Nodes a span of the grid asked for (m), or of the finest up to FINEST that is stable."""
-    if spacing is None:
-        return _most_nodes(data, step)
-    nodes = _nodes(data, spacing)
-    if not stable(data, data.span_length / nodes, step):
-        raise InputError(
-            f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m for "
-            f"line '{data.name}'; take a shorter step or a coarser grid."
-        )
-    return nodes
+    if spacing is not None:
+        nodes = _nodes(data, spacing)
+        if not stable(data, data.span_length / nodes, step):
+            raise InputError(
+                f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m "
+                f"for line '{data.name}'; take a shorter step or a coarser grid."
+            )
+        return nodes
+    for nodes in range(_nodes(data, FINEST), 7, -1):
+        if stable(data, data.span_length / nodes, step):
+            return nodes
+    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
 def _nodes(data: FlexibleCatenaryData, spacing: float) -> int:
     return int(np.ceil(data.span_length / spacing - 1e-9))
-
-
-def _most_nodes(data: FlexibleCatenaryData, step: float) -> int:
-    for nodes in range(FINEST * (len(data.droppers.positions) + 1), 7, -1):
-        if stable(data, data.span_length / nodes, step):
-            return nodes
-    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
