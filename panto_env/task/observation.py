@@ -14,7 +14,6 @@ from ..plant import coupling
 from ..plant.actuator import Actuator
 from ..plant.cosine import cosine_of_turns, sine_of_turns
 from ..plant.jit import part
-from ..plant.sensor import Sensors
 from .scores import ENTRY, READING, READINGS
 
 BOUND = 10.0
@@ -82,11 +81,6 @@ def layout(kind: str, actuator: Actuator, pantograph: PantographData) -> Layout:
                 Entry(f"mass {k} velocity", 1.0, "m/s"),
             ]
     return Layout(kind, tuple(entries))
-
-
-def noise_scale(sensors: Sensors) -> Array:
-    """Rms noise of each reading, (READINGS,), in its unit."""
-    return np.array([sensors.displacement_noise] * 2 + [sensors.velocity_noise] * 2 + [sensors.force_noise])
 
 
 @part

@@ -25,6 +25,7 @@ from . import observation as obs
 from . import tally
 from .crew import crew
 from .episode import SENSED, Episode, Flags, control_step, first_look
+from .noise import Noise
 from .policy import Context
 from .reward import Reward, weights
 from .scores import DISTANCE, END, KEPT, NOMINAL, READINGS, REWARD, TERM
@@ -128,8 +129,7 @@ class Task:
         self.speed = np.zeros(lanes)  # m/s
         self.episode = self._episode(weights(reward_settings))
         self.reward, self.terms = self.episode.lanes[REWARD, :lanes], self.episode.lanes[TERM:KEPT, :lanes]
-        self._noise_scale = obs.noise_scale(self.sensors)
-        self._random: list[np.random.Generator] = [np.random.default_rng(0)] * lanes
+        self._noise, self._every = Noise(self.sensors, lanes), np.arange(lanes)
         self._record_droppers = record_droppers
         self.keep_samples = keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
@@ -224,8 +224,9 @@ class Task:
             self.samples.channels[lane, 0] = sample
         else:
             tally.clear(self.tally, lane)
-        self._random[lane] = random
-        self._draw_noise(lane, lane + 1)
+        if episode.noisy:
+            self._noise.start(lane, random)
+            self._noise.write(episode.noise, np.array([lane]))
         self._first_look(lane, lane + 1)
 
     def end(self, lane: int) -> int:
@@ -257,7 +258,8 @@ class Task:
             self.episode.idle[:] = skip
         self.episode.action[:] = action
         if self.episode.noisy:
-            self._draw_noise(0, self.lanes)
+            awake = self._every if skip is None else np.flatnonzero(~skip)
+            self._noise.write(self.episode.noise, awake)
         if self._crew is None:
             self._control_step(0, self.lanes)
         else:
@@ -268,12 +270,6 @@ class Task:
     def coast(self) -> None:
         """Run all lanes, reset to one speed, to the end without actuators, in one kernel call."""
         self.plant.advance(np.zeros((self.lanes, 2)), self.end(0), self.samples)
-
-    def _draw_noise(self, first: int, last: int) -> None:
-        for lane in range(first, last):
-            if self.episode.noisy and not self.episode.idle[lane]:
-                drawn = self._random[lane].standard_normal(READINGS)
-                self.episode.noise[:, lane] = self._noise_scale * drawn
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's run so far, the same as its trajectory's summary."""
