@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -32,14 +33,15 @@ class Figures:
 
     def as_dict(self) -> dict[str, float]:
         """Names and values, in this order."""
-        return asdict(self)
+        return dict(vars(self))
 
 
+@cache
 def low_pass_sections(time_step: float) -> tuple[Array, Array]:
     """EN 50317's filter, a 6th-order Butterworth at 20 Hz, as second-order sections, (3, 6).
 
-    The second array, (3, 2), is its state settled at 1. Raises InputError where samples, ``time_step``
-    (s) apart, are too far apart to hold 20 Hz.
+    The second array, (3, 2), is its state settled at 1; all who ask share both. Raises InputError where
+    samples, ``time_step`` (s) apart, are too far apart to hold 20 Hz.
     """
     from scipy.signal import butter, sosfilt_zi  # slow to import
 

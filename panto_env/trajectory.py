@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,8 +72,9 @@ class Trajectory:
         mean, std = float(filtered.mean()), float(filtered.std())
         near = (self.support_position > lowest - 1e-6) & (self.support_position < highest + 1e-6)
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
-        effort = np.hypot(self.frame_force, self.head_force)[inside]
-        rates = np.diff(np.stack([self.frame_force, self.head_force])[:, inside]) / self.time_step
+        frame, head = self.frame_force[inside], self.head_force[inside]
+        frame_change, head_change = np.diff(frame), np.diff(head)
+        changes = frame_change @ frame_change + head_change @ head_change
         stride = self.speed_kmh / 3.6 * self.time_step
         return metrics.Figures(
             mean=mean,
@@ -84,8 +86,8 @@ class Trajectory:
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
             contact_loss=metrics.contact_loss(force),
             cost_function=metrics.cost_function(force, self.nominal_force, stride),
-            effort=float(np.sqrt(np.mean(effort**2))),
-            effort_rate=float(np.sqrt(np.mean((rates**2).sum(axis=0)))) if rates.size else 0.0,
+            effort=math.sqrt((frame @ frame + head @ head) / len(force)),
+            effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
             distance=float(inside.sum() * stride),
         )
 

@@ -11,11 +11,20 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..errors import InputError
-from ..plant import coupling
+from ..plant.coupling import (
+    CONTACT_FORCE,
+    FRAME_FORCE,
+    HEAD_FORCE,
+    HEAD_HEIGHT,
+    STEP,
+    STRIDE,
+    WIRE_HEIGHT,
+)
 from ..settings import suggest
 from ..task import Context, Task
 from ..task.observation import BOUND
-from ..task.reward import TERMS
+from ..task.reward import CONTACT_LOSS, COST_FUNCTION, EFFORT, RATE
+from ..task.scores import REWARD, TERM
 from ..trajectory import Trajectory
 
 SETTINGS = (
@@ -144,8 +153,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task, episode = task, task.episode
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
-        self._sample, self._terms = task.plant.sample[:, 0], task.terms[:, 0]
-        self._reward, self._ends = task.reward, (episode.terminated, episode.truncated)
+        self._plant_column, self._task_column = task.plant.run.lanes[:, 0], episode.lanes[:, 0]
+        self._terminated, self._truncated = episode.terminated, episode.truncated
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
         check_names(options, "option")
@@ -165,23 +174,28 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Hold ``action`` for one control interval. Raises InputError for an action that is not valid."""
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
-        task, plant = self.task, self.task.plant
-        task.step(checked(action, self._shape))
-        terminated, truncated = self._ends[0].item(), self._ends[1].item()
-        sample = self._sample.tolist()
+        self.task.step(checked(action, self._shape))
+        terminated, truncated = self._terminated.item(), self._truncated.item()
+        plant, scores = self._plant_column.tolist(), self._task_column.tolist()
         info: dict[str, Any] = {
-            "contact_force": sample[coupling.CONTACT_FORCE],
-            "head": sample[coupling.HEAD_HEIGHT],
-            "wire": sample[coupling.WIRE_HEIGHT],
-            "frame_force": sample[coupling.FRAME_FORCE],
-            "head_force": sample[coupling.HEAD_FORCE],
-            "position": plant.step.item() * plant.stride.item(),
-            "reward_terms": dict(zip(TERMS, self._terms.tolist(), strict=True)),
+            "contact_force": plant[CONTACT_FORCE],
+            "head": plant[HEAD_HEIGHT],
+            "wire": plant[WIRE_HEIGHT],
+            "frame_force": plant[FRAME_FORCE],
+            "head_force": plant[HEAD_FORCE],
+            "position": plant[STEP] * plant[STRIDE],
+            "reward_terms": {
+                "cost_function": scores[TERM + COST_FUNCTION],
+                "contact_loss": scores[TERM + CONTACT_LOSS],
+                "effort": scores[TERM + EFFORT],
+                "rate": scores[TERM + RATE],
+            },
         }
         if terminated or truncated:
             self._running = False
-            info["figures"] = task.figures(0).as_dict()
-        return self._observation.copy(), self._reward.item(), terminated, truncated and not terminated, info
+            info["figures"] = self.task.figures(0).as_dict()
+        reward = scores[REWARD]
+        return self._observation.copy(), reward, terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
@@ -194,14 +208,18 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 def checked(action: Any, shape: tuple[int, ...]) -> Array:
     """Action as an array of this shape. Raises InputError where it is of another or not finite."""
-    try:
-        force = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {action!r}.") from error
+    force: Array = action
+    if not (isinstance(action, np.ndarray) and action.dtype.char in "fd"):
+        try:
+            force = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"The action must be numbers in -1..1 of shape {shape}, not {action!r}."
+            ) from error
     if force.shape != shape:
         raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
     # The sum is finite where all are: cheaper than to ask each; Python adds up a few sooner than NumPy.
-    if not math.isfinite(sum(force.tolist()) if force.ndim == 1 else force.sum()):
+    if not math.isfinite(sum(force.tolist()) if force.ndim == 1 else force.sum(dtype=np.float64)):
         raise InputError(f"The action must be finite, not {action!r}; check the policy.")
     return force
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -109,14 +110,20 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
 
     The point stands at height ``wire`` (m) and yields ``compliance`` (m/N), contact spring included.
     """
-    n = len(pantograph.masses)
-    a, _ = matrices(pantograph)
-    stiffness = -a[n:, :n] * np.array(pantograph.masses)[:, None]
+    flexibility = _flexibility(pantograph.stiffnesses, compliance)
+    heights = flexibility[:, -1] * lift + flexibility[:, 0] * (wire / compliance)
+    return np.concatenate([heights, np.zeros(len(heights))])
+
+
+@lru_cache(maxsize=64)
+def _flexibility(stiffnesses: tuple[float, ...], compliance: float) -> Array:
+    """Displacement of each mass (m) by 1 N on each, (n, n), the head held by ``compliance`` (m/N)."""
+    stiffness = np.diag(stiffnesses).astype(float)
+    for i, value in enumerate(stiffnesses[:-1]):
+        stiffness[i + 1, i + 1] += value
+        stiffness[i, i + 1] = stiffness[i + 1, i] = -value
     stiffness[0, 0] += 1 / compliance
-    load = np.zeros(n)
-    load[-1] = lift
-    load[0] += wire / compliance
-    return np.concatenate([np.linalg.solve(stiffness, load), np.zeros(n)])
+    return np.linalg.inv(stiffness)
 
 
 @part

@@ -41,8 +41,8 @@ def tally(lanes: int, supports: int, time_step: float) -> Tally:
     """Sums of ``lanes`` lanes, none for 0."""
     sections, settled = low_pass_sections(time_step) if lanes else (np.zeros((0, 6)), np.zeros((0, 2)))
     return Tally(
-        sections=sections,
-        settled=settled.ravel(),
+        sections=sections.copy(),
+        settled=settled.flatten(),
         lanes=lane_table(TALLIED - FILTER if lanes else 0, lanes),
         peak=np.zeros((lanes, supports)),
     )

@@ -138,6 +138,7 @@ class Task:
         tallied = 0 if keep_samples else lanes
         self.tally = tally.tally(tallied, len(self.plant.supports), self.plant.time_step)
         self._crew = crew(lanes, self.plant.abreast)
+        self._action, self._noisy = self.episode.action, self.sensors.noisy
         self._bind()
 
     def _episode(self, reward_weights: Array) -> Episode:
@@ -256,8 +257,8 @@ class Task:
         """
         if skip is not None:
             self.episode.idle[:] = skip
-        self.episode.action[:] = action
-        if self.episode.noisy:
+        self._action[:] = action
+        if self._noisy:
             awake = self._every if skip is None else np.flatnonzero(~skip)
             self._noise.write(self.episode.noise, awake)
         if self._crew is None:
