@@ -55,7 +55,8 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     assert figures.cost_function == pytest.approx(
         np.trapezoid(np.abs(run.contact_force - run.nominal_force), dx=stride), rel=1e-9
     )
-    np.testing.assert_equal(infos[-1]["figures"], figures.as_dict())
+    # Kept sample by sample instead of computed from all of them: the same but for rounding.
+    assert infos[-1]["figures"] == pytest.approx(figures.as_dict(), rel=1e-9, nan_ok=True)
     assert "figures" not in infos[0]
 
 

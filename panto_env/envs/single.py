@@ -94,7 +94,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m or
     contact is lost for 0.5 s; the rest of the run is then charged as if without contact. At the end
-    `info["figures"]` holds the episode's figures, the same as `Trajectory.summary()`.
+    `info["figures"]` holds the episode's figures, those of `Trajectory.summary()`.
 
     ## Arguments
     `catenary`, `pantograph` (catalogue names or TOML files), `speed_kmh` (a number or a range to draw

@@ -141,7 +141,6 @@ def control_step(held, first, last):
     """
     line, wire, body, drive, run, samples, episode, tally = open_held(held)
     block, scores = stack(line, BLOCK_ROWS), stack(line, SCORE_ROWS)
-    tallies = tally.lanes.shape[0] > 0
     begin = first
     while begin < last:
         if episode.idle[begin]:
@@ -152,8 +151,7 @@ def control_step(held, first, last):
         count = awake(episode.idle, begin, alike(body, block, begin, last))
         load(run.lanes, block, STEP, begin, count)
         load(episode.lanes, scores, 0, begin, count)
-        if tallies:
-            load(tally.lanes, scores[FILTER:], 0, begin, count)
+        load(tally.lanes, scores[FILTER:], 0, begin, count)
         for i in range(count):
             scores[BEFORE, i] = block[FORCE, i]
             scores[COST, i] = 0.0
@@ -163,16 +161,14 @@ def control_step(held, first, last):
             step_block(line, wire, body, drive, run, block, begin, count)
             record_block(line, wire, samples, block, begin, count)
             judge_sample(block, scores, count)
-            if tallies:
-                count_sample(tally, samples, block, scores, begin, count)
+            count_sample(tally, samples, block, scores, begin, count)
             if s == episode.read_at:
                 read_sensors(episode, block, scores, begin, count)
         judge(episode, block, scores, begin, count)
         finish(episode, block, scores, begin, count)
-        if tallies:
-            for i in range(count):
-                scores[TOTAL, i] += scores[TERM, i]
-            store(scores[FILTER:], tally.lanes, begin, count)
+        for i in range(count):
+            scores[TOTAL, i] += scores[TERM, i]
+        store(scores[FILTER:], tally.lanes, begin, count)
         observe(episode, body.transition.shape[1], block, scores, begin, count)
         store(block, run.lanes, begin, count)
         store(scores, episode.lanes, begin, count)

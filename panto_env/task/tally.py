@@ -1,4 +1,4 @@
-"""Figures of an episode kept as it runs, where a batch has too many lanes to keep its samples."""
+"""Figures of an episode, kept as it runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..metrics import Figures, low_pass_sections
-from ..plant.coupling import FORCE, FRAME_FORCE, HEAD_FORCE, lane_table
+from ..plant.coupling import FORCE, FRAME_FORCE, HEAD_FORCE, STEP, lane_table
 from ..plant.jit import part
 from .scores import (
     COUNT,
@@ -29,7 +29,7 @@ from .scores import (
 
 
 class Tally(NamedTuple):
-    """Running sums of all lanes; arrays of no lanes keep nothing."""
+    """Running sums of all lanes."""
 
     sections: Array  # (sections, 6): EN 50317's filter, second-order sections
     settled: Array  # (2 sections,): its state settled at 1 N
@@ -38,12 +38,12 @@ class Tally(NamedTuple):
 
 
 def tally(lanes: int, supports: int, time_step: float) -> Tally:
-    """Sums of ``lanes`` lanes, none for 0."""
-    sections, settled = low_pass_sections(time_step) if lanes else (np.zeros((0, 6)), np.zeros((0, 2)))
+    """Sums of ``lanes`` lanes."""
+    sections, settled = low_pass_sections(time_step)
     return Tally(
         sections=sections.copy(),
         settled=settled.flatten(),
-        lanes=lane_table(TALLIED - FILTER if lanes else 0, lanes),
+        lanes=lane_table(TALLIED - FILTER, lanes),
         peak=np.zeros((lanes, supports)),
     )
 
@@ -91,8 +91,8 @@ def count_sample(tally, samples, block, scores, begin, count):
         scores[LOSSES, i] += 1.0 if block[FORCE, i] <= 0.0 else 0.0
     for s in range(tally.peak.shape[1]):
         for i in range(count):
-            peak, uplift = tally.peak[begin + i], samples.uplift[begin + i, 0]
-            peak[s] = max(peak[s], uplift[s])
+            row = min(int(block[STEP, i]), samples.uplift.shape[1] - 1)
+            tally.peak[begin + i, s] = max(tally.peak[begin + i, s], samples.uplift[begin + i, row, s])
 
 
 def figures(

@@ -75,8 +75,8 @@ class Task:
         masses, springs and dampers, relative, drawn likewise. distance: of an episode (m), to the end of
         the line by default; a line too short for it gets more spans. time_step (s), spacing (m), window,
         precision: see ``Numerics``. bilateral: let the contact pull, as paper 3's equations do.
-        keep_samples: keep those of a whole episode, for ``trajectory``; without them figures are kept as
-        the episode runs. Raises InputError for what is not valid.
+        keep_samples: keep those of a whole episode, for ``trajectory``.
+        Raises InputError for what is not valid.
         """
         line, panto = load_catenary(catenary), load_pantograph(pantograph)
         self.actuator = parse(Actuator, actuator, "actuator", ACTUATORS)
@@ -135,8 +135,7 @@ class Task:
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
         self.samples = self.plant.samples(rows, tension=record_droppers)
-        tallied = 0 if keep_samples else lanes
-        self.tally = tally.tally(tallied, len(self.plant.supports), self.plant.time_step)
+        self.tally = tally.tally(lanes, len(self.plant.supports), self.plant.time_step)
         self._crew = crew(lanes, self.plant.abreast)
         self._action, self._noisy = self.episode.action, self.sensors.noisy
         self._bind()
@@ -223,8 +222,7 @@ class Task:
         episode.past[:, :, lane] = sample[list(SENSED)]
         if self.keep_samples:
             self.samples.channels[lane, 0] = sample
-        else:
-            tally.clear(self.tally, lane)
+        tally.clear(self.tally, lane)
         if episode.noisy:
             self._noise.start(lane, random)
             self._noise.write(episode.noise, np.array([lane]))
@@ -273,9 +271,7 @@ class Task:
         self.plant.advance(np.zeros((self.lanes, 2)), self.end(0), self.samples)
 
     def figures(self, lane: int) -> Figures:
-        """Figures of a lane's run so far, the same as its trajectory's summary."""
-        if self.keep_samples:
-            return self.trajectory(lane).summary()
+        """Figures of a lane's control steps so far, the same as its trajectory's summary."""
         return tally.figures(
             self.tally,
             lane,
