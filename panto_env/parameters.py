@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from .errors import InputError
-from .settings import Settings
+from .settings import Settings, hint
 
 S = TypeVar("S", bound=Settings)
 
@@ -34,12 +33,11 @@ def check_name(name: str, entry: Settings) -> None:
     if name in known:
         return
     owner = getattr(entry, "name", None)
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
     # Of a list its first place stands for all: droppers alone would fill the line.
     shown = [each for each in known if not each[-1].isdigit() or each.endswith(".0")]
     raise InputError(
-        f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint}known are {', '.join(shown)}"
+        f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint(name, known)}"
+        f"known are {', '.join(shown)}"
         f"{' (lists count from 0)' if shown != known else ''}."
     )
 

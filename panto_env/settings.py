@@ -57,6 +57,10 @@ def explain(error: ValidationError) -> str:
 
 def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
     """A clause with the nearest known name, if any is near, and all of them."""
+    return f"{hint(name, known)}known are {', '.join(known)}"
+
+
+def hint(name: str, known: list[str] | tuple[str, ...]) -> str:
+    """A question that names the nearest known name, or nothing if none is near."""
     near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}known are {', '.join(known)}"
+    return f"did you mean '{near[0]}'? " if near else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, fields
@@ -18,7 +17,7 @@ from .parameters import change, check_name, parameter_names
 from .plant.actuator import ACTUATORS, Actuator
 from .plant.line_condition import LINE_CONDITIONS, LineCondition
 from .plant.sensor import SENSORS, Sensors
-from .settings import Settings, parse
+from .settings import Settings, hint, parse
 from .simulation import simulate
 from .task.policy import find_policy
 from .task.task import DEFAULT_LINE, DEFAULT_SPEED_KMH
@@ -122,11 +121,10 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
         check_name(name, entries[family])
         return
     everything = [n for each, entry in entries.items() for n in parameter_names(entry, each)]
-    near = difflib.get_close_matches(name, [SPEED, *everything], n=1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
+    near = hint(name, [SPEED, *everything])
     families = ", ".join(f"'{each}.'" for each in (*entries, POLICY))
     raise InputError(
-        f"Unknown parameter '{name}': {hint}it must be {SPEED} or begin with one of {families} "
+        f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
         "(as pantograph.masses.0)."
     )
 

@@ -8,10 +8,21 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from ..errors import InputError
 from ..metrics import en50367_checks
 from ..trajectory import Trajectory
 from .output import Json, Plot, console, number, print_json, progress_console
+from .pass_options import (
+    ActuatorName,
+    Bilateral,
+    Catenary,
+    Distance,
+    LineConditionName,
+    Pantograph,
+    Seed,
+    SensorsName,
+    Spans,
+    parse_spans,
+)
 
 LINES = (
     ("mean", "mean force F_m", "N", 1.0),
@@ -30,28 +41,24 @@ LINES = (
 
 
 def simulate(
-    catenary: Annotated[str, typer.Option(help="Line: a catalogue name or TOML file.")] = "en50318-2002",
-    pantograph: Annotated[str, typer.Option(help="Pantograph, likewise.")] = "en50318-2002",
+    catenary: Catenary = "en50318-2002",
+    pantograph: Pantograph = "en50318-2002",
     speed: Annotated[float, typer.Option(help="Train speed (km/h).")] = 300.0,
     policy: Annotated[
         str | None, typer.Option(help="Policy: a name, name:key=value,... or a model file.")
     ] = None,
-    spans: Annotated[
-        str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")
-    ] = None,
-    distance: Annotated[float | None, typer.Option(help="How far to run (m).")] = None,
-    actuator: Annotated[str, typer.Option(help="Actuator: ideal or realistic.")] = "ideal",
-    sensors: Annotated[str, typer.Option(help="Sensors: ideal or realistic.")] = "ideal",
-    line_condition: Annotated[str, typer.Option(help="Line: new, fair or worn.")] = "new",
-    seed: Annotated[int, typer.Option(help="Seed of irregularity and noise.")] = 0,
+    spans: Spans = None,
+    distance: Distance = None,
+    actuator: ActuatorName = "ideal",
+    sensors: SensorsName = "ideal",
+    line_condition: LineConditionName = "new",
+    seed: Seed = 0,
     time_step: Annotated[float | None, typer.Option(help="Time step (ms).")] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid of the flexible line (m).")] = None,
     window: Annotated[
         int | None, typer.Option(help="Spans computed about the train, odd; 0: the whole line.")
     ] = None,
-    bilateral: Annotated[
-        bool, typer.Option("--bilateral", help="Let the contact pull, as paper 3 does.")
-    ] = False,
+    bilateral: Bilateral = False,
     output: Annotated[str | None, typer.Option(help="Save the run to this Parquet file.")] = None,
     plot: Plot = None,
     json: Json = False,
@@ -111,16 +118,6 @@ def simulate(
         "EN 50367 (as recalled):",
         ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),
     )
-
-
-def parse_spans(text: str | None) -> tuple[int, int] | None:
-    """Spans from "5-6". Raises InputError where the text is not two whole numbers."""
-    if text is None:
-        return None
-    first, dash, last = text.partition("-")
-    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
-        raise InputError(f"--spans must read first-last, as 5-6, not '{text}'.")
-    return int(first), int(last)
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:

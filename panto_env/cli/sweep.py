@@ -14,7 +14,18 @@ from rich.table import Table
 
 from ..errors import InputError
 from .output import Json, Plot, console, number, print_json, progress_console
-from .simulate import parse_spans
+from .pass_options import (
+    ActuatorName,
+    Bilateral,
+    Catenary,
+    Distance,
+    LineConditionName,
+    Pantograph,
+    Seed,
+    SensorsName,
+    Spans,
+    parse_spans,
+)
 
 COLUMNS = (
     ("mean", "F_m\n(N)", 1.0),
@@ -36,24 +47,20 @@ def sweep(
             "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),
     ],
-    catenary: Annotated[str, typer.Option(help="Line: a catalogue name or TOML file.")] = "en50318-2002",
-    pantograph: Annotated[str, typer.Option(help="Pantograph, likewise.")] = "en50318-2002",
+    catenary: Catenary = "en50318-2002",
+    pantograph: Pantograph = "en50318-2002",
     speed: Annotated[float | None, typer.Option(help="Train speed (km/h) where it is not swept.")] = None,
     policy: Annotated[
         list[str] | None,
         typer.Option(help="Policy: a name, name:key=value,... or a model file; can be given again."),
     ] = None,
-    spans: Annotated[
-        str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")
-    ] = None,
-    distance: Annotated[float | None, typer.Option(help="How far to run (m).")] = None,
-    actuator: Annotated[str, typer.Option(help="Actuator: ideal or realistic.")] = "ideal",
-    sensors: Annotated[str, typer.Option(help="Sensors: ideal or realistic.")] = "ideal",
-    line_condition: Annotated[str, typer.Option(help="Line: new, fair or worn.")] = "new",
-    seed: Annotated[int, typer.Option(help="Seed of irregularity and noise.")] = 0,
-    bilateral: Annotated[
-        bool, typer.Option("--bilateral", help="Let the contact pull, as paper 3 does.")
-    ] = False,
+    spans: Spans = None,
+    distance: Distance = None,
+    actuator: ActuatorName = "ideal",
+    sensors: SensorsName = "ideal",
+    line_condition: LineConditionName = "new",
+    seed: Seed = 0,
+    bilateral: Bilateral = False,
     workers: Annotated[int | None, typer.Option(help="Threads; one a core unless told otherwise.")] = None,
     output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
     plot: Plot = None,

@@ -37,15 +37,7 @@ class Body(NamedTuple):
 def matrices(pantograph: PantographData) -> tuple[Array, Array]:
     """State matrix A, (2n, 2n), and inputs [contact, frame, head pair], (2n, 3), of x' = Ax + Bf."""
     n = len(pantograph.masses)
-    stiffness, damping = np.zeros((n, n)), np.zeros((n, n))
-    chains = zip((stiffness, damping), (pantograph.stiffnesses, pantograph.dampings), strict=True)
-    for matrix, values in chains:
-        for i, value in enumerate(values):
-            matrix[i, i] += value
-            if i + 1 < n:
-                matrix[i + 1, i + 1] += value
-                matrix[i, i + 1] -= value
-                matrix[i + 1, i] -= value
+    stiffness, damping = _chain(pantograph.stiffnesses), _chain(pantograph.dampings)
     inverse_mass = np.diag(1 / np.array(pantograph.masses))
     forces = np.zeros((n, 3))
     forces[0, 0] = -1.0
@@ -56,6 +48,15 @@ def matrices(pantograph: PantographData) -> tuple[Array, Array]:
     a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse_mass @ stiffness, -inverse_mass @ damping]])
     b = np.vstack([np.zeros((n, 3)), inverse_mass @ forces])
     return a, b
+
+
+def _chain(values: tuple[float, ...]) -> Array:
+    """Matrix, (n, n), of springs or dampers between each mass and the next, the last to the ground."""
+    matrix = np.diag(values).astype(float)
+    for i, value in enumerate(values[:-1]):
+        matrix[i + 1, i + 1] += value
+        matrix[i, i + 1] = matrix[i + 1, i] = -value
+    return matrix
 
 
 def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Array]:
@@ -118,10 +119,7 @@ def rest(pantograph: PantographData, lift: float, wire: float, compliance: float
 @lru_cache(maxsize=64)
 def _flexibility(stiffnesses: tuple[float, ...], compliance: float) -> Array:
     """Displacement of each mass (m) by 1 N on each, (n, n), the head held by ``compliance`` (m/N)."""
-    stiffness = np.diag(stiffnesses).astype(float)
-    for i, value in enumerate(stiffnesses[:-1]):
-        stiffness[i + 1, i + 1] += value
-        stiffness[i, i + 1] = stiffness[i + 1, i] = -value
+    stiffness = _chain(stiffnesses)
     stiffness[0, 0] += 1 / compliance
     return np.linalg.inv(stiffness)
 

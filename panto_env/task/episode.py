@@ -37,6 +37,7 @@ from .scores import (
     END,
     FILTER,
     GONE,
+    LOSSES,
     LOST,
     READING,
     READINGS,
@@ -168,6 +169,7 @@ def control_step(held, first, last):
         finish(episode, block, scores, begin, count)
         for i in range(count):
             scores[TOTAL, i] += scores[TERM, i]
+            scores[LOSSES, i] += scores[GONE, i]
         store(scores[FILTER:], tally.lanes, begin, count)
         observe(episode, body.transition.shape[1], block, scores, begin, count)
         store(block, run.lanes, begin, count)

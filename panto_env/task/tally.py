@@ -88,7 +88,6 @@ def count_sample(tally, samples, block, scores, begin, count):
         scores[SQUARE, i] += (filtered - nominal) * (filtered - nominal)
         scores[MAX, i] = max(scores[MAX, i], filtered)
         scores[MIN, i] = min(scores[MIN, i], filtered)
-        scores[LOSSES, i] += 1.0 if block[FORCE, i] <= 0.0 else 0.0
     for s in range(tally.peak.shape[1]):
         for i in range(count):
             row = min(int(block[STEP, i]), samples.uplift.shape[1] - 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...catalog import load_catenary, load_pantograph
 from ...errors import InputError
+from ...machine import cores
 from ...metrics import Figures
 from ...task import Task
 from ...task.policy import find_policy
@@ -49,10 +49,9 @@ class Result:
 
 def run_all(cases: Sequence[Case], progress: Callable[[float], None]) -> dict[Case, Result]:
     """Run cases on all cores; ``progress`` is told the share done. Raises InputError if a worker dies."""
-    workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     results: dict[Case, Result] = {}
     # Spawned, not forked: threads of Numba do not survive a fork.
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(cores(), mp_context=get_context("spawn"))
     try:
         for future in as_completed([pool.submit(run, batch) for batch in _batches(cases)]):
             results |= {result.case: result for result in future.result()}
