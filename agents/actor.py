@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.task import Context
+from panto_env.policies import Context
 
 Weights = NDArray[np.float32]
 

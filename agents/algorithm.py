@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from panto_env.settings import Positive, Settings
+from panto_env.base.settings import Positive, Settings
 
 from .actor import Actor
 

@@ -9,7 +9,7 @@ import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
-from panto_env.cli.output import progress_console
+from panto_env.terminal import progress_console
 
 from .evaluation import Pair, in_words
 

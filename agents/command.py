@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from panto_env.cli.output import Json, Plot, console, number, print_json, progress_console
-from panto_env.errors import InputError
+from panto_env.base.errors import InputError
+from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
 
 if TYPE_CHECKING:
     from .evaluation import Pair
@@ -93,7 +93,7 @@ def evaluate(
 
     What is not given is as it was in the model's training.
     """
-    from panto_env.task.policy import find_policy
+    from panto_env.policies import find_policy
 
     from .evaluation import Comparison, evaluated_spans, in_words
     from .policy import TrainedPolicy
@@ -114,7 +114,7 @@ def evaluate(
     with progress_console.status("running"):
         pairs = comparison.run(found)
     if plot is not None:
-        from panto_env import figures
+        from panto_env.analysis import plots as figures
 
         runs = comparison.passes(found, comparison.speeds_kmh[0], 0)
         first = (evaluated_spans(runs[1]) or (1, 2))[0]

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from panto_baselines.benchmark import FIRST_SPAN
-from panto_baselines.statistics import mean_range
+from panto_baselines.benchmark.run import FIRST_SPAN
+from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
-from panto_env.metrics import Figures
+from panto_env.metrics.figures import Figures
 
 DROPPED = ("speed_kmh", "reward")  # arguments of an environment that a pass has not, or its own
 

@@ -18,10 +18,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from panto_env import __version__
-from panto_env.errors import InputError
-from panto_env.files import write_whole
-from panto_env.settings import Settings
-from panto_env.task import Context
+from panto_env.base.errors import InputError
+from panto_env.base.files import write_whole
+from panto_env.base.settings import Settings
+from panto_env.policies import Context
 
 from .actor import Actor
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from panto_env.errors import InputError
-from panto_env.files import write_whole
+from panto_env.base.errors import InputError
+from panto_env.base.files import write_whole
 
 from .evaluation import Pair
 from .model_file import read_model

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from panto_env.errors import InputError
-from panto_env.settings import NonNegative
+from panto_env.base.errors import InputError
+from panto_env.base.settings import NonNegative
 
 from .actor import Actor
 from .algorithm import Algorithm, Count, Share

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.settings import Positive, Settings, parse, suggest
+from panto_env.control import Task
 from panto_env.envs import IDS
 from panto_env.envs.single import SETTINGS
-from panto_env.errors import InputError
-from panto_env.files import read_toml
-from panto_env.settings import Positive, Settings, parse, suggest
-from panto_env.task import Task
 
 from .algorithm import Algorithm, Count
 from .ppo import PPO

@@ -12,7 +12,7 @@ import torch
 from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 
-from panto_env.task import Task
+from panto_env.control import Task
 
 from .callbacks import Bar, EpisodeLog, Regular
 from .evaluation import Comparison, Pair, verdict

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .trajectory import Trajectory
+from .metrics.trajectory import Trajectory
 
 
 def picture(run: Trajectory) -> NDArray[np.uint8]:

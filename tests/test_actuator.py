@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
+from panto_env.base.settings import parse
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.actuator import ACTUATORS, Actuator
-from panto_env.plant.coupling import FRAME_FORCE
+from panto_env.plant.actuators.lagged import ACTUATORS, Actuator
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
-from panto_env.settings import parse
+from panto_env.plant.step import FRAME_FORCE
 
 STEP = 1e-3
 

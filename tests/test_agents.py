@@ -29,7 +29,7 @@ from panto_agents.policy import load
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
 from panto_env import InputError, simulate
-from panto_env.task import Task
+from panto_env.control import Task
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
@@ -205,8 +205,8 @@ class TestPolicy:
         assert one.policy == str(finished.model)
 
     def test_takes_part_in_the_benchmark(self, finished):
-        from panto_baselines.benchmark import run
-        from panto_baselines.settings import BenchmarkSettings, Line
+        from panto_baselines.benchmark.run import run
+        from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 
         line = Line(distance=310.0, speeds_kmh=(300.0,), spans=(3, 5))
         path = str(finished.best)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from panto_baselines.fb_ff import FeedbackFeedforward
-from panto_baselines.passive import Passive
-from panto_baselines.pd import ProportionalDerivative
-from panto_baselines.proportional import Proportional
+from panto_baselines.policies.fb_ff import FeedbackFeedforward
+from panto_baselines.policies.passive import Passive
+from panto_baselines.policies.pd import ProportionalDerivative
+from panto_baselines.policies.proportional import Proportional
 from panto_env import InputError, simulate
-from panto_env.task import Context, Policy, Task
-from panto_env.task.policy import find_policy
+from panto_env.control import Task
+from panto_env.policies import Context, Policy, find_policy
 
 SPEED_KMH = 300.0
 POLICIES = {

@@ -15,12 +15,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_baselines import benchmark, command, plot, statistics
-from panto_baselines.benchmark import Benchmark
-from panto_baselines.settings import BenchmarkSettings, Line, load_benchmark
-from panto_baselines.single_pass import Row
+from panto_baselines.benchmark import command, plot, statistics
+from panto_baselines.benchmark import run as benchmark
+from panto_baselines.benchmark.run import Benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.benchmark.single_pass import Row
 from panto_env import InputError, simulate
-from panto_env.settings import parse
+from panto_env.base.settings import parse
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}

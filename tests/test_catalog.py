@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 from pydantic import BaseModel
 
+from panto_env.base.errors import InputError
 from panto_env.catalog import (
     FlexibleCatenaryData,
     PantographData,
@@ -21,7 +22,6 @@ from panto_env.catalog import (
     load_catenary,
     load_pantograph,
 )
-from panto_env.errors import InputError
 
 LOADERS: dict[str, Callable[[Any], Any]] = {
     "catenary": load_catenary,

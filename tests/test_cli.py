@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from panto_env import Trajectory, validation
+from panto_env import Trajectory
+from panto_env.studies.en50318 import study as validation
 
 PANTO = Path(sys.executable).with_name("panto")
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
-from panto_env.errors import InputError
 from panto_env.identification import (
     EXPERIMENTS,
     FILTERED,
@@ -30,7 +30,7 @@ from panto_env.identification import (
 )
 from panto_env.identification.model import matrices
 from panto_env.identification.response import polynomials, respond
-from panto_env.plant import pantograph
+from panto_env.plant.pantograph import build as pantograph
 
 TRUTH = parameters_of(load_pantograph("identified-2dof"))
 KNOWN = {name: TRUTH[name] for name in MEASURED}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
-from panto_env.errors import InputError
 from panto_env.identification import (
     EXPERIMENTS,
     SWEEP,

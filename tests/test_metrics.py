@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from panto_env import InputError, metrics
+from panto_env import InputError
+from panto_env.metrics import figures as metrics
 
 
 def test_low_pass_keeps_slow_and_stops_fast_waves():

@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from panto_env.catalog import available, load_pantograph
-from panto_env.plant import pantograph
+from panto_env.plant.pantograph import build as pantograph
 
 
 @pytest.mark.parametrize("name", available("pantograph"))

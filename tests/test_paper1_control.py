@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.control.task import Task
+from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
 from panto_env.studies.paper1_control.angles import wrap
 from panto_env.studies.paper1_control.cases import (
@@ -30,8 +32,6 @@ from panto_env.studies.paper1_control.cases import (
 )
 from panto_env.studies.paper1_control.linear import amplification
 from panto_env.studies.paper1_control.passes import band_rms, longest, pressed, records, run
-from panto_env.task.policy import find_policy
-from panto_env.task.task import Task
 
 # --- helpers -------------------------------------------------------------------------------------
 

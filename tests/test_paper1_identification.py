@@ -4,7 +4,7 @@ import pytest
 from panto_env import studies
 from panto_env.catalog import load_pantograph
 from panto_env.identification import IDENTIFIED, parameters_of
-from panto_env.studies.paper1_published import (
+from panto_env.studies.paper1_identification.published import (
     PUBLISHED,
     best_performance,
     dry_friction,
@@ -68,7 +68,7 @@ def test_dry_friction_found_by_harmonic_balance_gives_the_force_back():
 
 
 def _complex_force(printed):
-    from panto_env.studies.paper1_published import per_plate
+    from panto_env.studies.paper1_identification.published import per_plate
 
     return per_plate(TRUTH, printed.frequency)[0]
 

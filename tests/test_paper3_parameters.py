@@ -4,10 +4,10 @@ from math import inf
 import numpy as np
 import pytest
 
+from panto_env.analysis.sweep import sweep
 from panto_env.studies import find_study, write
 from panto_env.studies.paper3_parameters.equations import Equations
 from panto_env.studies.paper3_parameters.passes import influences, run_pass
-from panto_env.sweep import sweep
 
 PLANT = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
 

@@ -11,9 +11,10 @@ import pytest
 
 import panto_env
 import panto_env.speed as measured
-from panto_env import machine
-from panto_env.cli import speed, speed_tables
-from panto_env.figures import plot_speed
+from panto_env.analysis.plots import plot_speed
+from panto_env.base import machine
+from panto_env.cli import speed
+from panto_env.studies.throughput import tables as speed_tables
 
 ROOT = Path(panto_env.__file__).parents[1]
 chooses_cores = pytest.mark.skipif(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from panto_env.catalog import available, load_catenary
-from panto_env.plant.catenary import static_shape
+from panto_env.plant.catenary.flexible import static_shape
 
 from .judge import finite_element
 

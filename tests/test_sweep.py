@@ -8,11 +8,11 @@ import pyarrow.parquet
 import pytest
 
 from panto_env import InputError, simulate
+from panto_env.analysis.parameters import change, parameter_names
+from panto_env.analysis.sweep import sweep
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.cli.sweep import parse_values
-from panto_env.parameters import change, parameter_names
-from panto_env.plant.actuator import Actuator
-from panto_env.sweep import sweep
+from panto_env.plant.actuators.lagged import Actuator
 
 PANTO = Path(sys.executable).with_name("panto")
 PAPER_3 = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
@@ -154,7 +154,7 @@ def test_bad_input_is_refused_in_one_sentence(values, settings, message):
 
 
 def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
-    monkeypatch.setattr("panto_env.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
+    monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
     with pytest.raises(InputError, match="can't be -1"):
         sweep({"pantograph.masses.0": [7.0, 8.0, -1.0]})
 
@@ -224,7 +224,7 @@ def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path
 
 
 def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
-    from panto_env.files import write_rows
+    from panto_env.base.files import write_rows
 
     path = tmp_path / "s.parquet"
     path.write_text("mine")
@@ -236,7 +236,7 @@ def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
 
 
 def test_plot_shows_what_varies():
-    from panto_env.figures import plot_sweep
+    from panto_env.analysis.plots import plot_sweep
 
     rows = sweep(
         {"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3, policies=[None, "p"]

@@ -2,9 +2,10 @@ import json
 
 import pytest
 
-from panto_env import simulate, validation
+from panto_env import simulate
 from panto_env.cli import validate
 from panto_env.plant.numerics import Numerics
+from panto_env.studies.en50318 import study as validation
 
 from .judge import __main__ as judge
 

@@ -2,12 +2,13 @@ import numba
 import numpy as np
 import pytest
 
-from panto_env import simulate, validation
+from panto_env import simulate
+from panto_env.backend.compile import OPTIONS
 from panto_env.catalog import load_catenary
-from panto_env.plant import coupling
-from panto_env.plant.catenary import flexible
-from panto_env.plant.jit import OPTIONS
+from panto_env.plant import step as coupling
+from panto_env.plant.catenary.flexible import build as flexible
 from panto_env.plant.numerics import Numerics
+from panto_env.studies.en50318 import study as validation
 
 
 @numba.njit(**OPTIONS)

@@ -12,8 +12,8 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from ..errors import InputError
-from ..files import read_toml
+from ..base.errors import InputError
+from ..base.files import read_toml
 from .schema import (
     Catenary,
     CatenaryData,

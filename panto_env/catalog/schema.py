@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..settings import NonNegative, Positive, Settings
+from ..base.settings import NonNegative, Positive, Settings
 
 
 class Entry(Settings):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from importlib.metadata import entry_points
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 COMMANDS = "panto_env.commands"
 """Entry-point group of sub-commands that other packages bring."""

@@ -9,10 +9,10 @@ import typer
 from pydantic import BaseModel
 from rich.table import Table
 
+from ..base.errors import InputError
 from ..catalog import available, load_catenary, load_pantograph
-from ..errors import InputError
-from ..task.policy import policy_names
-from .output import Json, console, print_json
+from ..policies import policy_names
+from ..terminal import Json, console, print_json
 
 LOADERS: dict[str, Callable[[str], Any]] = {"catenary": load_catenary, "pantograph": load_pantograph}
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from ..errors import InputError
-from .output import Json, Plot, console, number, print_json, progress_console
+from ..base.errors import InputError
+from ..terminal import Json, Plot, console, number, print_json, progress_console
 
 
 class Method(StrEnum):
@@ -57,7 +57,7 @@ def identify(
     names = dict(zip(Method, ident.METHODS, strict=True))
     known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])])}
     if plot is not None:
-        from ..figures import check_picture
+        from ..analysis.plots import check_picture
 
         check_picture(plot)
     record = ident.read_record(file, dict(_pairs(unit or [])))
@@ -78,8 +78,8 @@ def identify(
         force, source = _static_force(static_force, record.force, file)
         ident.write_pantograph(chosen, output, record=file.name, static_force=force, force_source=source)
     if plot is not None and chosen is not None:
-        from ..figures import save
-        from ..identification.figures import plot_matches
+        from ..analysis.plots import save
+        from ..identification.plots import plot_matches
 
         time = record.time
         title = f"{file.name}, model by {chosen.method}"

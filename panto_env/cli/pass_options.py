@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 Catenary = Annotated[str, typer.Option(help="Line: a catalogue name or TOML file.")]
 Pantograph = Annotated[str, typer.Option(help="Pantograph, likewise.")]

@@ -10,7 +10,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from .. import studies
-from .output import console, number, progress_console
+from ..terminal import console, number, progress_console
 
 
 def reproduce(

@@ -8,9 +8,9 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from ..metrics import en50367_checks
-from ..trajectory import Trajectory
-from .output import Json, Plot, console, number, print_json, progress_console
+from ..metrics.figures import en50367_checks
+from ..metrics.trajectory import Trajectory
+from ..terminal import Json, Plot, console, number, print_json, progress_console
 from .pass_options import (
     ActuatorName,
     Bilateral,
@@ -64,7 +64,7 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Simulate one pass along a line and print its figures."""
-    from ..simulation import simulate as run
+    from ..analysis.simulation import simulate as run
 
     settings: dict[str, Any] = {
         "actuator": actuator,
@@ -81,7 +81,7 @@ def simulate(
         settings["window"] = window
     chosen = parse_spans(spans)
     if plot is not None:
-        from ..figures import check_picture, plot_run, save
+        from ..analysis.plots import check_picture, plot_run, save
 
         check_picture(plot)
     with Progress(

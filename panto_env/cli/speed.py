@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from ..errors import InputError
-from .output import Json, Plot, console, print_json, progress_console
+from ..base.errors import InputError
+from ..terminal import Json, Plot, console, print_json, progress_console
 
 if TYPE_CHECKING:
-    from .speed_tables import Sheet
+    from ..studies.throughput.tables import Sheet
 
 
 def speed(
@@ -31,17 +31,17 @@ def speed(
     """
     if json and markdown:
         raise InputError("Give one of --json and --markdown, not both.")
-    from ..speed import measure
-    from . import speed_tables
+    from ..studies.throughput import tables as speed_tables
+    from ..studies.throughput.measure import measure
 
     if plot is not None:
-        from ..figures import check_picture
+        from ..analysis.plots import check_picture
 
         check_picture(plot)
     with progress_console.status("measuring") as status:
         result = measure(repeats, report=lambda what: status.update(f"measuring {what}"))
     if plot is not None:
-        from ..figures import plot_speed, save
+        from ..analysis.plots import plot_speed, save
 
         save(plot_speed(result), plot)
     if json:

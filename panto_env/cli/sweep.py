@@ -12,8 +12,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 from rich.table import Table
 
-from ..errors import InputError
-from .output import Json, Plot, console, number, print_json, progress_console
+from ..base.errors import InputError
+from ..terminal import Json, Plot, console, number, print_json, progress_console
 from .pass_options import (
     ActuatorName,
     Bilateral,
@@ -67,15 +67,15 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Run every value of one parameter, or every pair of two, and print the figures."""
-    from .. import files
-    from ..sweep import SPEED
-    from ..sweep import sweep as run
+    from ..analysis.sweep import SPEED
+    from ..analysis.sweep import sweep as run
+    from ..base import files
 
     values = _parse(parameters)
     if output is not None:
         files.check_table(output)
     if plot is not None:
-        from ..figures import check_picture, plot_sweep, save
+        from ..analysis.plots import check_picture, plot_sweep, save
 
         check_picture(plot)
     settings: dict[str, Any] = {"distance": distance, "bilateral": bilateral, "seed": seed}

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from .. import validation
-from .output import Json, Plot, console, number, print_json, progress_console
+from ..studies.en50318 import study as validation
+from ..terminal import Json, Plot, console, number, print_json, progress_console
 
 
 def validate(
@@ -26,7 +26,7 @@ def validate(
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
     if plot is not None:
-        from .. import figures
+        from ..analysis import plots as figures
 
         figures.check_picture(plot)
     runs = validation.reference_runs()

@@ -9,23 +9,16 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
-from ..errors import InputError
-from ..plant.coupling import (
-    CONTACT_FORCE,
-    FRAME_FORCE,
-    HEAD_FORCE,
-    HEAD_HEIGHT,
-    STEP,
-    STRIDE,
-    WIRE_HEIGHT,
-)
-from ..settings import suggest
-from ..task import Context, Task
-from ..task.observation import BOUND
-from ..task.reward import CONTACT_LOSS, COST_FUNCTION, EFFORT, RATE
-from ..task.scores import REWARD, TERM
-from ..trajectory import Trajectory
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import suggest
+from ..control import Task
+from ..control.observation import BOUND
+from ..control.reward import CONTACT_LOSS, COST_FUNCTION, EFFORT, RATE
+from ..control.rows import REWARD, TERM
+from ..metrics.trajectory import Trajectory
+from ..plant.step import CONTACT_FORCE, FRAME_FORCE, HEAD_FORCE, HEAD_HEIGHT, STEP, STRIDE, WIRE_HEIGHT
+from ..policies import Context
 
 SETTINGS = (
     "catenary",

@@ -12,10 +12,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..task import Task
-from ..task.observation import BOUND
-from ..task.reward import TERMS
+from ..base.errors import InputError
+from ..control import Task
+from ..control.observation import BOUND
+from ..control.reward import TERMS
 from .single import check_names, checked
 
 Lanes = NDArray[np.bool_]

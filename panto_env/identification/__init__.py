@@ -1,5 +1,6 @@
 """Identification of a pantograph from records of a rig (paper 1, sections 2 to 4), and beyond."""
 
+from ..analysis.pool import pool
 from .coverage import Trials, run_trials
 from .equation_error import FILTERED, PRINTED, equations, fit_equation_error, three_points
 from .experiments import EXPERIMENTS, SWEEP, Excitation, add_noise, clean_record
@@ -12,7 +13,6 @@ from .pantograph_file import write_pantograph
 from .performance import Match, force_matches, matches
 from .record import Record
 from .record_file import read_record, write_record
-from .workers import pool
 
 __all__ = [
     "EXPERIMENTS",

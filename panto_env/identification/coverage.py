@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..base.arrays import Array
 from .experiments import Excitation, add_noise, clean_record
 from .methods import identify
 from .model import IDENTIFIED, MEASURED, Parameters

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
 from .fit import Fit, free_names
 from .low_pass import low_pass
 from .model import IDENTIFIED, Parameters, check_known

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..base.arrays import Array
 from .model import Parameters
 from .record import Record
 from .response import contact_force, rest_on_plate, under_plate

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..base.arrays import Array
 from .model import IDENTIFIED, UNITS, Parameters
 
 CONFIDENCE = 0.95

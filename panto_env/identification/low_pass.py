@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
 from .record import Record
 
 ATTENUATION = 60.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .equation_error import FILTERED, PRINTED, fit_equation_error
 from .fit import Fit
 from .low_pass import excited_band

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Array
+from ..base.arrays import Array
+from ..base.errors import InputError
 from ..catalog import PantographData
-from ..errors import InputError
 
 Parameters = Mapping[str, float]
 """Values by the names in ``UNITS``, SI."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
 from .equation_error import FILTERED, solve
 from .fit import Fit, free_names
 from .low_pass import low_pass

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
 from .model import Parameters, matrices
 from .record import Record
 from .response import contact_force, fitted_response, force_matrices

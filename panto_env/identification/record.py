@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
 
 SHORTEST = 20
 """Samples that a record must have at least; what a method needs beyond this it says itself."""

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
-from ..files import write_whole
-from ..settings import suggest
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.files import write_whole
+from ..base.settings import suggest
 from .record import Record, equal_step
 
 NAMES = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
-from ..plant.jit import kernel
+from ..backend.compile import kernel
+from ..base.arrays import Array
+from ..base.errors import InputError
 from .model import Parameters, matrices
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .jit import part
+from ..backend.compile import part
 
 
 @part

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator
 
-from ..arrays import Array
-from ..settings import NonNegative, Positive, Settings
+from ..base.arrays import Array
+from ..base.settings import NonNegative, Positive, Settings
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a fair line (seen in one toy model).
 IRREGULARITY = ((12.0, 0.15e-3), (5.0, 0.08e-3), (1.5, 0.03e-3))

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from ..settings import Positive, Settings
+from ..base.settings import Positive, Settings
 
 
 class Numerics(Settings):

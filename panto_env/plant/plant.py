@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..backend.block import WIDTH
+from ..backend.packed import bind
+from ..base.arrays import Array
+from ..base.errors import InputError
 from ..catalog.schema import CatenaryData, PantographData, PeriodicStiffnessData
-from ..errors import InputError
-from . import actuator as actuators
-from . import coupling, pantograph
+from . import step as coupling
+from .actuators import lagged as actuators
 from .catenary import MODELS
-from .coupling import CHANNELS, Run, Samples
-from .held import bind
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
-from .stack import WIDTH
+from .pantograph import build as pantograph
+from .step import CHANNELS, Run, Samples
 
 
 class Plant:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from ..errors import InputError
-from ..settings import suggest
+from ..base.errors import InputError
+from ..base.settings import suggest
 from .study import Comparison, Outcome, Report, Study, Table, write
 
 __all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
 
 STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper3-parameters")
-"""Names of all studies; the module of "paper3-parameters" is ``paper3_parameters``."""
+"""Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""
 
 
 def find_study(name: str) -> Study:
     """The study of this name. Raises InputError where there is none."""
     if name not in STUDIES:
         raise InputError(f"Unknown study '{name}': {suggest(name, [*STUDIES, 'all'])}.")
-    study: Study = import_module(f".{name.replace('-', '_')}", __name__).run
+    study: Study = import_module(f".{name.replace('-', '_')}.study", __name__).run
     return study

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..figures import save
-from ..files import finite, write_whole
+from ..analysis.plots import save
+from ..base.files import finite, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

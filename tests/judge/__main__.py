@@ -8,7 +8,7 @@ from rich.table import Table
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
-from panto_env.validation import in_use
+from panto_env.studies.en50318.study import in_use
 
 from . import finite_element
 

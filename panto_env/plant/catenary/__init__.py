@@ -7,7 +7,9 @@ Each module provides the functions that ``Plant`` calls (``wave_speed``, ``line_
 
 from types import ModuleType
 
-from . import flexible, periodic_stiffness, three_span
+from .flexible import build as flexible
+from .periodic_stiffness import build as periodic_stiffness
+from .three_span import build as three_span
 
 MODELS: dict[str, ModuleType] = {
     "flexible": flexible,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...catalog import FlexibleCatenaryData, load_catenary, load_pantograph
-from ...plant.pantograph import matrices
+from ...plant.pantograph.build import matrices
 from .cases import LINE, PANTOGRAPH
 
 

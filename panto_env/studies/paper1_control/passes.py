@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Array
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.machine import cores
 from ...catalog import load_catenary, load_pantograph
-from ...errors import InputError
-from ...machine import cores
-from ...metrics import Figures
-from ...task import Task
-from ...task.policy import find_policy
-from ...trajectory import Trajectory
+from ...control import Task
+from ...metrics.figures import Figures
+from ...metrics.trajectory import Trajectory
+from ...policies import find_policy
 from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, USUAL, Case
 
 BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))

@@ -8,8 +8,8 @@ from typing import Any
 from ..study import Outcome, Report
 from .cases import SHOWN_SPEEDS, Case, all_cases, control
 from .comparisons import comparisons
-from .figures import figures
 from .passes import Result, pressed, run_all
+from .plots import figures
 from .tables import tables
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...arrays import Array
+from ...base.arrays import Array
 from ...catalog import load_catenary, load_pantograph
 from .passes import CATENARY, PANTOGRAPH, SPANS
 

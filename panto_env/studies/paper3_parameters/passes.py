@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...analysis.parameters import change
+from ...analysis.simulation import simulate
+from ...base.arrays import Array
 from ...catalog import load_catenary, load_pantograph
-from ...metrics import Figures, en50367_checks, en50367_mean_limit
-from ...parameters import change
-from ...simulation import simulate
+from ...metrics.figures import Figures, en50367_checks, en50367_mean_limit
 
 CATENARY, PANTOGRAPH = "periodic-stiffness", "three-mass"
 SPEED_KMH = 300.0

@@ -14,18 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
-from ...metrics import en50367_mean_limit
+from ...base.arrays import Array
+from ...metrics.figures import en50367_mean_limit
 from ..study import Comparison
-from .passes import (
-    FACTORS,
-    SPEED_KMH,
-    SPEEDS_KMH,
-    Pass,
-    Passes,
-    largest_static_force,
-    maximum_limit,
-)
+from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, Pass, Passes, largest_static_force, maximum_limit
 from .sensitivity import Sensitivity
 
 MIDDLE = (0.25, 0.75)

@@ -1,0 +1,114 @@
+"""The command `panto benchmark`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from panto_env.terminal import Json, Plot, print_json, progress_console
+
+if TYPE_CHECKING:
+    from .settings import BenchmarkSettings
+
+
+def benchmark(
+    policies: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names, with parameters or without (p:gain=0.5), or model files."),
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="TOML file; options given beside it win over it.")
+    ] = None,
+    catenary: Annotated[
+        str | None, typer.Option(help="Line: catalogue name or TOML file, in place of the file's.")
+    ] = None,
+    pantograph: Annotated[
+        str | None, typer.Option(help="Catalogue name or TOML file, in place of the file's.")
+    ] = None,
+    speed: Annotated[
+        list[float] | None, typer.Option(help="Speed (km/h) on every line; can be given again.")
+    ] = None,
+    seeds: Annotated[int | None, typer.Option(help="How many seeds.")] = None,
+    actuator: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
+    sensors: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
+    line_condition: Annotated[str | None, typer.Option(help="'new', 'fair' or 'worn'.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one a core unless told otherwise.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="File to write: all as .json, passes as .csv or .parquet.")
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Compare policies on the same lines, at the same speeds, under the same seeds.
+
+    Ranks them by paper 1's cost function CF; one that buys calm by pressing less is disqualified. The
+    plot shows the contact force of every line at its highest speed, and σ over speed.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    from panto_env.analysis.plots import check_picture, save
+
+    from .plot import plot as draw
+    from .report import WIDTH, tables
+    from .run import check_format, run
+
+    settings = _settings(
+        config,
+        line={"catenary": catenary, "pantograph": pantograph, "speeds_kmh": speed or None},
+        policies=policies or None,
+        seeds=seeds,
+        actuator=actuator,
+        sensors=sensors,
+        line_condition=line_condition,
+    )
+    if output is not None:
+        check_format(output)
+    if plot is not None:
+        check_picture(plot)
+    columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal
+    ) as progress:
+        task = progress.add_task("passes", total=None)
+        outcome = run(
+            settings,
+            workers,
+            lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    if output is not None:
+        outcome.save(output)
+    if plot is not None:
+        save(draw(outcome), plot)
+    if json:
+        print_json(outcome.as_dict())
+        return
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(tables(outcome))
+
+
+def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> BenchmarkSettings:
+    """Settings of the file, or the defaults, under what was given on the command line.
+
+    A catenary or pantograph takes the place of all of the file's lines; speeds go to every line.
+    """
+    from panto_env.base.settings import parse
+
+    from .settings import BenchmarkSettings, load_benchmark
+
+    base = BenchmarkSettings() if config is None else load_benchmark(config)
+    own = _without_none(line)
+    table = base.model_dump() | _without_none(given)
+    if "catenary" in own or "pantograph" in own:
+        table["lines"] = [own]
+    else:
+        table["lines"] = [old | own for old in table["lines"]]
+    return parse(BenchmarkSettings, table, "the benchmark")
+
+
+def _without_none(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}

@@ -1,0 +1,79 @@
+"""Tables of a benchmark for people."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from panto_env.terminal import number
+
+from .run import Benchmark
+from .statistics import Cell
+
+WIDTH = 120
+"""Columns that a table needs; a narrower terminal folds the policies' names."""
+FIGURES = (  # heading, name, factor from SI, decimals
+    ("CF\n(N m)", "cost_function", 1, 0),
+    ("CL\n(%)", "contact_loss", 1, 2),
+    ("F_m\n(N)", "mean", 1, 1),
+    ("σ\n(N)", "std", 1, 2),
+    ("max\n(N)", "max", 1, 0),
+    ("min\n(N)", "min", 1, 0),
+    ("uplift\n(mm)", "max_uplift", 1e3, 0),
+    ("effort\n(N)", "effort", 1, 1),
+    ("rate\n(N/s)", "action_rate", 1, 0),
+)
+SIGMA = "std"
+LEGEND = (
+    "Interquartile means over the seeds; Δσ against passive, pass by pass, with its 95 % bootstrap "
+    "interval. F_m, σ, max and min of the force low-passed at 20 Hz. Ranked by CF within a line and "
+    "speed, those alone whose mean force keeps its range."
+)
+
+
+def tables(outcome: Benchmark) -> RenderableType:
+    """One table a line, with a legend."""
+    parts: list[RenderableType] = []
+    cells = groupby(outcome.cells, key=lambda cell: (cell.catenary, cell.pantograph))
+    for (names, own), (first, last) in zip(cells, outcome.spans, strict=True):
+        parts += [*_line(list(own), f"{' on '.join(reversed(names))}, spans {first}–{last}"), ""]
+    return Group(*parts, Text(LEGEND, style="dim"))
+
+
+def _line(cells: list[Cell], title: str) -> list[RenderableType]:
+    title += f", {cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("km/h", justify="right")
+    table.add_column("policy", overflow="fold")
+    table.add_column("rank", justify="right")
+    for heading, name, _, _ in FIGURES:
+        table.add_column(heading, justify="right")
+        if name == SIGMA:
+            table.add_column("Δσ\n(N)", justify="right", no_wrap=True)
+    faults: list[RenderableType] = []
+    for speed, own in groupby(cells, key=lambda cell: cell.speed_kmh):
+        for k, cell in enumerate(own):
+            values = []
+            for _, name, factor, decimals in FIGURES:
+                values.append(number(factor * cell.figures[name], decimals))
+                if name == SIGMA:
+                    values.append(_change(cell))
+            rank = "–" if cell.rank is None else str(cell.rank)
+            style = "red" if cell.disqualified else "bold" if cell.rank == 1 else ""
+            table.add_row(f"{speed:g}" if k == 0 else "", cell.policy, rank, *values, style=style)
+            if cell.disqualified:
+                words = f"{cell.policy} at {speed:g} km/h is disqualified: {cell.disqualified}."
+                faults.append(Text(words, style="red"))
+        table.add_section()
+    return [table, *faults]
+
+
+def _change(cell: Cell) -> str:
+    if cell.std_interval is None:
+        return number(cell.std_change, 2)
+    low, high = cell.std_interval
+    return f"{cell.std_change:+.2f} ({low:+.2f} to {high:+.2f})"

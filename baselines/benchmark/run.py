@@ -1,0 +1,151 @@
+"""Policies x lines x speeds x seeds, paired, on all cores."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from panto_env.base.errors import InputError
+from panto_env.base.files import TABLES, write_rows, write_whole
+from panto_env.base.machine import cores
+from panto_env.control import Task
+from panto_env.policies import find_policy
+
+from .settings import BenchmarkSettings, Line
+from .single_pass import Row, run_pass
+from .statistics import Cell, compare
+
+FIRST_SPAN = 4
+"""First span evaluated unless told otherwise: the three before it are the run-in from rest."""
+FORMATS = (".json", *TABLES)
+Progress = Callable[[int, int], None]
+Job = tuple[BenchmarkSettings, Line, tuple[int, int], str, float, int]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """Outcome of a benchmark."""
+
+    settings: BenchmarkSettings
+    spans: tuple[tuple[int, int], ...]  # evaluated on each line: first and last, from 1
+    rows: tuple[Row, ...]  # one a pass, in the order of lines, speeds, policies and seeds
+    cells: tuple[Cell, ...]  # one a policy, line and speed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, ready for JSON: no number is nan, it is None instead."""
+        table: dict[str, Any] = _plain(
+            {
+                "settings": self.settings.model_dump(mode="json"),
+                "spans": self.spans,
+                "cells": [asdict(cell) for cell in self.cells],
+                "rows": [row.as_dict() for row in self.rows],
+            }
+        )
+        return table
+
+    def save(self, path: str | Path) -> None:
+        """Write a file, whole or not at all: all as JSON, or the rows as CSV or Parquet."""
+        check_format(path)
+        if Path(path).suffix != ".json":
+            write_rows([row.as_dict() for row in self.rows], path)
+            return
+        with write_whole(path) as temporary:
+            temporary.write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
+
+
+def run(
+    settings: BenchmarkSettings, workers: int | None = None, progress: Progress | None = None
+) -> Benchmark:
+    """Run every policy on every line at every speed under every seed.
+
+    workers: processes, as many as there are cores by default; the outcome does not depend on it.
+    With more than one, a script must call this under ``if __name__ == "__main__":``. progress:
+    called with the number of passes done and of all. Raises InputError for what is not valid, and
+    naming the policy where one fails.
+    """
+    workers = cores() if workers is None else workers
+    if workers < 1:
+        raise InputError(f"workers must be 1 or more, not {workers}.")
+    for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
+        find_policy(policy)
+    spans = tuple(_check(settings, line) for line in settings.lines)
+    jobs: list[Job] = [
+        (settings, line, covered, policy, speed, seed)
+        for line, covered in zip(settings.lines, spans, strict=True)
+        for speed in line.speeds_kmh
+        for policy in settings.policies_on(line)
+        for seed in settings.seeds
+    ]
+    rows = tuple(_passes(jobs, min(workers, len(jobs)), progress or (lambda done, total: None)))
+    return Benchmark(settings, spans, rows, compare(rows))
+
+
+def check_format(path: str | Path) -> None:
+    """Raise InputError unless the name of a file says how to write a benchmark's outcome."""
+    if Path(path).suffix not in FORMATS:
+        raise InputError(f"{path} must end in one of {', '.join(FORMATS)}.")
+
+
+def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
+    """Spans to evaluate; raises InputError where a line can't be run as told."""
+    task = Task(
+        catenary=line.catenary,
+        pantograph=line.pantograph,
+        speed_kmh=(min(line.speeds_kmh), max(line.speeds_kmh)),
+        actuator=settings.actuator,
+        sensors=settings.sensors,
+        line_condition=settings.line_condition,
+        distance=line.distance,
+        control_interval=settings.control_interval,
+    )
+    last = math.floor(task.distance / task.plant.catenary.span_length)
+    first, last = line.spans or (FIRST_SPAN, last)
+    where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
+    if not 1 <= first <= last:
+        raise InputError(
+            f"There are no spans {first} to {last} to evaluate {where}; "
+            "give a longer distance, or spans of your own."
+        )
+    if last * task.plant.catenary.span_length > task.distance:
+        raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
+    return first, last
+
+
+def _passes(jobs: list[Job], workers: int, progress: Progress) -> list[Row]:
+    if workers == 1:
+        rows = []
+        for job in jobs:
+            rows.append(run_pass(*job))
+            progress(len(rows), len(jobs))
+        return rows
+    # Spawned, not forked: threads of Numba and torch do not survive a fork.
+    executor = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    try:
+        futures = [executor.submit(run_pass, *job) for job in jobs]
+        for done, future in enumerate(as_completed(futures), start=1):
+            future.result()
+            progress(done, len(jobs))
+        return [future.result() for future in futures]
+    except BrokenProcessPool as error:
+        raise InputError(
+            "A worker process died; run with one worker, or call benchmark.run under "
+            "`if __name__ == '__main__':`."
+        ) from error
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _plain(value: Any) -> Any:
+    """Lists for tuples and None for nan."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

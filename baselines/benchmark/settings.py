@@ -1,0 +1,114 @@
+"""What a benchmark is to run, from keywords or a TOML file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.settings import Positive, Settings, parse
+from panto_env.control.task import CONTROL_INTERVAL
+from panto_env.plant.actuators.lagged import ACTUATORS, Actuator
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
+from panto_env.plant.sensors.delayed import SENSORS, Sensors
+
+S = TypeVar("S", bound=Settings)
+REFERENCE = "passive"
+"""The policy that every other one is compared with."""
+
+
+def _preset(kind: type[S], presets: Mapping[str, S]) -> Callable[[Any], S]:
+    """Reader of a preset's name or a table, for a field."""
+
+    def read(value: Any) -> S:
+        try:
+            return parse(kind, value, "it", presets)
+        except InputError as error:  # as a clause: pydantic adds the key and the value
+            raise ValueError(str(error).rstrip(".")) from error
+
+    return read
+
+
+class Line(Settings):
+    """A pantograph on a line, and the speeds to run at."""
+
+    catenary: str = Field("en50318-2002", description="catalogue name or TOML file")
+    pantograph: str = Field("en50318-2002", description="catalogue name or TOML file")
+    speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
+    distance: Positive | None = Field(None, description="of a run (m), to the line's end if not given")
+    spans: tuple[int, int] | None = Field(
+        None,
+        description="first and last span that the figures cover, counted from 1; if not given, from "
+        "the fourth (the run-in is left out) to the last that every run covers whole",
+    )
+
+    policies: tuple[str, ...] = Field((), description="policies that run on this line alone, added to all's")
+
+    @field_validator("speeds_kmh", "policies")
+    @classmethod
+    def _each_once(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _distinct(value)
+
+
+class BenchmarkSettings(Settings):
+    """Policies, lines with speeds, and seeds; every policy runs all of them under the same noise."""
+
+    policies: tuple[str, ...] = Field(
+        ("passive", "p", "pd", "fb+ff"),
+        description="names, with parameters (p:gain=0.5) or without, or model files; "
+        "the passive pantograph runs always",
+    )
+    lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, pantographs, speeds")
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
+        tuple(range(5)), min_length=1, description="seeds, or how many from 0 on"
+    )
+    actuator: Annotated[Actuator, BeforeValidator(_preset(Actuator, ACTUATORS))] = Actuator()
+    sensors: Annotated[Sensors, BeforeValidator(_preset(Sensors, SENSORS))] = Sensors()
+    line_condition: Annotated[LineCondition, BeforeValidator(_preset(LineCondition, LINE_CONDITIONS))] = (
+        Field(LINE_CONDITIONS["fair"], description="on a new line all seeds are alike")
+    )
+    control_interval: Positive = Field(CONTROL_INTERVAL, description="time between actions (s)")
+
+    def policies_on(self, line: Line) -> tuple[str, ...]:
+        """Policies that run on a line."""
+        return tuple(dict.fromkeys((*self.policies, *line.policies)))
+
+    @field_validator("seeds", mode="before")
+    @classmethod
+    def _count(cls, value: Any) -> Any:
+        counts = isinstance(value, int) and not isinstance(value, bool)
+        return tuple(range(value)) if counts else value
+
+    @field_validator("policies", "seeds")
+    @classmethod
+    def _each_once(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _distinct(value)
+
+    @field_validator("policies")
+    @classmethod
+    def _with_reference(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        return value if REFERENCE in value else (REFERENCE, *value)
+
+    @model_validator(mode="after")
+    def _each_line_once(self) -> Self:
+        _distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
+        return self
+
+
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    for place, value in enumerate(values):
+        if value in values[:place]:
+            raise ValueError(f"{value!r} is given twice")
+    return values
+
+
+def load_benchmark(path: str | Path) -> BenchmarkSettings:
+    """Read a TOML file of ``BenchmarkSettings``; paths in it count from the working folder.
+
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    """
+    return parse(BenchmarkSettings, read_toml(path), str(path))

@@ -1,0 +1,113 @@
+"""Paper 1's control: feedback on the contact force and feed-forward of the spans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.policies import Context
+
+from .force_law import ForceLaw, number
+
+FORCE_RANGE = (0.0, 300.0)
+"""Range of the contact force (N) that the feedback takes in; beyond it the end counts (paper 1)."""
+READINGS = ("span", "printed")
+SPEED_UNITS = {"km/h": 3.6, "m/s": 1.0}
+
+
+class FeedbackFeedforward(ForceLaw):
+    """Feedback and feed-forward of paper 1, section 5, both as forces that lift the pantograph.
+
+    Feedback: gain (F_N - F), F clipped to 0-300 N; zero at F_N and within ``dead_zone`` of it, and
+    counted from the dead zone's edge outside. The paper prints no gain.
+
+    Feed-forward: A sin(k x - theta), x the distance run, 0 at a support. k is by ``reading``
+    "span": 2 pi / s, once per span s, which is what the paper's text describes;
+    "printed": Eqs 11 and 12 as they stand, k = w pi / (2 s) with w = 2 v / s. That is no angle and
+    not in step with the spans, and depends on the unit of v, which the paper does not give.
+
+    The paper calls the control force positive where the contact force is above F_N, and draws no
+    axes: A sin(...) as a lift is our reading, as a push down it would be theta + pi. So read, the
+    least CF lies between theta = -pi/6 and pi/6 under `en50318-2002` and, at 350 and 400 km/h, under
+    `shinkansen-simple`; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 does harm: `panto
+    benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
+
+    A policy does not see where the train is: x starts from the sine and cosine of the position in
+    the first span and goes on by speed times control interval.
+    """
+
+    def __init__(
+        self,
+        gain: float | Mapping[float, float] = 1.0,
+        theta: float = math.pi / 6,
+        amplitude: float = 10.0,
+        dead_zone: float = 0.0,
+        reading: str = "span",
+        speed_unit: str = "km/h",
+    ) -> None:
+        """Take the parameters; raises ValueError for one that is not valid.
+
+        gain: N/N, or gains by speed (km/h), linear between and constant beyond; the default opposes
+        each newton with one newton, see ``Proportional``. theta: phase (rad), the paper's pi/6 for
+        every speed. amplitude: A (N). dead_zone: half its width (N). speed_unit: of v in Eq. 12,
+        for the reading "printed" alone.
+        """
+        gains = gain if isinstance(gain, Mapping) else {0.0: gain}
+        if not gains:
+            raise ValueError("gain must hold at least one speed")
+        self.gains = {
+            number("speed of a gain", speed, lowest=0): number("gain", value, lowest=0)
+            for speed, value in gains.items()
+        }
+        self.theta = number("theta", theta)
+        self.amplitude = number("amplitude", amplitude, lowest=0)
+        self.dead_zone = number("dead_zone", dead_zone, lowest=0)
+        if reading not in READINGS:
+            raise ValueError(f"reading must be one of {', '.join(READINGS)}, not {reading!r}")
+        if speed_unit not in SPEED_UNITS:
+            raise ValueError(f"speed_unit must be one of {', '.join(SPEED_UNITS)}, not {speed_unit!r}")
+        self.reading = reading
+        self.speed_unit = speed_unit
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        super().reset(context)
+        speeds = sorted(self.gains)
+        values = [self.gains[speed] for speed in speeds]
+        self._gain = float(np.interp(3.6 * context.speed, speeds, values))
+        if self.reading == "span":
+            self._wavenumber = 2 * math.pi / context.span_length
+        else:
+            w = 2 * context.speed * SPEED_UNITS[self.speed_unit] / context.span_length  # Eq. 12
+            self._wavenumber = w * math.pi / (2 * context.span_length)  # Eq. 11
+        self._start: float | None = None
+        self._steps = 0
+
+    def force(self, observation: NDArray[np.float32]) -> float:
+        """Force (N) for an observation, before the actuator's limit."""
+        return self._feedback(self.read(observation, "contact force")) + self._feedforward(
+            self._distance(observation)
+        )
+
+    def _feedback(self, contact_force: float) -> float:
+        lowest, highest = FORCE_RANGE
+        lacking = self.context.nominal_force - min(max(contact_force, lowest), highest)
+        beyond = max(abs(lacking) - self.dead_zone, 0.0)
+        return self._gain * math.copysign(beyond, lacking)
+
+    def _feedforward(self, distance: float) -> float:
+        return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
+
+    def _distance(self, observation: NDArray[np.float32]) -> float:
+        """Distance (m) from the support before the start."""
+        if self._start is None:
+            sine = self.read(observation, "sine of span position")
+            cosine = self.read(observation, "cosine of span position")
+            turns = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
+            self._start = turns * self.context.span_length
+        distance = self._start + self._steps * self.context.control_interval * self.context.speed
+        self._steps += 1
+        return distance

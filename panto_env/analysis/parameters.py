@@ -1,0 +1,88 @@
+"""Parameters by their dotted names, as in the TOML files: ``pantograph.masses.0``."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..base.errors import InputError
+from ..base.settings import Settings, hint
+
+S = TypeVar("S", bound=Settings)
+
+
+def parameter_names(entry: Settings, family: str) -> list[str]:
+    """Dotted names, ``family`` first, of all values of an entry that are numbers or may be."""
+    names = []
+    for key, field in type(entry).model_fields.items():
+        value = getattr(entry, key)
+        if isinstance(value, Settings):
+            names += parameter_names(value, f"{family}.{key}")
+        elif isinstance(value, tuple):
+            names += _places(value, f"{family}.{key}")
+        elif _is_number(value) or (not isinstance(value, bool) and _takes_number(field.rebuild_annotation())):
+            names.append(f"{family}.{key}")
+    return names
+
+
+def check_name(name: str, entry: Settings) -> None:
+    """Raise InputError, with a suggestion, unless an entry has a parameter of this dotted name."""
+    family = name.partition(".")[0]
+    known = parameter_names(entry, family)
+    if name in known:
+        return
+    owner = getattr(entry, "name", None)
+    # Of a list its first place stands for all: droppers alone would fill the line.
+    shown = [each for each in known if not each[-1].isdigit() or each.endswith(".0")]
+    raise InputError(
+        f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint(name, known)}"
+        f"known are {', '.join(shown)}"
+        f"{' (lists count from 0)' if shown != known else ''}."
+    )
+
+
+def change(entry: S, name: str, value: float) -> S:
+    """The entry with another value of the parameter ``name``, whose first part names the family.
+
+    Raises InputError where the entry has no such parameter, or its schema refuses the value.
+    """
+    check_name(name, entry)
+    path = name.split(".")[1:]
+    try:
+        return type(entry).model_validate(_put(entry.model_dump(), path, value))
+    except ValidationError as error:
+        words = dict.fromkeys(problem["msg"].removeprefix("Value error, ") for problem in error.errors())
+        raise InputError(f"{name} can't be {value:g}: {' or '.join(words)}.") from error
+
+
+def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
+    names = []
+    for k, value in enumerate(values):
+        if isinstance(value, tuple):
+            names += _places(value, f"{prefix}.{k}")
+        elif _is_number(value):
+            names.append(f"{prefix}.{k}")
+    return names
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _takes_number(annotation: Any) -> bool:
+    """Whether a field that is a word or empty now ("rigid", None) could be a number."""
+    try:
+        return _is_number(TypeAdapter(annotation).validate_python(1.0))
+    except ValidationError:
+        return False
+
+
+def _put(data: Any, path: list[str], value: float) -> Any:
+    """A copy of nested tables and tuples with another value at the end of the path."""
+    key, *rest = path
+    if isinstance(data, dict):
+        return data | {key: _put(data[key], rest, value) if rest else value}
+    items = list(data)
+    items[int(key)] = _put(items[int(key)], rest, value) if rest else value
+    return tuple(items)

@@ -1,0 +1,191 @@
+"""One or two parameters of the plant, its actuators or its policy over ranges, on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, fields
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import InputError
+from ..base.machine import cores
+from ..base.settings import Settings, hint, parse
+from ..catalog import load_catenary, load_pantograph
+from ..control.task import DEFAULT_LINE, DEFAULT_SPEED_KMH
+from ..metrics.figures import Figures
+from ..plant.actuators.lagged import ACTUATORS, Actuator
+from ..plant.line_condition import LINE_CONDITIONS, LineCondition
+from ..plant.sensors.delayed import SENSORS, Sensors
+from ..policies import find_policy
+from .parameters import change, check_name, parameter_names
+from .simulation import simulate
+
+SPEED = "speed_kmh"
+POLICY = "policy"
+"""First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
+MOST_PARAMETERS = 2
+
+Progress = Callable[[int, int], None]
+Row = dict[str, Any]
+_READERS: dict[str, Callable[[Any], Settings]] = {
+    "catenary": load_catenary,
+    "pantograph": load_pantograph,
+    "actuator": lambda value: parse(Actuator, value, "actuator", ACTUATORS),
+    "sensors": lambda value: parse(Sensors, value, "sensors", SENSORS),
+    "line_condition": lambda value: parse(LineCondition, value, "line_condition", LINE_CONDITIONS),
+}
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """One pass to run: the swept values, the policy by its own name, and what ``simulate`` takes."""
+
+    values: dict[str, float]
+    policy: str
+    arguments: dict[str, Any]
+
+
+def sweep(
+    parameters: Mapping[str, Sequence[float]],
+    *,
+    catenary: Any = DEFAULT_LINE,
+    pantograph: Any = "en50318-2002",
+    speed_kmh: float = DEFAULT_SPEED_KMH,
+    policies: Sequence[str | Path | None] = (None,),
+    spans: tuple[int, int] | None = None,
+    actuator: Any = "ideal",
+    sensors: Any = "ideal",
+    line_condition: Any = "new",
+    workers: int | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> list[Row]:
+    """Run every policy at every value of one parameter, or every pair of values of two.
+
+    parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
+    ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
+    of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
+    figures cover, first and last from 1; the whole run by default. workers: threads, one a core by
+    default; the outcome does not depend on it. progress: called with the passes done and of all.
+    settings: any other of ``simulate`` (seed, distance (m), bilateral, ...).
+
+    Returns one row a pass, in the order of values, then policies: the swept values, what was run, and
+    every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
+    unknown parameter, a value that its schema refuses, and whatever else ``simulate`` refuses; all
+    values are checked before the first pass.
+    """
+    if workers is not None and workers < 1:
+        raise InputError(f"workers must be 1 or more, not {workers}.")
+    given = {
+        "catenary": catenary,
+        "pantograph": pantograph,
+        "actuator": actuator,
+        "sensors": sensors,
+        "line_condition": line_condition,
+    }
+    entries = {family: _READERS[family](value) for family, value in given.items()}
+    _check(parameters, entries, policies)
+    passes = [
+        _prepare(dict(zip(parameters, values, strict=True)), policy, entries, speed_kmh, settings)
+        for values in product(*parameters.values())
+        for policy in policies
+    ]
+    return _run(passes, spans, workers or cores(), progress or (lambda done, total: None))
+
+
+def _check(
+    parameters: Mapping[str, Sequence[float]],
+    entries: Mapping[str, Settings],
+    policies: Sequence[str | Path | None],
+) -> None:
+    if not 1 <= len(parameters) <= MOST_PARAMETERS:
+        raise InputError(f"One or two parameters can be swept, not {len(parameters)}.")
+    if not policies:
+        raise InputError("There is no policy to run; name at least one, or leave policies at its default.")
+    for policy in policies:
+        if not (policy is None or isinstance(policy, str | Path)):
+            raise InputError(f"A sweep takes policies by name or model file, not {policy!r}.")
+    for name, values in parameters.items():
+        _check_name(name, entries)
+        if len(values) == 0:
+            raise InputError(f"There are no values of {name} to run.")
+
+
+def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
+    family = name.partition(".")[0]
+    if name == SPEED or (family == POLICY and family != name):
+        return
+    if family in entries:
+        check_name(name, entries[family])
+        return
+    everything = [n for each, entry in entries.items() for n in parameter_names(entry, each)]
+    near = hint(name, [SPEED, *everything])
+    families = ", ".join(f"'{each}.'" for each in (*entries, POLICY))
+    raise InputError(
+        f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
+        "(as pantograph.masses.0)."
+    )
+
+
+def _prepare(
+    values: dict[str, float],
+    policy: str | Path | None,
+    entries: Mapping[str, Settings],
+    speed_kmh: float,
+    settings: dict[str, Any],
+) -> _Pass:
+    changed = dict(entries)
+    own: list[str] = []
+    for name, value in values.items():
+        family, _, rest = name.partition(".")
+        if name == SPEED:
+            speed_kmh = value
+        elif family == POLICY:
+            own.append(f"{rest}={value!r}")
+        else:
+            changed[family] = change(changed[family], name, value)
+    source = None if policy is None else str(policy)
+    if own:
+        if source is None:
+            raise InputError(f"The passive pantograph has no {' or '.join(values)}; name a policy.")
+        source = f"{source}{',' if ':' in source else ':'}{','.join(own)}"
+    if source is not None:
+        find_policy(source)
+    label = "passive" if policy is None else str(policy)
+    return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
+
+
+def _run(passes: list[_Pass], spans: tuple[int, int] | None, workers: int, progress: Progress) -> list[Row]:
+    # Threads: kernels run without Python's lock, and a pass takes tens of milliseconds, less than a
+    # process takes to start.
+    executor = ThreadPoolExecutor(min(workers, len(passes)), thread_name_prefix="panto")
+    try:
+        futures = [executor.submit(_row, each, spans) for each in passes]
+        for done, future in enumerate(as_completed(futures), start=1):
+            future.result()
+            progress(done, len(passes))
+        return [future.result() for future in futures]
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _row(each: _Pass, spans: tuple[int, int] | None) -> Row:
+    try:
+        run = simulate(**{"record_droppers": False} | each.arguments)
+        figures = Figures(*[float("nan")] * len(fields(Figures))) if run.terminated else run.summary(spans)
+    except InputError as error:
+        at = ", ".join(f"{name} = {value:g}" for name, value in each.values.items())
+        raise InputError(f"At {at}: {error}") from error
+    return {
+        **each.values,
+        "policy": each.policy,
+        "catenary": run.catenary,
+        "pantograph": run.pantograph,
+        "speed_kmh": each.arguments["speed_kmh"],
+        "seed": run.seed,
+        "nominal_force": run.nominal_force,
+        "terminated": run.terminated,
+        **figures.as_dict(),
+    }

@@ -1,0 +1,1 @@
+"""All that touches Numba's and llvmlite's insides."""

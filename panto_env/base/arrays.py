@@ -1,0 +1,9 @@
+"""Types of numeric arrays in signatures; shapes stand in docstrings and comments."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+Index = NDArray[np.integer[Any]]

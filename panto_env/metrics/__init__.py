@@ -1,0 +1,1 @@
+"""What is said of a run: its record and its figures."""

@@ -1,0 +1,1 @@
+"""Actuators on the pantograph."""

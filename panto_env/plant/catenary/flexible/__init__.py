@@ -1,0 +1,1 @@
+"""Flexible catenary: tensioned wires, droppers that go slack, supports and steady arms."""

@@ -1,0 +1,178 @@
+"""Static state of a flexible line with defects: broken and mis-cut droppers, supports out of height.
+
+Droppers apart, the wires are linear, so only the change about the intact static shape is solved for:
+two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
+and taut droppers. Between two nodes, which stand at the supports and the droppers, a beam without load
+is a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) with kappa = sqrt(T/EI), so that elements of that
+shape are exact. Their matrix is banded, and a line of any length costs a few times its nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import InputError
+from ....catalog.schema import FlexibleCatenaryData, Wire
+from ...line_condition import LineCondition
+from .state import CONTACT, MESSENGER, FlexibleLine
+from .static_shape import solve
+
+HELD = 1e18  # N/m, that holds a wire at the anchor
+SHARPEST = 0.01  # m over which a wire without bending stiffness rounds a kink, as elements need one
+BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
+SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
+ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
+UNKNOWNS = 4  # a node: height and slope of the contact wire, then of the messenger (m, -)
+BAND = 6  # diagonals of the matrix: a wire's unknowns at the next node are at most 5 away
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """Static state of a defective line; droppers of the whole line in their order."""
+
+    tension: Array  # (droppers,): N
+    gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
+    rise: Array  # (pieces, 4): change of the contact wire's height: a, b, c, d between nodes
+
+
+class DefectiveLine:
+    """A line with the defects of a condition, to be solved for any scatter of its droppers' lengths."""
+
+    def __init__(self, data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> None:
+        """Raises InputError for a dropper or support that a line of so many spans has not."""
+        shape, each = solve(data), len(data.droppers.positions)
+        self._static = np.tile(shape.dropper_tension, spans)
+        self._stiffness = np.tile(shape.dropper_stiffness, spans)
+        self._broken, self._error, height = _locate(data, spans, condition)
+
+        self.breaks = np.array([0.0, *data.droppers.positions, data.span_length])
+        nodes = spans * (each + 1) + 1
+        number = np.arange(nodes)
+        at_mast = number % (each + 1) == 0
+        self._ends = UNKNOWNS * number[~at_mast][:, None] + [0, 2]  # of the droppers
+        masts = UNKNOWNS * number[at_mast][1:-1]
+        self._band = np.zeros((BAND, UNKNOWNS * nodes))
+        self._load = np.zeros(UNKNOWNS * nodes)
+        for w, wire in ((CONTACT, data.contact_wire), (MESSENGER, data.messenger_wire)):
+            elements = [_element(wire, length) for length in np.diff(self.breaks)]
+            unknowns = UNKNOWNS * number[:-1, None] + 2 * w + [0, 1, 4, 5]
+            _add(self._band, unknowns, np.tile([stiffness for _, stiffness in elements], (spans, 1, 1)))
+            if w == CONTACT:
+                self._unknowns = unknowns
+                self._shapes = np.tile([shapes for shapes, _ in elements], (spans, 1, 1))
+        self._band[0, masts] += data.steady_arm.stiffness
+        self._band[0, masts + 2] += data.support.stiffness
+        self._load[masts + 2] = data.support.stiffness * height
+        self._band[0, [0, 2, -4, -2]] = HELD
+        self.decay = _decay(data.contact_wire)
+
+    def room(self, line: FlexibleLine, rows: int) -> FlexibleLine:
+        """The line with tables for ``rows`` defective ones, which ``impose`` fills."""
+        droppers, real = len(self._static), line.dropper_static.dtype
+        return line._replace(
+            dropper_static=np.zeros((rows, droppers), dtype=real),
+            dropper_gap=np.zeros((rows, droppers), dtype=real),
+            rise=np.zeros((rows, len(self._unknowns), 4)),
+            rise_breaks=self.breaks,
+            rise_decay=self.decay,
+        )
+
+    def impose(self, line: FlexibleLine, row: int, scatter: Array | None = None) -> StaticState:
+        """Write the state under this scatter of the droppers' lengths (m) into the line's tables."""
+        state = self.solve(scatter)
+        line.dropper_static[row] = state.tension
+        line.dropper_gap[row] = state.gap
+        line.rise[row] = state.rise
+        return state
+
+    def solve(self, scatter: Array | None = None) -> StaticState:
+        """Static state; scatter: length error of every dropper (m), added to those of the condition."""
+        error = self._error if scatter is None else self._error + scatter
+        taut = ~self._broken
+        rounds = 0
+        while True:
+            change = self._solve_linear(taut, error)
+            contact, messenger = change[self._ends].T
+            pull = self._static + self._stiffness * (messenger - contact - error)  # were it always taut
+            wrong = np.flatnonzero(~self._broken & (np.where(taut, -pull, pull) > SLIGHT))
+            if len(wrong) == 0:
+                break
+            rounds += 1
+            turned = wrong if rounds <= ROUNDS else wrong[-1:]
+            taut[turned] = ~taut[turned]
+        gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
+        rise = np.einsum("eij,ej->ei", self._shapes, change[self._unknowns])
+        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
+
+    def _solve_linear(self, taut: Any, error: Array) -> Array:
+        """Change of all unknowns with these droppers taut, the others without tension."""
+        from scipy.linalg import solveh_banded  # slow to import
+
+        band, load = self._band.copy(), self._load.copy()
+        spring = np.where(taut, self._stiffness, 0.0)
+        contact, messenger = self._ends.T
+        band[0, contact] += spring
+        band[0, messenger] += spring
+        band[2, contact] -= spring
+        gain = np.where(taut, -spring * error, -self._static)  # of tension, were the wires held
+        load[contact] += gain
+        load[messenger] -= gain
+        return np.asarray(solveh_banded(band, load, lower=True, overwrite_ab=True, overwrite_b=True))
+
+
+def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> tuple[Any, Array, Array]:
+    """Broken droppers, (droppers,), their length errors (m), and errors of support height (m)."""
+    each = len(data.droppers.positions)
+
+    def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
+        for span, number in places:
+            if span > spans or number > each:
+                raise InputError(
+                    f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans "
+                    f"of {each} droppers."
+                )
+        return [(span - 1) * each + number - 1 for span, number in places]
+
+    broken, error, height = np.zeros(spans * each, dtype=bool), np.zeros(spans * each), np.zeros(spans - 1)
+    broken[droppers(condition.broken_droppers)] = True
+    cut = condition.miscut_droppers
+    error[droppers([(span, number) for span, number, _ in cut])] = [wrong for _, _, wrong in cut]
+    for support, wrong in condition.raised_supports:
+        if support >= spans:
+            raise InputError(
+                f"Line '{data.name}' has no support {support}: its {spans} spans have {spans - 1} "
+                "supports between them."
+            )
+        height[support - 1] = wrong
+    return broken, error, height
+
+
+def _decay(wire: Wire) -> float:
+    """How fast bending dies out along a wire, kappa (1/m)."""
+    return float(np.sqrt(wire.tension / max(wire.bending_stiffness, wire.tension * SHARPEST**2)))
+
+
+def _element(wire: Wire, length: float) -> tuple[Array, Array]:
+    """Shapes and stiffness, each (4, 4), of a tensioned beam (m) by height and slope of its two ends.
+
+    Shapes are a, b, c, d of each unknown. What the ends are held by follows from T u' - EI u''' = T b
+    and EI u'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
+    """
+    kappa = _decay(wire)
+    far = np.exp(-kappa * length)
+    ends = [[1, 0, 1, far], [0, 1, -kappa, kappa * far], [1, length, far, 1], [0, 1, -kappa * far, kappa]]
+    shapes = np.linalg.inv(np.array(ends))
+    held = wire.tension * np.array([[0, -1, 0, 0], [0, 0, -1, -far], [0, 1, 0, 0], [0, 0, far, 1]])
+    return shapes, held @ shapes
+
+
+def _add(band: Array, unknowns: Any, stiffness: Array) -> None:
+    """Add elements' stiffness (elements, 4, 4) to the lower diagonals of the matrix."""
+    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+    lower = row >= column
+    np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])

@@ -1,0 +1,1 @@
+"""Three-span catenary of paper 2, in modal form."""

@@ -1,0 +1,1 @@
+"""Pantograph: a chain of lumped masses."""

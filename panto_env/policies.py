@@ -1,0 +1,111 @@
+"""What a policy is, and how it is found by name."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .base.errors import InputError
+from .base.settings import suggest
+from .catalog.schema import CatenaryData, PantographData
+from .control.observation import Layout
+
+POLICIES = "panto_env.policies"
+"""Entry-point group: a name and a callable that makes a policy, with keyword parameters."""
+LOADERS = "panto_env.policy_loaders"
+"""Entry-point group: a file suffix without its dot and a callable that loads a policy from a path."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a policy may know of the episode at its start."""
+
+    layout: Layout  # of the observation
+    actions: int  # length of an action, each in -1..1
+    channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
+    force_limit: float  # force of an action of 1 (N)
+    control_interval: float  # s
+    speed: float  # of the train (m/s)
+    span_length: float  # m
+    nominal_force: float  # static and aerodynamic uplift (N)
+    catenary: CatenaryData
+    pantograph: PantographData
+
+
+class Policy(Protocol):
+    """Anything with these two methods. It sees observations, never the environment."""
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+
+
+def find_policy(source: Any) -> Policy:
+    """Policy from an object, a name ("pd"), a name with parameters ("pd:gain=0.5") or a model file.
+
+    Raises InputError where there is none such.
+    """
+    if not isinstance(source, str | Path):
+        if hasattr(source, "reset") and hasattr(source, "act"):
+            return source  # type: ignore[no-any-return]
+        raise InputError(
+            f"A policy must have the methods reset and act, or be a name; {source!r} is neither."
+        )
+    name, _, parameters = str(source).partition(":")
+    known = {point.name: point for point in entry_points(group=POLICIES)}
+    if name in known:
+        maker = _load(known[name])
+        try:
+            policy: Policy = maker(**_parameters(str(source), parameters))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"Policy '{source}' cannot be made: {error}.") from error
+        return policy
+    path = Path(source)
+    loaders = {point.name: point for point in entry_points(group=LOADERS)}
+    if path.suffix[1:] in loaders:
+        if not path.is_file():
+            raise InputError(f"The model file {path} does not exist; check the path.")
+        loaded: Policy = _load(loaders[path.suffix[1:]])(path)
+        return loaded
+    raise InputError(
+        f"Unknown policy '{source}': {suggest(name, sorted(known))}; or give the path of a model file "
+        f"(.{', .'.join(sorted(loaders))})."
+    )
+
+
+def policy_names() -> list[str]:
+    """Names of all installed policies."""
+    return sorted(point.name for point in entry_points(group=POLICIES))
+
+
+def _load(point: EntryPoint) -> Callable[..., Any]:
+    try:
+        loaded: Callable[..., Any] = point.load()
+        return loaded
+    except ImportError as error:
+        raise InputError(
+            f"'{point.name}' needs a package that is not installed ({error}); "
+            "install panto-env with the extra 'agents'."
+        ) from error
+
+
+def _parameters(source: str, text: str) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for part in filter(None, text.split(",")):
+        key, equals, value = part.partition("=")
+        if not equals:
+            raise InputError(f"Policy '{source}': '{part}' must read key=value.")
+        try:
+            values[key.strip()] = ast.literal_eval(value.strip())
+        except (ValueError, SyntaxError):
+            values[key.strip()] = value.strip()
+    return values

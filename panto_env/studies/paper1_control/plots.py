@@ -1,0 +1,122 @@
+"""Figs 13 to 18. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ...analysis.plots import mark_supports
+from .angles import sweep
+from .cases import (
+    DAMPING,
+    DEFAULT_GAIN,
+    GAIN,
+    KMH,
+    REAL_GAIN,
+    SHIPPED,
+    SHOWN_SPEEDS,
+    SPAN,
+    SPANS,
+    SPEEDS,
+    SWEEP_SPEEDS,
+    THETA,
+    THETAS,
+    Case,
+    control,
+    sampled,
+)
+from .passes import Result, records
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Results = Mapping[Case, Result]
+SHOWN_SPANS = (10, 11)
+"""Spans of Figs 14 to 16."""
+COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
+# The paper's colours: without control red, with control blue, control force green.
+WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
+
+
+def figures(results: Results) -> dict[str, Figure]:
+    """All of them, by file name."""
+    shown = {f"fig{14 + k}-{speed}kmh": passage(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
+    return {
+        "fig13-phase-angle": phase_angle(results),
+        **shown,
+        "fig17-contact-loss": over_speed(results, "contact_loss", "contact loss ratio CL (%)"),
+        "fig18-cost-function": over_speed(results, "cost_function", "cost function CF (N m)"),
+    }
+
+
+def phase_angle(results: Results) -> Figure:
+    """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 5.2), layout="constrained")
+    for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
+        for k, speed in enumerate(SWEEP_SPEEDS):
+            found = sweep(results, speed, GAIN, reading)
+            colour = f"C{k}"
+            axis.plot(
+                [math.degrees(theta) for theta in THETAS], found.cost, color=colour, label=f"{speed} km/h"
+            )
+            axis.plot(math.degrees(found.best), found.least, "o", color=colour)
+        axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
+        axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
+    figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=8, fontsize="small")
+    figure.suptitle(f"Fig. 13: cost function for phase angle (dots: least), gain {GAIN}")
+    return figure
+
+
+def passage(speed: int) -> Figure:
+    """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
+    from matplotlib.figure import Figure
+
+    passive, active = records([Case(speed), Case(speed, control())])
+    figure = Figure(figsize=(7.5, 4.7), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
+    upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
+    upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
+    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 120))
+    lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
+    lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
+    for axis in (upper, lower):
+        mark_supports(axis, active)
+        axis.legend(loc="upper right", ncols=3, fontsize="small")
+    lower.set_xlim((SHOWN_SPANS[0] - 1) * active.span_length, SHOWN_SPANS[1] * active.span_length)
+    figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: simulation at {speed} km/h, gain {GAIN}")
+    return figure
+
+
+def over_speed(results: Results, name: str, label: str) -> Figure:
+    """Figs 17 and 18: a figure of merit over speed."""
+    from matplotlib.figure import Figure
+
+    gentle, damped = control(REAL_GAIN), DAMPING[SHIPPED]
+    curves = {
+        "without control": ([Case(v) for v in SPEEDS], WITHOUT, "o-"),
+        f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
+        "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], "tab:cyan", "^--"),
+        f"with control, gain {REAL_GAIN}, realistic actuator": (
+            [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x:"
+        ),
+        "feedback and frame damping (pd), realistic actuator": (
+            [sampled(v, damped, "realistic") for v in SPEEDS], "tab:olive", "d:"
+        ),
+    }  # fmt: skip
+    figure = Figure(figsize=(8, 4.8), layout="constrained")
+    axis = figure.subplots()
+    for told, (cases, colour, style) in curves.items():
+        values = [getattr(results[case].figures, name) for case in cases]
+        axis.plot(SPEEDS, values, style, color=colour, label=told)
+    number, what = {"contact_loss": (17, "contact loss ratio"), "cost_function": (18, "cost function")}[name]
+    axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if number == 18 else None, None))
+    axis.set_title(f"Fig. {number}: {what}, {COVERED}")
+    axis.legend(fontsize="small")
+    axis.grid(color="0.9")
+    return figure

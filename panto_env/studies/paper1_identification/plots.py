@@ -1,0 +1,164 @@
+"""Figures of paper 1's identification. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...identification import FILTERED, IDENTIFIED, METHODS, SWEEP, Identification, Match, Record
+from ...identification.equation_error import equations
+from ...identification.plots import plot_matches, plot_record
+from .published import PUBLISHED
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SECONDS = 4.0
+"""Shown of a record. Own choice: the paper's figures are not at hand, only their captions."""
+
+COLOURS = ("tab:blue", "tab:orange", "tab:green")
+
+
+def record(shown: Record, name: str) -> Figure:
+    """Figs 6 to 8."""
+    return plot_record(shown, f"Experiment {name}: contact force and displacements (synthetic)", SECONDS)
+
+
+def match(shown: Record, found: Sequence[Match], name: str) -> Figure:
+    """Figs 9 to 11."""
+    title = f"Experiment {name}: synthetic record and model identified from it by output error"
+    return plot_matches(shown.time, found, title, 0.0, SECONDS)
+
+
+def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[float]]) -> Figure:
+    """Condition number and RSD of the three experiments, ours and the paper's."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1, 2))
+    place = np.arange(3)
+    left.bar(place - 0.2, [p.condition for p in PUBLISHED], 0.4, color="0.7", label="paper")
+    ours = [kept[p.name].fits[FILTERED].condition for p in PUBLISHED]
+    left.bar(place + 0.2, ours, 0.4, color="tab:blue", label="ours, low-passed")
+    left.set_xticks(place, [f"Exp. {p.name}" for p in PUBLISHED])
+    left.set(ylabel="condition number of A", title="Condition number, offset kept")
+    left.legend(fontsize="small")
+    place = np.arange(5)
+    for k, printed in enumerate(PUBLISHED):
+        paper = [printed.rsd[i] for i in range(5)]
+        right.bar(
+            place + 0.13 * (k - 2.5), paper, 0.13, color=COLOURS[k], alpha=0.4, label=f"paper, {printed.name}"
+        )
+    for k, printed in enumerate(PUBLISHED):
+        right.bar(
+            place + 0.13 * (k + 0.5),
+            medians[printed.name],
+            0.13,
+            color=COLOURS[k],
+            label=f"ours, {printed.name}",
+        )
+    right.axhline(100, color="0.3", linestyle=":", linewidth=1)
+    right.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
+    right.set(yscale="log", ylabel="RSD (%)", title="RSD; ours with free offset, low-passed, median of 100")
+    right.legend(fontsize="small", ncols=2)
+    return figure
+
+
+def stiffness(
+    clean: Mapping[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
+) -> Figure:
+    """Why k3 is unsure: its column beside m3's; and what a sweep does."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
+    for (name, shown), colour, width in zip(
+        list(clean.items())[::-1], ("tab:orange", "tab:blue"), (0.6, 2.5), strict=True
+    ):
+        columns = equations(shown, known)[0][1]
+        label = "sweep 0.3 to 4 Hz" if name == SWEEP.name else f"Experiment {name}, 1.42 Hz"
+        displacement = 1e3 * (columns[:, 4] - columns[:, 4].mean())
+        left.plot(displacement[::4], columns[::4, 2], color=colour, linewidth=width, label=label)
+    left.set(
+        xlabel="column of $k_3$: $y_{p3}$ about its mean (mm)",
+        ylabel="column of $m_3$: acceleration (m/s²)",
+        title="One sine: two columns on one line",
+    )
+    left.legend(fontsize="small")
+    right.plot(last, sweeps[True], "o-", color="tab:blue", label="offset free: only motion counts")
+    right.plot(last, sweeps[False], "s-", color="tab:green", label="offset kept, as printed")
+    right.axhline(PUBLISHED[0].rsd[-1], color="0.3", linestyle=":", label="paper, Experiment I: one sine")
+    right.set(
+        xscale="log", yscale="log",
+        xlabel="last frequency of a sweep from 0.3 Hz (Hz)", ylabel="RSD of $k_3$ (%)",
+        title="A sweep tells $k_3$ from $m_3$",
+    )  # fmt: skip
+    right.set_xticks([0.3, 0.5, 1.0, 2.0, 4.0], ["0.3: a sine", "0.5", "1", "2", "4"])
+    right.minorticks_off()
+    right.legend(fontsize="small")
+    for axis in (left, right):
+        axis.grid(color="0.9")
+    return figure
+
+
+def convergence(
+    rates: Sequence[float],
+    sampling: Mapping[str, Array],
+    levels: Sequence[float],
+    noise: Mapping[str, Mapping[str, Sequence[float]]],
+) -> Figure:
+    """Errors of the equations as printed over the sampling step, and of all methods over the noise."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.5, 3.7), layout="constrained")
+    axes = figure.subplots(1, 3)
+    steps = 1e3 / np.array(rates)
+    for name, errors in sampling.items():
+        axes[0].loglog(steps, np.abs(errors).max(axis=1), "o-", label=f"{name}: c2, the worst")
+        axes[0].loglog(
+            steps, np.abs(errors[:, 2:]).max(axis=1), "--", color=axes[0].lines[-1].get_color(), linewidth=0.9
+        )
+    axes[0].plot([], [], "--", color="0.5", label="worst of m3, c3, k3")
+    axes[0].set(
+        xlabel="sampling step (ms)", ylabel="error (%)",
+        title="No noise, as printed", ylim=(1e-6, 1e6),
+    )  # fmt: skip
+    for axis, (name, methods) in zip(axes[1:], noise.items(), strict=True):
+        for method, colour in zip(METHODS, COLOURS, strict=True):
+            axis.loglog(1e6 * np.array(levels), methods[method], "o-", color=colour, label=method)
+        label = "sweep, offset free" if name == SWEEP.name else f"Experiment {name}, offset kept"
+        axis.set(xlabel="noise of the displacements, rms (µm)", ylabel="error of the worst parameter (%)")
+        axis.set_title(f"{label}, 1 kHz")
+        axis.set_ylim(top=1e9)  # room for the legend
+    for axis in axes:
+        axis.axhline(0.5, color="0.3", linestyle=":", label="0.5 %")
+        axis.grid(color="0.9")
+        axis.legend(fontsize="x-small", loc="upper left")
+    return figure
+
+
+def coverage(found: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
+    """Share of records whose 95 % intervals hold the truth."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 3.8), layout="constrained")
+    axes = figure.subplots(1, len(found), sharey=True)
+    place = np.arange(5)
+    for axis, (name, methods) in zip(axes, found.items(), strict=True):
+        for k, (method, colour) in enumerate(zip(METHODS, COLOURS, strict=True)):
+            axis.bar(place + 0.27 * (k - 1), methods[method], 0.27, color=colour, label=method)
+        axis.axhline(90, color="0.3", linestyle=":", linewidth=1)
+        axis.set_xticks(place, [f"${_symbol(each)}$" for each in IDENTIFIED])
+        axis.set_title(name)
+    axes[0].set(ylabel=f"truth inside its 95 % interval\n(% of {trials} records)")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="small")
+    return figure
+
+
+def _symbol(name: str) -> str:
+    return f"{name[0]}_{{{name[1:]}}}"

@@ -1,0 +1,1 @@
+"""How fast plants and environments are."""

@@ -1,0 +1,87 @@
+"""What one core of this machine can do at most, and how near the flexible catenary's kernel comes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...backend.compile import kernel
+
+# Arithmetic of one step, counted in the source of flexible_parts: adds and multiplies.
+FLOPS_A_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
+FLOPS_A_DROPPER = 90  # two differences 2 x 11, tension 12, two shoves 2 x 20, and what surrounds them
+# Numbers that the sweep moves to or from the nearest cache for each node: u, d, q written; u, d, five q
+# read; u, d written.
+NUMBERS_A_NODE = 12
+CHAIN = 32
+
+
+@dataclass(frozen=True)
+class Roofline:
+    """Limits of one core, and the kernel beside them."""
+
+    multiply_add: float  # measured peak of multiply and add in registers (GFLOP/s)
+    cache: float  # measured traffic of a triad in the nearest cache (GB/s)
+    arithmetic: float  # arithmetic of the kernel (GFLOP/s)
+    traffic: float  # traffic of its sweep (GB/s)
+    bound: float  # times real time, were the kernel at the nearer of both limits
+
+
+@kernel
+def multiply_add(sums, rounds):
+    """Multiply-adds, CHAIN to a number that is read and written once: 2 flops each."""
+    a = sums[0]
+    for _ in range(rounds):
+        for i in range(sums.size):
+            x = sums[i]
+            for _ in range(CHAIN):
+                x = x * a + a
+            sums[i] = x
+
+
+@kernel
+def triad(a, b, c, rounds):
+    """C = b + s a, over arrays that stay in the nearest cache: three numbers an entry."""
+    s = a[0]
+    for _ in range(rounds):
+        for i in range(a.size):
+            c[i] = b[i] + s * a[i]
+        s = s + c[0]
+    return s
+
+
+def _fastest(run: object, repeats: int) -> float:
+    best = np.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        run()  # type: ignore[operator]
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def measure(nodes: int, droppers: int, time_step: float, times_real_time: float, single: bool) -> Roofline:
+    """Limits in the wires' precision, and the kernel that runs ``times_real_time``.
+
+    nodes: of both wires together. time_step: s.
+    """
+    real = np.float32 if single else np.float64
+    sums = np.full(512, 0.5, dtype=real)
+    rounds = 20_000
+    multiply_add(sums, 1)
+    peak = 2 * CHAIN * sums.size * rounds / _fastest(lambda: multiply_add(sums, rounds), 5)
+    a, b, c = (np.full(2048, 0.5, dtype=real) for _ in range(3))
+    triad(a, b, c, 1)
+    rounds = 20_000
+    cache = 3 * a.nbytes * rounds / _fastest(lambda: triad(a, b, c, rounds), 5)
+    flops = FLOPS_A_NODE * nodes + FLOPS_A_DROPPER * droppers
+    moved = NUMBERS_A_NODE * nodes * a.itemsize
+    steps = times_real_time / time_step  # a second
+    return Roofline(
+        multiply_add=peak / 1e9,
+        cache=cache / 1e9,
+        arithmetic=flops * steps / 1e9,
+        traffic=moved * steps / 1e9,
+        bound=time_step / max(flops / peak, moved / cache),
+    )
