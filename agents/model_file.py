@@ -21,7 +21,7 @@ from panto_env import __version__
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_whole
 from panto_env.base.settings import Settings
-from panto_env.policies import Context
+from panto_env.control.context import Context
 
 from .actor import Actor
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
-from panto_env.policies import Context
+from panto_env.control.context import Context
 
 from .actor import Actor
 from .model_file import Facts, Needs, read_model

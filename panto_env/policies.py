@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,29 +13,12 @@ from numpy.typing import NDArray
 
 from .base.errors import InputError
 from .base.settings import suggest
-from .catalog.schema import CatenaryData, PantographData
-from .control.observation import Layout
+from .control.context import Context
 
 POLICIES = "panto_env.policies"
 """Entry-point group: a name and a callable that makes a policy, with keyword parameters."""
 LOADERS = "panto_env.policy_loaders"
 """Entry-point group: a file suffix without its dot and a callable that loads a policy from a path."""
-
-
-@dataclass(frozen=True)
-class Context:
-    """What a policy may know of the episode at its start."""
-
-    layout: Layout  # of the observation
-    actions: int  # length of an action, each in -1..1
-    channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
-    force_limit: float  # force of an action of 1 (N)
-    control_interval: float  # s
-    speed: float  # of the train (m/s)
-    span_length: float  # m
-    nominal_force: float  # static and aerodynamic uplift (N)
-    catenary: CatenaryData
-    pantograph: PantographData
 
 
 class Policy(Protocol):

@@ -15,7 +15,8 @@ from panto_baselines.policies.pd import ProportionalDerivative
 from panto_baselines.policies.proportional import Proportional
 from panto_env import InputError, simulate
 from panto_env.control import Task
-from panto_env.policies import Context, Policy, find_policy
+from panto_env.control.context import Context
+from panto_env.policies import Policy, find_policy
 
 SPEED_KMH = 300.0
 POLICIES = {

@@ -27,7 +27,7 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
 PLUGIN = """
 import numpy as np
-from panto_baselines.force_law import ForceLaw
+from panto_baselines.policies.force_law import ForceLaw
 
 class Half(ForceLaw):
     "Presses with half of the nominal force."

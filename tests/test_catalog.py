@@ -13,15 +13,11 @@ import pytest
 from pydantic import BaseModel
 
 from panto_env.base.errors import InputError
-from panto_env.catalog import (
-    FlexibleCatenaryData,
-    PantographData,
-    PeriodicStiffnessData,
-    ThreeSpanData,
-    available,
-    load_catenary,
-    load_pantograph,
-)
+from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.three_span.schema import ThreeSpanData
+from panto_env.plant.pantograph.schema import PantographData
 
 LOADERS: dict[str, Callable[[Any], Any]] = {
     "catenary": load_catenary,

@@ -5,9 +5,9 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.backend.compile import OPTIONS
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.catalog.schema import Rayleigh, Support
 from panto_env.plant import step as coupling
 from panto_env.plant.catenary.flexible import build as flexible
+from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 

@@ -9,11 +9,11 @@ from scipy.sparse.linalg import splu
 
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.catalog.schema import Rayleigh
 from panto_env.control import Task
 from panto_env.plant.catenary.flexible import build as flexible
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.parts import rise_by_defects
+from panto_env.plant.catenary.flexible.schema import Rayleigh
 from panto_env.plant.line_condition import LineCondition, draw
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import panto_env
-import panto_env.speed as measured
+import panto_env.studies.throughput.measure as measured
 from panto_env.analysis.plots import plot_speed
 from panto_env.base import machine
 from panto_env.cli import speed

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import InputError, Trajectory, simulate
+from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
-from panto_env.policies import Context, Policy, find_policy
+from panto_env.policies import Policy, find_policy
 
 from .settings import BenchmarkSettings, Line
 

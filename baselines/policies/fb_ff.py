@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.policies import Context
+from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.policies import Context
+from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number
 

@@ -6,31 +6,30 @@ import difflib
 import reprlib
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from ..base.errors import InputError
 from ..base.files import read_toml
-from .schema import (
-    Catenary,
-    CatenaryData,
-    Entry,
-    FlexibleCatenaryData,
-    PantographData,
-    PeriodicStiffnessData,
-    ThreeSpanData,
-)
+from ..base.settings import Settings
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from ..plant.catenary.schema import CatenaryData
+from ..plant.catenary.three_span.schema import ThreeSpanData
+from ..plant.pantograph.schema import PantographData
 
 FOLDERS = {
     "catenary": Path(__file__).parent / "catenaries",
     "pantograph": Path(__file__).parent / "pantographs",
 }
-_CATENARY: TypeAdapter[Any] = TypeAdapter(Catenary)
+_CATENARY: TypeAdapter[Any] = TypeAdapter(
+    Annotated[FlexibleCatenaryData | ThreeSpanData | PeriodicStiffnessData, Field(discriminator="kind")]
+)
 _PANTOGRAPH: TypeAdapter[Any] = TypeAdapter(PantographData)
-_KINDS: dict[int | str, type[Entry]] = {
+_KINDS: dict[int | str, type[Settings]] = {
     "flexible": FlexibleCatenaryData,
     "three_span": ThreeSpanData,
     "periodic_stiffness": PeriodicStiffnessData,
@@ -152,7 +151,7 @@ def _explain(error: ValidationError) -> str:
     return "; ".join(f"key '{key}' {words}" if key else words for key, words in said.items())
 
 
-def _complaint(problem: ErrorDetails, loc: list[int | str], family: type[Entry]) -> str:
+def _complaint(problem: ErrorDetails, loc: list[int | str], family: type[Settings]) -> str:
     """What is wrong at the place ``loc`` of an entry."""
     kinds = ", ".join(map(repr, _KINDS))
     match problem["type"]:
@@ -176,7 +175,7 @@ def _complaint(problem: ErrorDetails, loc: list[int | str], family: type[Entry])
             return f"{words} (given: {reprlib.repr(problem['input'])})"
 
 
-def _fields(family: type[Entry], loc: list[int | str]) -> dict[str, FieldInfo]:
+def _fields(family: type[Settings], loc: list[int | str]) -> dict[str, FieldInfo]:
     """The keys of the table that holds the key at ``loc``."""
     table: Any = family
     for part in loc[:-1]:

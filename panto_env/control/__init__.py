@@ -1,6 +1,6 @@
 """Observation, reward, termination: what turns the plant into a control task."""
 
-from ..policies import Context, Policy
+from .context import Context
 from .task import Task
 
-__all__ = ["Context", "Policy", "Task"]
+__all__ = ["Context", "Task"]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..backend.compile import part
 from ..base.arrays import Array
-from ..catalog.schema import PantographData
 from ..plant import step as coupling
 from ..plant.actuators.lagged import Actuator
+from ..plant.pantograph.schema import PantographData
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .rows import ENTRY, READING, READINGS
 

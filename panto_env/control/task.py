@@ -22,9 +22,9 @@ from ..plant.numerics import Numerics
 from ..plant.pantograph.build import vary
 from ..plant.plant import Plant
 from ..plant.sensors.delayed import SENSORS, Sensors
-from ..policies import Context
 from . import observation as obs
 from . import running_figures as tally
+from .context import Context
 from .noise import Noise
 from .reward import Reward, weights
 from .rows import DISTANCE, END, KEPT, NOMINAL, READINGS, REWARD, TERM

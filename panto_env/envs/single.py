@@ -13,12 +13,12 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.settings import suggest
 from ..control import Task
+from ..control.context import Context
 from ..control.observation import BOUND
 from ..control.reward import CONTACT_LOSS, COST_FUNCTION, EFFORT, RATE
 from ..control.rows import REWARD, TERM
 from ..metrics.trajectory import Trajectory
 from ..plant.step import CONTACT_FORCE, FRAME_FORCE, HEAD_FORCE, HEAD_HEIGHT, STEP, STRIDE, WIRE_HEIGHT
-from ..policies import Context
 
 SETTINGS = (
     "catenary",

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..catalog import PantographData
+from ..plant.pantograph.schema import PantographData
 
 Parameters = Mapping[str, float]
 """Values by the names in ``UNITS``, SI."""

@@ -11,13 +11,15 @@ from ..backend.block import WIDTH
 from ..backend.packed import bind
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..catalog.schema import CatenaryData, PantographData, PeriodicStiffnessData
 from . import step as coupling
 from .actuators import lagged as actuators
 from .catenary import MODELS
+from .catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from .catenary.schema import CatenaryData
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
 from .pantograph import build as pantograph
+from .pantograph.schema import PantographData
 from .step import CHANNELS, Run, Samples
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from panto_env.catalog.schema import FlexibleCatenaryData, PantographData
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.pantograph.schema import PantographData
 
 from .figures import Figures, figures
 from .hermite import Array

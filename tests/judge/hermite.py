@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from panto_env.catalog.schema import Wire
+from panto_env.plant.catenary.schema import Wire
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -8,7 +8,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from panto_env.catalog.schema import FlexibleCatenaryData, Wire
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.schema import Wire
 
 from .hermite import Array, Indices, matrices, span_nodes, uniform_load
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from panto_env.catalog.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 from .hermite import Array, Indices, matrices, shape_functions
 from .static import static_shape

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...backend.compile import part
 from ...base.arrays import Array, Index
-from ...catalog.schema import PantographData
 from ..actuators.lagged import FRAME, HEAD
+from .schema import PantographData
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""

@@ -13,10 +13,10 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...catalog import load_catenary
-from ...catalog.schema import FlexibleCatenaryData
 from ...metrics.figures import low_pass
 from ...metrics.trajectory import Trajectory
 from ...plant.catenary.flexible import build as flexible
+from ...plant.catenary.flexible.schema import FlexibleCatenaryData
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
 

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from ...catalog import FlexibleCatenaryData, load_catenary, load_pantograph
+from ...catalog import load_catenary, load_pantograph
+from ...plant.catenary.flexible.schema import FlexibleCatenaryData
 from ...plant.pantograph.build import matrices
 from .cases import LINE, PANTOGRAPH
 

@@ -20,11 +20,12 @@ import numpy as np
 from ....backend.memory import LINE, aligned_zeros
 from ....base.arrays import Array
 from ....base.errors import InputError
-from ....catalog.schema import FlexibleCatenaryData, Wire
 from ...interpolation import stencil
 from ...numerics import Numerics
+from ..schema import Wire
 from . import step as _motion  # noqa: F401 - its overloads
 from .defects import DefectiveLine as DefectiveLine
+from .schema import FlexibleCatenaryData
 from .state import CONTACT, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .static_shape import StaticShape, solve
 

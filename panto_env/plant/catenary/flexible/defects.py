@@ -17,8 +17,9 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.errors import InputError
-from ....catalog.schema import FlexibleCatenaryData, Wire
 from ...line_condition import LineCondition
+from ..schema import Wire
+from .schema import FlexibleCatenaryData
 from .state import CONTACT, MESSENGER, FlexibleLine
 from .static_shape import solve
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....base.arrays import Array
-from ....catalog.schema import FlexibleCatenaryData, Wire
+from ..schema import Wire
+from .schema import FlexibleCatenaryData
 
 GRAVITY = 9.81  # m/s^2
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ....backend.block import WIDTH
 from ....backend.compile import PART, part
 from ....base.arrays import Array
-from ....catalog.schema import PeriodicStiffnessData
 from ... import step as coupling
 from ...numerics import Numerics
 from ...trigonometry import cosine_of_turns
+from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
 """Unless told otherwise (s): forces within 0.2 % of the peak (tests/test_periodic_stiffness.py)."""

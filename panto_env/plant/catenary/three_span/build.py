@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ....backend.compile import PART, part
 from ....base.arrays import Array
-from ....catalog.schema import ThreeSpanData
 from ... import step as coupling
 from ...numerics import Numerics
+from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support

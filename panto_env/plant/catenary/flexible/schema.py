@@ -1,0 +1,83 @@
+"""What a flexible catenary is made of."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ....base.settings import NonNegative, Positive, Settings
+from ..schema import CatenaryData, Wire
+
+
+class Droppers(Settings):
+    """The droppers of one span: springs that carry tension and go slack in compression."""
+
+    positions: tuple[Positive, ...] = Field(min_length=1, description="distance from support (m)")
+    sag: tuple[float, ...] = Field(
+        description="how far the contact wire hangs below its height at the support (m)"
+    )
+    stiffness: Positive | None = Field(None, description="stiffness in tension (N/m)")
+    axial_stiffness: Positive | None = Field(
+        None, description="EA in tension (N); the stiffness is EA over the dropper's length"
+    )
+    mass: NonNegative = Field(0.0, description="mass per length (kg/m)")
+    messenger_clamp_mass: NonNegative = Field(0.0, description="clamp on the messenger (kg)")
+    contact_clamp_mass: NonNegative = Field(0.0, description="clamp on the contact wire (kg)")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.sag) != len(self.positions):
+            raise ValueError(
+                f"sag must hold one value a dropper: {len(self.positions)} positions are given, "
+                f"but {len(self.sag)} sags"
+            )
+        if any(b <= a for a, b in zip(self.positions, self.positions[1:], strict=False)):
+            raise ValueError("positions must increase from the support")
+        if (self.stiffness is None) == (self.axial_stiffness is None):
+            raise ValueError("give either stiffness or axial_stiffness, and only one of them")
+        return self
+
+
+class Support(Settings):
+    """What holds the messenger wire at a mast."""
+
+    stiffness: Positive = Field(description="vertical stiffness (N/m)")
+    damping: NonNegative = Field(description="vertical damping (N s/m)")
+
+
+class SteadyArm(Settings):
+    """What holds the contact wire sideways at a mast; it balances its own weight."""
+
+    mass: NonNegative = Field(description="mass that moves with the contact wire (kg)")
+    stiffness: NonNegative = Field(description="vertical stiffness (N/m)")
+    holds_wire: bool = Field(
+        False, description="whether it carries the wire's weight, so that the wire is at height 0"
+    )
+
+
+class Rayleigh(Settings):
+    """Damping matrix alpha M + beta K."""
+
+    alpha: NonNegative = Field(description="mass-proportional damping (1/s)")
+    beta: NonNegative = Field(description="stiffness-proportional damping (s)")
+
+
+class FlexibleCatenaryData(CatenaryData):
+    """Contact and messenger wire, droppers, supports and steady arms."""
+
+    kind: Literal["flexible"] = "flexible"
+    encumbrance: Positive = Field(description="height of messenger over contact wire at support (m)")
+    contact_wire: Wire
+    messenger_wire: Wire
+    droppers: Droppers
+    support: Support
+    steady_arm: SteadyArm
+    damping: Rayleigh
+
+    @model_validator(mode="after")
+    def _droppers_inside_span(self) -> Self:
+        last = self.droppers.positions[-1]
+        if last >= self.span_length:
+            raise ValueError(f"dropper at {last} m lies outside the span of {self.span_length} m")
+        return self

@@ -1,0 +1,18 @@
+"""What a line of periodic stiffness is made of."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ....base.settings import Positive
+from ..schema import CatenaryData
+
+
+class PeriodicStiffnessData(CatenaryData):
+    """A massless spring whose stiffness varies along the span (paper 3, Eqs 1-5)."""
+
+    kind: Literal["periodic_stiffness"] = "periodic_stiffness"
+    mean_stiffness: Positive = Field(description="k_m (N/m)")
+    stiffness_variation: Annotated[float, Field(ge=0, lt=1)] = Field(description="epsilon (-)")

@@ -1,0 +1,49 @@
+"""What a pantograph is made of. All values in SI units, up is positive."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ...base.settings import NonNegative, Positive, Settings
+
+
+class PantographData(Settings):
+    """A chain of lumped masses: the collector head first, the ground last."""
+
+    kind: Literal["pantograph"] = "pantograph"
+    name: str = Field(description="name in the catalogue")
+    description: str = Field(description="what it is and how its open values were chosen")
+    masses: tuple[Positive, ...] = Field(min_length=1, max_length=8, description="masses, head first (kg)")
+    stiffnesses: tuple[NonNegative, ...] = Field(
+        description="springs below each mass, the last to the ground (N/m)"
+    )
+    dampings: tuple[NonNegative, ...] = Field(
+        description="dampers below each mass, the last to the ground (N s/m)"
+    )
+    static_force: NonNegative = Field(description="lifting force on the lowest mass (N)")
+    aerodynamic_coefficient: NonNegative = Field(
+        description="aerodynamic uplift on the lowest mass per speed squared (N/(km/h)^2)"
+    )
+    contact_stiffness: Positive | Literal["rigid"] = Field(
+        description="spring between collector strip and contact wire (N/m), or 'rigid'"
+    )
+    contact_damping: NonNegative = Field(0.0, description="damper beside the contact spring (N s/m)")
+    sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
+
+    @model_validator(mode="after")
+    def _one_spring_and_damper_a_mass(self) -> Self:
+        for key in ("stiffnesses", "dampings"):
+            if len(getattr(self, key)) != len(self.masses):
+                raise ValueError(
+                    f"{key} must hold one value a mass: {len(self.masses)} masses are given, "
+                    f"but {len(getattr(self, key))} {key}"
+                )
+        if self.contact_stiffness == "rigid" and self.contact_damping > 0:
+            raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
+        return self
+
+    def nominal_force(self, speed: float) -> float:
+        """Force that lifts the pantograph (N) at a train speed (m/s)."""
+        return self.static_force + self.aerodynamic_coefficient * (3.6 * speed) ** 2
