@@ -17,7 +17,7 @@ Weights = NDArray[np.float32]
 class Actor:
     """Deterministic policy: a multilayer perceptron from an observation to an action.
 
-    It is a policy itself (``panto_env.task.Policy``), for any context of the right shape.
+    It is a policy itself (``panto_env.policies.Policy``), for any context of the right shape.
     """
 
     weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)

@@ -17,8 +17,8 @@ PACKAGE = Path(panto_env.__file__).parent
 # Numba can't show the code of kernels that it read from disk, so a fresh process compiles them anew.
 CODE = """
 import json, sys
-from panto_env.task import Task
-from panto_env.task.episode import control_step
+from panto_env.control import Task
+from panto_env.control.step import control_step
 Task(**json.loads(sys.argv[1]))
 (assembly,) = control_step.inspect_asm().values()
 print(assembly)

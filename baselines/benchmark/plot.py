@@ -23,7 +23,7 @@ def plot(outcome: Benchmark) -> Figure:
     """Contact force along two spans of every line, and sigma over speed.
 
     The force is that at a line's highest speed under the first seed, in the last two spans evaluated:
-    one more pass for each policy. ``panto_env.figures.save`` writes the figure.
+    one more pass for each policy. ``panto_env.analysis.plots.save`` writes the figure.
     """
     from matplotlib.figure import Figure
 
