@@ -31,8 +31,7 @@ def test_validate_fails_where_a_figure_lies_outside(monkeypatch, capsys):
 
     from panto_env.cli import validate
 
-    unit, label, *_ = validation.ACCEPTED["std"]
-    monkeypatch.setitem(validation.ACCEPTED, "std", (unit, label, (0, 1), (0, 1)))
+    monkeypatch.setitem(validation.ACCEPTED, "std", ((0, 1), (0, 1)))
     with pytest.raises(typer.Exit) as caught:
         validate.validate()
     assert caught.value.exit_code == 1

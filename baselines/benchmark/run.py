@@ -16,6 +16,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.control import Task
+from panto_env.metrics.spans import last_whole_span
 from panto_env.policies import find_policy
 
 from .settings import BenchmarkSettings, Line
@@ -105,7 +106,7 @@ def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
         distance=line.distance,
         control_interval=settings.control_interval,
     )
-    last = math.floor(task.distance / task.plant.catenary.span_length)
+    last = last_whole_span(task.distance, task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SPAN, last)
     where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
     if not 1 <= first <= last:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.errors import InputError
 from ..base.files import write_whole
-from ..metrics.figures import low_pass
+from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 
 if TYPE_CHECKING:

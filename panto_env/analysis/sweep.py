@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -174,7 +174,7 @@ def _run(passes: list[_Pass], spans: tuple[int, int] | None, workers: int, progr
 def _row(each: _Pass, spans: tuple[int, int] | None) -> Row:
     try:
         run = simulate(**{"record_droppers": False} | each.arguments)
-        figures = Figures(*[float("nan")] * len(fields(Figures))) if run.terminated else run.summary(spans)
+        figures = Figures.none() if run.terminated else run.summary(spans)
     except InputError as error:
         at = ", ".join(f"{name} = {value:g}" for name, value in each.values.items())
         raise InputError(f"At {at}: {error}") from error

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from ..metrics.labels import LABELS
 from ..studies.en50318 import study as validation
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 
@@ -64,7 +65,7 @@ def _print_checks(checks: list[validation.Check]) -> None:
         table.add_column(f"{speed:g} km/h", justify="right")
         table.add_column("accepted", justify="right")
     for name in validation.ACCEPTED:
-        cells = [f"{validation.LABELS[name]} ({validation.ACCEPTED[name][1]})"]
+        cells = [LABELS[name].heading]
         for item in (check for check in checks if check.figure == name):
             value = number(item.value, 2)
             cells.append(value if item.inside else f"[bold red]{value} outside[/]")

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..backend.compile import part
 from ..base.arrays import Array
-from ..metrics.figures import Figures, low_pass_sections
+from ..metrics.figures import Figures
+from ..metrics.low_pass import low_pass_sections
 from ..plant.step import FORCE, FRAME_FORCE, HEAD_FORCE, STEP, lane_table
 from .rows import (
     COUNT,

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...catalog import load_catenary
-from ...metrics.figures import low_pass
+from ...metrics.labels import LABELS
+from ...metrics.low_pass import low_pass
 from ...metrics.trajectory import Trajectory
 from ...plant.catenary.flexible import build as flexible
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -24,27 +25,17 @@ REFERENCE_MODEL = "en50318-2002"
 SPANS = (5, 6)
 SPEEDS_KMH = (250.0, 300.0)
 
-# Accepted ranges (seen in a journal table): figure, scale from SI, unit, then a range a speed.
-ACCEPTED = {
-    "mean": (1.0, "N", (110, 120), (110, 120)),
-    "std": (1.0, "N", (26, 31), (32, 40)),
-    "statistical_max": (1.0, "N", (190, 210), (210, 230)),
-    "statistical_min": (1.0, "N", (20, 40), (-5, 20)),
-    "max": (1.0, "N", (175, 210), (190, 225)),
-    "min": (1.0, "N", (50, 75), (30, 55)),
-    "max_uplift": (1e3, "mm", (48, 55), (55, 65)),
-    "contact_loss": (1.0, "%", (0, 0), (0, 0)),
+ACCEPTED: dict[str, tuple[tuple[float, float], ...]] = {
+    "mean": ((110, 120), (110, 120)),
+    "std": ((26, 31), (32, 40)),
+    "statistical_max": ((190, 210), (210, 230)),
+    "statistical_min": ((20, 40), (-5, 20)),
+    "max": ((175, 210), (190, 225)),
+    "min": ((50, 75), (30, 55)),
+    "max_uplift": ((48, 55), (55, 65)),
+    "contact_loss": ((0, 0), (0, 0)),
 }
-LABELS = {
-    "mean": "mean F_m",
-    "std": "standard deviation σ",
-    "statistical_max": "statistical maximum F_m + 3σ",
-    "statistical_min": "statistical minimum F_m − 3σ",
-    "max": "actual maximum",
-    "min": "actual minimum",
-    "max_uplift": "maximum uplift at the supports",
-    "contact_loss": "contact loss",
-}
+"""Accepted ranges (seen in a journal table) of each figure, in its label's unit, at each of SPEEDS_KMH."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +65,9 @@ def check(runs: list[Trajectory]) -> list[Check]:
     checks = []
     for place, run in enumerate(runs):
         figures = run.summary(SPANS).as_dict()
-        for name, (scale, unit, *ranges) in ACCEPTED.items():
-            low, high = ranges[place]
-            checks.append(Check(name, unit, run.speed_kmh, scale * figures[name], low, high))
+        for name, ranges in ACCEPTED.items():
+            label, (low, high) = LABELS[name], ranges[place]
+            checks.append(Check(name, label.unit, run.speed_kmh, label.scale * figures[name], low, high))
     return checks
 
 
@@ -140,9 +131,7 @@ def check_windows(
         )
 
     whole = run(WHOLE)
-    true, span = whole.summary(WINDOW_RANGE), whole.span_length
-    first, last = (WINDOW_RANGE[0] - 1) * span, WINDOW_RANGE[1] * span
-    inside = (whole.position >= first) & (whole.position < last)
+    true, inside = whole.summary(WINDOW_RANGE), whole.inside(WINDOW_RANGE)
     checks = []
     for window in windows:
         travelling = run(window)
@@ -212,9 +201,8 @@ def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
             **used.model_dump(),
         )
         own = run.summary(WEAR_SPANS)
-        first, last = (WEAR_SPANS[0] - 1) * run.span_length, WEAR_SPANS[1] * run.span_length
-        inside = (run.position >= first) & (run.position < last)
-        rows.append((own.std, own.max, own.min, run.contact_force[inside].max(), own.contact_loss))
+        raw = run.contact_force[run.inside(WEAR_SPANS)]
+        rows.append((own.std, own.max, own.min, raw.max(), own.contact_loss))
     means, spreads = np.mean(rows, axis=0).tolist(), np.std(rows, axis=0, ddof=1).tolist()
     return WearCheck(
         condition.wear_wavelength,

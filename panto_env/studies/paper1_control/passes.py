@@ -118,7 +118,7 @@ def pressed(speed_kmh: int, mean: float) -> Result:
 
 def keep(case: Case, record: Trajectory) -> Result:
     """What is kept of a record."""
-    inside = _inside(record)
+    inside = record.inside(SPANS)
     force, turns = record.contact_force[inside], record.position[inside] / record.span_length
     return Result(
         case,
@@ -156,11 +156,4 @@ def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
 
 
 def _mean(record: Trajectory) -> float:
-    return float(record.contact_force[_inside(record)].mean())
-
-
-def _inside(record: Trajectory) -> NDArray[np.bool_]:
-    first, last = SPANS
-    lowest, highest = (first - 1) * record.span_length, last * record.span_length
-    inside: NDArray[np.bool_] = (record.position >= lowest) & (record.position < highest)
-    return inside
+    return float(record.contact_force[record.inside(SPANS)].mean())

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 
+from ...metrics.labels import LABELS
 from ..study import Table
 from .angles import sweep
 from .cases import (
@@ -30,21 +31,31 @@ from .linear import amplification
 from .passes import BANDS, Result
 
 Results = Mapping[Case, Result]
-FIGURES = (
-    "F_m (N)", "σ (N)", "raw σ (N)", "max (N)", "min (N)", "CL (%)", "longest loss (ms)", "CF (N m)",
-    "mean |F − F_N| (N)", "uplift (mm)", "effort (N)", "effort rate (N/s)",
-)  # fmt: skip
+Column = tuple[str, Callable[[Result], str]]
+"""A heading, and the cell under it."""
 
 
-def figures(result: Result) -> tuple[str, ...]:
-    """The cells under ``FIGURES``."""
-    of = result.figures
-    return (
-        f"{of.mean:.1f}", f"{of.std:.1f}", f"{result.raw_std:.1f}", f"{of.max:.0f}", f"{of.min:.0f}",
-        f"{of.contact_loss:.2f}", f"{1e3 * result.longest_loss:.0f}", f"{of.cost_function:.0f}",
-        f"{result.mean_deviation:.1f}", f"{1e3 * of.max_uplift:.0f}", f"{of.effort:.1f}",
-        f"{of.effort_rate:.0f}",
-    )  # fmt: skip
+def _figure(name: str, decimals: int) -> Column:
+    """The column of one of ``Figures``."""
+    label = LABELS[name]
+    return label.short_heading, lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
+
+
+COLUMNS: tuple[Column, ...] = (
+    _figure("mean", 1),
+    _figure("std", 1),
+    ("raw σ (N)", lambda result: f"{result.raw_std:.1f}"),
+    _figure("max", 0),
+    _figure("min", 0),
+    _figure("contact_loss", 2),
+    ("longest loss (ms)", lambda result: f"{1e3 * result.longest_loss:.0f}"),
+    _figure("cost_function", 0),
+    ("mean |F − F_N| (N)", lambda result: f"{result.mean_deviation:.1f}"),
+    _figure("max_uplift", 0),
+    _figure("effort", 1),
+    _figure("effort_rate", 0),
+)
+HEADINGS = tuple(heading for heading, _ in COLUMNS)
 
 
 def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]:
@@ -63,7 +74,7 @@ def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]
 
 
 def _rows(named: Iterable[tuple[str, int, Result]]) -> tuple[tuple[str, ...], ...]:
-    return tuple((name, str(speed), *figures(result)) for name, speed, result in named)
+    return tuple((name, str(speed), *(cell(result) for _, cell in COLUMNS)) for name, speed, result in named)
 
 
 def _parts(results: Results, pressed: Mapping[int, Result]) -> Table:
@@ -73,7 +84,7 @@ def _parts(results: Results, pressed: Mapping[int, Result]) -> Table:
         rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, pressed[speed]))
     return Table(
         f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}",
-        ("control", "km/h", *FIGURES),
+        ("control", "km/h", *HEADINGS),
         _rows(rows),
     )
 
@@ -100,7 +111,7 @@ def _actuators(results: Results) -> Table:
         (f"{actuator}: {name}", speed, results[sampled(speed, policy, actuator)])
         for actuator, (name, policy), speed in product(ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
     ]
-    return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *FIGURES), _rows(rows))
+    return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *HEADINGS), _rows(rows))
 
 
 def _angles(results: Results) -> Table:
@@ -157,7 +168,7 @@ def _speeds(results: Results) -> Table:
     for speed in SPEEDS:
         passive, active = results[Case(speed)], results[Case(speed, control())]
         rows += [("passive", speed, passive), (f"FB+FF, gain {GAIN}", speed, active)]
-    return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *FIGURES), _rows(rows))
+    return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *HEADINGS), _rows(rows))
 
 
 def _fine(results: Results) -> Table:
@@ -166,7 +177,7 @@ def _fine(results: Results) -> Table:
         (f"{name}, {told[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
         for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), told)
     ]
-    return Table("Time step and grid", ("control, time step, grid", "km/h", *FIGURES), _rows(rows))
+    return Table("Time step and grid", ("control, time step, grid", "km/h", *HEADINGS), _rows(rows))
 
 
 def _other_line(results: Results) -> Table:
@@ -174,4 +185,4 @@ def _other_line(results: Results) -> Table:
         (name, speed, results[Case(speed, policy, OTHER_LINE)])
         for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
     ]
-    return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *FIGURES), _rows(rows))
+    return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *HEADINGS), _rows(rows))

@@ -12,7 +12,8 @@ from ...analysis.parameters import change
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...catalog import load_catenary, load_pantograph
-from ...metrics.figures import Figures, en50367_checks, en50367_mean_limit
+from ...metrics import en50367
+from ...metrics.figures import Figures
 
 CATENARY, PANTOGRAPH = "periodic-stiffness", "three-mass"
 SPEED_KMH = 300.0
@@ -77,8 +78,8 @@ class Pass:
             "nominal_force_n": self.nominal_force,
             "contact_lost_percent": float(100 * np.mean(self.force <= 0)),
             "low_passed": self.figures.as_dict(),
-            "en50367_mean_limit_n": en50367_mean_limit(self.speed_kmh / 3.6),
-            "en50367": en50367_checks(self.figures, self.speed_kmh / 3.6),
+            "en50367_mean_limit_n": en50367.mean_limit(self.speed_kmh / 3.6),
+            "en50367": en50367.checks(self.figures, self.speed_kmh / 3.6),
         }
 
 
@@ -116,8 +117,7 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     else:
         pantograph = change(pantograph, parameter, value)
     run = simulate(line, pantograph, speed_kmh, bilateral=bilateral, time_step=TIME_STEP)
-    first, last = (SPANS[0] - 1) * run.span_length, SPANS[1] * run.span_length
-    shown = (run.position >= first) & (run.position < last)
+    shown = run.inside(SPANS)
     return Pass(
         speed_kmh=speed_kmh,
         span_length=run.span_length,
@@ -129,18 +129,14 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     )
 
 
-def maximum_limit(speed_kmh: float) -> float:
-    """Largest contact force (N) by EN 50367, as the paper's conclusion has it."""
-    return 350.0 if speed_kmh > 200 else 300.0
-
-
 def largest_static_force(each: Pass) -> float:
     """F_S (N) at which a pass' maximum would be at its limit.
 
     Every force scales with F(v) = F_S + alpha v^2, in either reading of the contact.
     """
     aerodynamic = each.nominal_force - load_pantograph(PANTOGRAPH).static_force
-    return maximum_limit(each.speed_kmh) / float(each.force.max() / each.nominal_force) - aerodynamic
+    limit = en50367.maximum_limit(each.speed_kmh / 3.6)
+    return limit / float(each.force.max() / each.nominal_force) - aerodynamic
 
 
 def _statistics(values: Array) -> dict[str, float]:

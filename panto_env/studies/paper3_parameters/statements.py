@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...metrics.figures import en50367_mean_limit
+from ...metrics import en50367
 from ..study import Comparison
-from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, Pass, Passes, largest_static_force, maximum_limit
+from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, Pass, Passes, largest_static_force
 from .sensitivity import Sensitivity
 
 MIDDLE = (0.25, 0.75)
@@ -92,18 +92,19 @@ def _standard(passes: Passes) -> list[Comparison]:
     """The conclusion: "in accordance with EN 50367"; it names the limits of the maximum alone."""
     found = []
     for each in passes["speed"]:
-        limit, largest = maximum_limit(each.speed_kmh), float(each.force.max())
+        limit, largest = en50367.maximum_limit(each.speed_kmh / 3.6), float(each.force.max())
         bound = largest_static_force(each)
         note = "" if largest <= limit else f"kept only with F_S up to {bound:.0f} N, which is not printed"
         name = f"largest F_C, {each.speed_kmh:g} km/h"
         found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit, note))
     others = [each for own in passes.values() for each in own if each.speed_kmh == SPEED_KMH]
-    largest, limit = max(float(each.force.max()) for each in others), maximum_limit(SPEED_KMH)
+    largest = max(float(each.force.max()) for each in others)
+    limit = en50367.maximum_limit(SPEED_KMH / 3.6)
     name = f"largest F_C of all variants, {SPEED_KMH:g} km/h"
     found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit))
 
     said = "in accordance with EN 50367"
-    mean = max(each.figures.mean / en50367_mean_limit(each.speed_kmh / 3.6) for each in passes["speed"])
+    mean = max(each.figures.mean / en50367.mean_limit(each.speed_kmh / 3.6) for each in passes["speed"])
     note = "limit 0.00097 v² + 70 (recalled), not named in the paper; our F_S puts F(v) on it"
     found.append(Comparison("F_m over its limit, any speed", "", mean, said, 0.0, 1.0, note))
     for each in passes["speed"]:

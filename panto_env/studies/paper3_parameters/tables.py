@@ -8,9 +8,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from ...metrics import en50367
 from ..study import Comparison, Table
 from .equations import RUN_TIME, Equations
-from .passes import SPANS, Influence, Pass, Passes, largest_static_force, maximum_limit
+from .passes import SPANS, Influence, Pass, Passes, largest_static_force
 from .sensitivity import SHARES, Sensitivity
 
 
@@ -105,7 +106,7 @@ def static_force(passes: Sequence[Pass]) -> Table:
             f"{each.speed_kmh:g}",
             f"{each.force.max() / each.nominal_force:.3f}",
             f"{each.force.std() / each.nominal_force:.3f}",
-            f"{maximum_limit(each.speed_kmh):g}",
+            f"{en50367.maximum_limit(each.speed_kmh / 3.6):g}",
             f"{largest_static_force(each):.0f}",
         )
         for each in passes
@@ -146,7 +147,9 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     high = [row["speed_kmh"] > 200 for row in rows]
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),
-        "maximum above its limit from": first([row["max"] > maximum_limit(row["speed_kmh"]) for row in rows]),
+        "maximum above its limit from": first(
+            [row["max"] > en50367.maximum_limit(row["speed_kmh"] / 3.6) for row in rows]
+        ),
         "contact lost from": first([row["contact_loss"] > 0 for row in rows]),
         "sigma over F(v) greatest at": rows[int(np.argmax(shares))]["speed_kmh"],
         "a span takes a natural period at": resonant,
