@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.machine import cores
 from ..base.settings import Settings, hint, parse
 from ..catalog import load_catenary, load_pantograph
 from ..control.task import DEFAULT_LINE, DEFAULT_SPEED_KMH
@@ -20,6 +19,7 @@ from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.sensors.delayed import SENSORS, Sensors
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
+from .pool import Progress, in_threads
 from .simulation import simulate
 
 SPEED = "speed_kmh"
@@ -27,7 +27,6 @@ POLICY = "policy"
 """First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
 MOST_PARAMETERS = 2
 
-Progress = Callable[[int, int], None]
 Row = dict[str, Any]
 _READERS: dict[str, Callable[[Any], Settings]] = {
     "catenary": load_catenary,
@@ -67,7 +66,7 @@ def sweep(
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1; the whole run by default. workers: threads, one a core by
+    figures cover, first and last from 1; the whole run by default. workers: threads, one per core by
     default; the outcome does not depend on it. progress: called with the passes done and of all.
     settings: any other of ``simulate`` (seed, distance (m), bilateral, ...).
 
@@ -92,7 +91,8 @@ def sweep(
         for values in product(*parameters.values())
         for policy in policies
     ]
-    return _run(passes, spans, workers or cores(), progress or (lambda done, total: None))
+    # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
+    return in_threads([partial(_row, each, spans) for each in passes], workers=workers, progress=progress)
 
 
 def _check(
@@ -155,20 +155,6 @@ def _prepare(
         find_policy(source)
     label = "passive" if policy is None else str(policy)
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
-
-
-def _run(passes: list[_Pass], spans: tuple[int, int] | None, workers: int, progress: Progress) -> list[Row]:
-    # Threads: kernels run without Python's lock, and a pass takes tens of milliseconds, less than a
-    # process takes to start.
-    executor = ThreadPoolExecutor(min(workers, len(passes)), thread_name_prefix="panto")
-    try:
-        futures = [executor.submit(_row, each, spans) for each in passes]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            progress(done, len(passes))
-        return [future.result() for future in futures]
-    finally:
-        executor.shutdown(cancel_futures=True)
 
 
 def _row(each: _Pass, spans: tuple[int, int] | None) -> Row:

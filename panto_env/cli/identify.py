@@ -57,9 +57,9 @@ def identify(
     names = dict(zip(Method, ident.METHODS, strict=True))
     known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])])}
     if plot is not None:
-        from ..analysis.plots import check_picture
+        from ..analysis.plots import check_plot
 
-        check_picture(plot)
+        check_plot(plot)
     record = ident.read_record(file, dict(_pairs(unit or [])))
     with progress_console.status("identifying"):
         found = ident.identify(record, known, band=band, free_offset=free_offset)

@@ -67,9 +67,9 @@ def simulate(
         settings["window"] = window
     chosen = parse_spans(spans)
     if plot is not None:
-        from ..analysis.plots import check_picture, plot_run, save
+        from ..analysis.plots import check_plot, plot_run, save
 
-        check_picture(plot)
+        check_plot(plot)
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:

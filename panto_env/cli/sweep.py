@@ -70,9 +70,10 @@ def sweep(
     if output is not None:
         files.check_table(output)
     if plot is not None:
-        from ..analysis.plots import check_picture, plot_sweep, save
+        from ..analysis.plots import check_plot, save
+        from ..analysis.sweep_plots import plot_sweep
 
-        check_picture(plot)
+        check_plot(plot)
     settings: dict[str, Any] = {"distance": distance, "bilateral": bilateral, "seed": seed}
     if speed is not None:
         if SPEED in values:

@@ -53,7 +53,7 @@ EXPERIMENTS = (
 )
 """y_p1 of paper 1's Table 1."""
 
-SWEEP = Excitation("sweep", 0.99e-3, 54.3e-3, 0.3, 4.0)
+FREQUENCY_SWEEP = Excitation("sweep", 0.99e-3, 54.3e-3, 0.3, 4.0)
 """Own choice: Experiment I's plate, swept from 0.3 to 4 Hz; the contact force stays above 0."""
 
 

@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 
+from ...base.table import Table
 from ...metrics.labels import LABELS
-from ..study import Table
-from .angles import sweep
+from .angles import cost_over_angle
 from .cases import (
     ACTUATORS,
+    ANGLE_CONTROLS,
+    ANGLE_SPEEDS,
     FINE,
     GAIN,
     GAINS,
@@ -21,8 +23,6 @@ from .cases import (
     SHOWN_SPEEDS,
     SPANS,
     SPEEDS,
-    SWEEP_SPEEDS,
-    SWEEPS,
     Case,
     control,
     sampled,
@@ -58,10 +58,10 @@ COLUMNS: tuple[Column, ...] = (
 HEADINGS = tuple(heading for heading, _ in COLUMNS)
 
 
-def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]:
-    """All of them. pressed: the passive pantograph at the controlled one's mean force, by speed."""
+def all_tables(results: Results, at_same_mean: Mapping[int, Result]) -> tuple[Table, ...]:
+    """All of them. at_same_mean: the passive pantograph at the controlled one's mean force, by speed."""
     return (
-        _parts(results, pressed),
+        _parts(results, at_same_mean),
         _gains(results),
         _actuators(results),
         _angles(results),
@@ -77,11 +77,11 @@ def _rows(named: Iterable[tuple[str, int, Result]]) -> tuple[tuple[str, ...], ..
     return tuple((name, str(speed), *(cell(result) for _, cell in COLUMNS)) for name, speed, result in named)
 
 
-def _parts(results: Results, pressed: Mapping[int, Result]) -> Table:
+def _parts(results: Results, at_same_mean: Mapping[int, Result]) -> Table:
     rows = []
     for speed in SHOWN_SPEEDS:
         rows += [(name, speed, results[Case(speed, policy)]) for name, policy in PARTS.items()]
-        rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, pressed[speed]))
+        rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, at_same_mean[speed]))
     return Table(
         f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}",
         ("control", "km/h", *HEADINGS),
@@ -116,9 +116,9 @@ def _actuators(results: Results) -> Table:
 
 def _angles(results: Results) -> Table:
     rows = []
-    for (gain, reading), speed in product(SWEEPS, SWEEP_SPEEDS):
-        found = sweep(results, speed, gain, reading)
-        span = reading == SWEEPS[0][1]
+    for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
+        found = cost_over_angle(results, speed, gain, reading)
+        span = reading == ANGLE_CONTROLS[0][1]
         rows.append(
             (
                 f"{reading}, gain {gain:g}",
@@ -141,7 +141,7 @@ def _angles(results: Results) -> Table:
 def _bands(results: Results) -> Table:
     shown = {name: PARTS[name] for name in ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")}
     rows = []
-    for speed, (name, policy) in product(SWEEP_SPEEDS, shown.items()):
+    for speed, (name, policy) in product(ANGLE_SPEEDS, shown.items()):
         result = results[Case(speed, policy)]
         parts = (abs(result.once_per_span) / math.sqrt(2), *result.bands, result.raw_std)
         rows.append((name, str(speed), *(f"{part:.1f}" for part in parts)))
@@ -172,10 +172,10 @@ def _speeds(results: Results) -> Table:
 
 
 def _fine(results: Results) -> Table:
-    told = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    numerics = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
     rows = [
-        (f"{name}, {told[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
-        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), told)
+        (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
+        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)
     ]
     return Table("Time step and grid", ("control, time step, grid", "km/h", *HEADINGS), _rows(rows))
 

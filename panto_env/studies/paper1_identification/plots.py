@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.arrays import Array
-from ...identification import FILTERED, IDENTIFIED, METHODS, SWEEP, Identification, Match, Record
+from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.equation_error import equations
 from ...identification.plots import plot_matches, plot_record
 from .published import PUBLISHED
@@ -80,7 +80,7 @@ def stiffness(
         list(clean.items())[::-1], ("tab:orange", "tab:blue"), (0.6, 2.5), strict=True
     ):
         columns = equations(shown, known)[0][1]
-        label = "sweep 0.3 to 4 Hz" if name == SWEEP.name else f"Experiment {name}, 1.42 Hz"
+        label = "sweep 0.3 to 4 Hz" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, 1.42 Hz"
         displacement = 1e3 * (columns[:, 4] - columns[:, 4].mean())
         left.plot(displacement[::4], columns[::4, 2], color=colour, linewidth=width, label=label)
     left.set(
@@ -130,7 +130,7 @@ def convergence(
     for axis, (name, methods) in zip(axes[1:], noise.items(), strict=True):
         for method, colour in zip(METHODS, COLOURS, strict=True):
             axis.loglog(1e6 * np.array(levels), methods[method], "o-", color=colour, label=method)
-        label = "sweep, offset free" if name == SWEEP.name else f"Experiment {name}, offset kept"
+        label = "sweep, offset free" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, offset kept"
         axis.set(xlabel="noise of the displacements, rms (µm)", ylabel="error of the worst parameter (%)")
         axis.set_title(f"{label}, 1 kHz")
         axis.set_ylim(top=1e9)  # room for the legend
