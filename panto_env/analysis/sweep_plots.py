@@ -52,7 +52,7 @@ def _lines(rows: Sequence[Row], parameter: str) -> Figure:
             axis.plot(values, scaled, color=colour, marker=".")
     force.set(ylabel="contact force (N)")
     for axis, key in zip(others, shown, strict=True):
-        axis.set(ylabel=LABELS[key].heading)
+        axis.set(ylabel=f"{LABELS[key].name}\n({LABELS[key].unit})")
         if key == "contact_loss":  # never below 0; a line without loss is not magnified
             axis.set_ylim(bottom=0, top=max(1.0, axis.get_ylim()[1]))
     for axis in (force, *others):
