@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.control.settings import run_settings
 from panto_env.control.task import Task
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
@@ -52,7 +53,7 @@ def test_no_pass_is_made_twice_and_every_actuator_is_known() -> None:
     cases = all_cases()
     assert len(set(cases)) == len(cases)
     for actuator in {case.actuator for case in cases}:
-        Task(actuator=ACTUATORS[actuator])
+        Task(run_settings({"actuator": ACTUATORS[actuator]}))
 
 
 @pytest.mark.parametrize(

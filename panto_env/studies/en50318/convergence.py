@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...catalog import load_catenary
-from ...plant.catenary.flexible import build as flexible
+from ...plant.catenary.flexible import grid
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
 from ...plant.numerics import Numerics
 from . import reference
@@ -33,8 +33,8 @@ def in_use(numerics: Numerics) -> Numerics:
     """The same with the time step and the grid that the reference line takes where they are None."""
     line = load_catenary(reference.REFERENCE_MODEL)
     assert isinstance(line, FlexibleCatenaryData)  # the standard's line is no other
-    step = flexible.time_step(line, numerics)
-    spacing = line.span_length / flexible.nodes_per_span(line, numerics.spacing, step)
+    step = grid.time_step(line, numerics)
+    spacing = line.span_length / grid.nodes_per_span(line, numerics.spacing, step)
     return numerics.model_copy(update={"time_step": step, "spacing": spacing})
 
 

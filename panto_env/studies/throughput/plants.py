@@ -12,6 +12,7 @@ import numpy as np
 
 from ...catalog import load_catenary
 from ...control import Task
+from ...control.settings import run_settings
 from ...envs import IDS
 
 COUNTED = "Pantograph-v0"
@@ -49,14 +50,14 @@ class PlantSpeed:
 
 def plant_speed(settings: dict[str, Any], repeats: int) -> tuple[PlantSpeed, Task]:
     """Times real time of whole passes at 300 km/h without a policy, on one core; and the task."""
-    task = Task(**settings, speed_kmh=SPEED_KMH)
+    task = Task(run_settings(settings | {"speed_kmh": SPEED_KMH}))
     travelled = 0.0
 
     def run() -> float:
         nonlocal travelled
         task.reset(0, np.random.default_rng(0))
         start = time.perf_counter()
-        task.coast()
+        task.run_passively()
         travelled = float(task.end(0) * task.plant.time_step)
         return time.perf_counter() - start
 
@@ -95,11 +96,11 @@ def cost_of_settings(repeats: int, report: Report) -> dict[str, list[dict[str, A
     for settings in DISCRETISATIONS:
         what = ", ".join(f"{key} {value}" for key, value in settings.items())
         speed, task = measured(flexible | settings, f"the flexible plant, {what or 'defaults'}")
-        grid = {"spacing": task.plant.line.spacing, "time_step": task.plant.time_step}
+        grid = {"spacing": task.plant.model.line.spacing, "time_step": task.plant.time_step}
         discretisations.append(grid | {"precision": "single" if in_single(task) else "double"} | speed)
     return {"spans": spans, "modes": modes, "discretisation": discretisations}
 
 
 def in_single(task: Task) -> bool:
     """Whether the wires of a flexible plant are computed in single precision."""
-    return bool(task.plant.line.stencil.itemsize == 4)
+    return bool(task.plant.model.line.stencil.itemsize == 4)

@@ -21,10 +21,10 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
         speed, task = plant_speed(dict(settings), repeats)
         plants.append({"id": name} | asdict(speed))
         if name == COUNTED:
-            line = task.plant.line
+            line = task.plant.model.line
             limits = roofline.measure(
                 2 * line.mobility.shape[1],
-                len(line.dropper_node),
+                len(line.link_node),
                 task.plant.time_step,
                 speed.times_real_time,
                 in_single(task),
