@@ -14,6 +14,7 @@ from ..base.settings import Settings, hint
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings
 from ..metrics.figures import Figures
+from ..metrics.spans import Spans
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
 from .pool import Progress, in_threads
@@ -42,7 +43,7 @@ def sweep(
     parameters: Mapping[str, Sequence[float]],
     *,
     policies: Sequence[str | Path | None] = (None,),
-    spans: tuple[int, int] | None = None,
+    spans: Spans | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -78,7 +79,9 @@ def sweep(
         for policy in policies
     ]
     # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
-    return in_threads([partial(_row, each, spans) for each in passes], workers=workers, progress=progress)
+    return in_threads(
+        [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
+    )
 
 
 def _check(
@@ -106,9 +109,9 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     if family in entries:
         check_name(name, entries[family])
         return
-    everything = [n for each, entry in entries.items() for n in parameter_names(entry, each)]
+    everything = [known for owner, entry in entries.items() for known in parameter_names(entry, owner)]
     near = hint(name, [SPEED, *everything])
-    families = ", ".join(f"'{each}.'" for each in (*entries, POLICY))
+    families = ", ".join(f"'{owner}.'" for owner in (*entries, POLICY))
     raise InputError(
         f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
         "(as pantograph.masses.0)."
@@ -122,39 +125,39 @@ def _prepare(
     settings: dict[str, Any],
 ) -> _Pass:
     changed, speed_kmh = dict(entries), settings.get(SPEED, default(SPEED))
-    own: list[str] = []
+    of_policy: list[str] = []
     for name, value in values.items():
         family, _, rest = name.partition(".")
         if name == SPEED:
             speed_kmh = value
         elif family == POLICY:
-            own.append(f"{rest}={value!r}")
+            of_policy.append(f"{rest}={value!r}")
         else:
             changed[family] = change(changed[family], name, value)
     source = None if policy is None else str(policy)
-    if own:
+    if of_policy:
         if source is None:
             raise InputError(f"The passive pantograph has no {' or '.join(values)}; name a policy.")
-        source = f"{source}{',' if ':' in source else ':'}{','.join(own)}"
+        source = f"{source}{',' if ':' in source else ':'}{','.join(of_policy)}"
     if source is not None:
         find_policy(source)
     label = "passive" if policy is None else str(policy)
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _row(each: _Pass, spans: tuple[int, int] | None) -> Row:
+def _row(one_pass: _Pass, spans: Spans | None) -> Row:
     try:
-        run = simulate(**{"record_droppers": False} | each.arguments)
+        run = simulate(**{"record_droppers": False} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
     except InputError as error:
-        at = ", ".join(f"{name} = {value:g}" for name, value in each.values.items())
+        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
         raise InputError(f"At {at}: {error}") from error
     return {
-        **each.values,
-        "policy": each.policy,
+        **one_pass.values,
+        "policy": one_pass.policy,
         "catenary": run.catenary,
         "pantograph": run.pantograph,
-        "speed_kmh": each.arguments["speed_kmh"],
+        "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,

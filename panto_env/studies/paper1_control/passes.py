@@ -60,21 +60,21 @@ def run(cases: Sequence[Case]) -> list[Result]:
 
 def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Trajectory]:
     """Whole records of cases that differ in their policy alone: lanes of one task."""
-    case = cases[0]
-    line = load_catenary(case.line)
+    first = cases[0]
+    line = load_catenary(first.line)
     settings = run_settings(
         {
             "catenary": line,
             "pantograph": pantograph,
-            "speed_kmh": case.speed_kmh,
-            "actuator": ACTUATORS[case.actuator],
-            "control_interval": case.control_interval,
+            "speed_kmh": first.speed_kmh,
+            "actuator": ACTUATORS[first.actuator],
+            "control_interval": first.control_interval,
             "distance": RUN_SPANS * line.span_length,
         }
-        | (FINE if case.fine else USUAL)
+        | (FINE if first.fine else USUAL)
     )
     task = Task(settings, lanes=len(cases))
-    policies = [find_policy(each.policy) for each in cases]
+    policies = [find_policy(case.policy) for case in cases]
     for lane, policy in enumerate(policies):
         task.reset(lane, np.random.default_rng(0))
         policy.reset(task.context(lane))
@@ -87,7 +87,7 @@ def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Traject
         if episode.terminated.any():
             ended = cases[int(np.argmax(episode.terminated))]
             raise InputError(f"The pass {ended} left the valid range of the simulation; leave it out.")
-    return [task.trajectory(lane, policy=each.policy) for lane, each in enumerate(cases)]
+    return [task.trajectory(lane, policy=case.policy) for lane, case in enumerate(cases)]
 
 
 def passive_at_mean(speed_kmh: int, mean: float) -> Result:
