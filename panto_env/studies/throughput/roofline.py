@@ -9,10 +9,10 @@ import numpy as np
 
 from ...backend import kernel
 
-# Arithmetic of one step, counted in the source of flexible_parts: adds and multiplies.
+# Adds and multiplies of one step, counted in panto_env/plant/catenary/flexible/wires.py and links.py.
 FLOPS_PER_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
 FLOPS_PER_DROPPER = 90  # two differences 2 x 11, tension 12, two forces on wires 2 x 20, what surrounds them
-# Numbers that the loops over the wires move to or from the nearest cache for each node: u, d, q written;
+# Numbers that the leapfrog moves to or from the nearest cache for each node: u, d, q written;
 # u, d, five q read; u, d written.
 NUMBERS_PER_NODE = 12
 CHAIN = 32
@@ -25,7 +25,7 @@ class Roofline:
     multiply_add: float  # measured peak of multiply and add in registers (GFLOP/s)
     cache: float  # measured traffic of a triad in the nearest cache (GB/s)
     arithmetic: float  # arithmetic of the kernel (GFLOP/s)
-    traffic: float  # traffic of its loops over the wires (GB/s)
+    traffic: float  # traffic of its leapfrog along the wires (GB/s)
     bound: float  # times real time, were the kernel at the nearer of both limits
 
 
