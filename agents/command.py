@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from panto_env.base.errors import InputError
+from panto_env.metrics.labels import LABELS
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
 
 if TYPE_CHECKING:
@@ -17,16 +18,17 @@ if TYPE_CHECKING:
 
 NEEDED = ("torch", "stable_baselines3", "tensorboard")
 ROWS = (
-    ("mean", "mean force F_m (N)", 1.0),
-    ("std", "standard deviation σ (N)", 1.0),
-    ("max", "maximum (N)", 1.0),
-    ("min", "minimum (N)", 1.0),
-    ("cost_function", "cost function CF (N m)", 1.0),
-    ("contact_loss", "contact loss CL (%)", 1.0),
-    ("max_uplift", "maximum uplift (mm)", 1e3),
-    ("effort", "actuator force, rms (N)", 1.0),
-    ("effort_rate", "its rate, rms (N/s)", 1.0),
+    "mean",
+    "std",
+    "max",
+    "min",
+    "cost_function",
+    "contact_loss",
+    "max_uplift",
+    "effort",
+    "effort_rate",
 )
+"""Figures that `panto evaluate` prints."""
 REPORTED = ("steps", "ratio", "qualified")  # facts of a model file that `panto train` prints
 
 
@@ -136,14 +138,15 @@ def _print_pairs(pairs: list[Pair]) -> None:
     for speed in sorted({pair.speed_kmh for pair in pairs}):
         here = [pair for pair in pairs if pair.speed_kmh == speed]
         table.add_section()
-        for key, label, scale in ROWS:
+        for key in ROWS:
+            label = LABELS[key]
             policy, passive = (
-                scale * sum(getattr(figures, key) for figures in column) / len(here)
+                label.scale * sum(getattr(figures, key) for figures in column) / len(here)
                 for column in ([pair.policy for pair in here], [pair.passive for pair in here])
             )
             change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 else ""
-            first = f"{speed:g}" if key == ROWS[0][0] else ""
-            table.add_row(first, label, number(policy), number(passive), change)
+            first = f"{speed:g}" if key == ROWS[0] else ""
+            table.add_row(first, label.heading, number(policy), number(passive), change)
         faults = [f"{sum(pair.terminated for pair in here)} ended early"] * any(p.terminated for p in here)
         out = sum(not pair.qualified and not pair.terminated for pair in here)
         faults += [f"{out} with F_m out of range"] * (out > 0)

@@ -11,7 +11,7 @@ from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 
-from .judge import finite_element
+from .finite_element import simulation as finite_element
 
 WHOLE = {"window": 0, "precision": "double"}
 
@@ -95,21 +95,21 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, 
 
 
 @pytest.mark.parametrize("speed", [250.0, 300.0])
-def test_agrees_with_the_finite_element_judge(speed):
+def test_agrees_with_finite_elements(speed):
     """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
     run = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4, **WHOLE)
     ours = run.summary((5, 6))
-    judged = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
-    judge = finite_element.figures(judged, line.span_length)
-    assert ours.std == pytest.approx(judge.std, rel=0.02)
-    assert ours.mean == pytest.approx(judge.mean, abs=0.5)
-    assert ours.max == pytest.approx(judge.maximum, abs=2.0)
-    assert ours.min == pytest.approx(judge.minimum, abs=2.0)
-    # The judge ran past span 6 alone, so that uplift is compared as far as it saw it.
-    seen = run.position < judged.position[-1]
+    other = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
+    theirs = finite_element.figures(other, line.span_length)
+    assert ours.std == pytest.approx(theirs.std, rel=0.02)
+    assert ours.mean == pytest.approx(theirs.mean, abs=0.5)
+    assert ours.max == pytest.approx(theirs.maximum, abs=2.0)
+    assert ours.min == pytest.approx(theirs.minimum, abs=2.0)
+    # The finite-element run ends just past span 6: uplift is compared up to there.
+    seen = run.position < other.position[-1]
     uplift = 1e3 * run.uplift[seen][:, 3:6].max()
-    assert uplift == pytest.approx(1e3 * judged.support_uplift[:, 3:6].max(), abs=0.5)
+    assert uplift == pytest.approx(1e3 * other.support_uplift[:, 3:6].max(), abs=0.5)
 
 
 @pytest.mark.slow
@@ -121,13 +121,13 @@ def test_agrees_with_the_finite_element_judge(speed):
         ("beijing-tianjin", "dsa380", 300.0),
     ],
 )
-def test_agrees_with_the_judge_on_other_lines(line, pantograph, speed):
+def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
     data, panto = load_catenary(line), load_pantograph(pantograph)
     ours = simulate(line, pantograph, speed, spacing=0.125, time_step=1.25e-4, **WHOLE).summary((5, 6))
-    judged = finite_element.simulate(
+    other = finite_element.simulate(
         data, panto, speed, element=0.25, time_step=2.5e-4, distance=6.1 * data.span_length
     )
-    assert ours.std == pytest.approx(finite_element.figures(judged, data.span_length).std, rel=0.02)
+    assert ours.std == pytest.approx(finite_element.figures(other, data.span_length).std, rel=0.02)
 
 
 @pytest.mark.parametrize("speed", [250.0, 300.0])

@@ -8,7 +8,7 @@ from panto_env.catalog import load_catenary
 from panto_env.plant import step as coupling
 from panto_env.plant.catenary.flexible import build as flexible
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318 import study as validation
+from panto_env.studies.en50318 import window as windows
 
 
 @numba.njit(**OPTIONS)
@@ -68,10 +68,10 @@ def test_window_is_the_whole_line_until_it_travels():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("catenary", "pantograph"), validation.WINDOW_LINES)
-@pytest.mark.parametrize("speed", validation.WINDOW_SPEEDS_KMH)
+@pytest.mark.parametrize(("catenary", "pantograph"), windows.LINES)
+@pytest.mark.parametrize("speed", windows.SPEEDS_KMH)
 def test_default_window_agrees_with_the_whole_line(catenary, pantograph, speed):
-    (check,) = validation.check_windows(catenary, pantograph, speed, [Numerics().window])
+    (check,) = windows.check_windows(catenary, pantograph, speed, [Numerics().window])
     assert abs(check.std) < 2
     assert abs(check.max) < 2
     assert abs(check.min) < 2.1  # % of the mean force; 2.03 at 200 km/h on benchmark-2015
