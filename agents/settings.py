@@ -12,8 +12,8 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse, suggest
 from panto_env.control import Task
+from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
-from panto_env.envs.single import SETTINGS
 
 from .algorithm import Algorithm, Count
 from .ppo import PPO
@@ -64,13 +64,13 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     if name not in IDS:
         raise InputError(f"[environment]: unknown id {name!r}: {suggest(str(name), list(IDS))}")
     given = {key: value for key, value in environment.items() if key != "id"}
-    _check_keys(given, SETTINGS, "[environment]")
+    _check_keys(given, tuple(fields()), "[environment]")
     return {**IDS[name], **given}
 
 
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
     """Ends and middle of an environment's range of speeds, or its one speed (km/h)."""
-    low, high = Task(**arguments(environment)).speed_range
+    low, high = Task(run_settings(arguments(environment))).speed_range
     return tuple(sorted({round(3.6 * v, 6) for v in (low, (low + high) / 2, high)}))
 
 
@@ -109,7 +109,7 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
 def _check_environment(training: Training) -> None:
     given = training.arguments
     try:
-        task = Task(**given)
+        task = Task(run_settings(given))
         for speed in training.evaluation.speeds_kmh or ():
             task.check_speeds(speed)
     except InputError as error:

@@ -13,6 +13,7 @@ from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 
 from panto_env.control import Task
+from panto_env.control.settings import run_settings
 
 from .callbacks import Bar, EpisodeLog, Regular
 from .evaluation import Comparison, Pair, verdict
@@ -56,7 +57,7 @@ class Run:
         self.training, self.folder = training, folder
         self.model = training.hyperparameters.make(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation
-        self._needs = Needs.of(Task(**training.arguments).context(0))
+        self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
         self._best = (False, -math.inf)  # evaluation of the best model: qualified, minus the ratio
         self._comparison = Comparison(training.arguments, training.speeds_kmh, training.evaluation.seeds)
 

@@ -52,7 +52,7 @@ def test_no_pass_is_made_twice_and_every_actuator_is_known() -> None:
     cases = all_cases()
     assert len(set(cases)) == len(cases)
     for actuator in {case.actuator for case in cases}:
-        Task(actuator=ACTUATORS[actuator])
+        Task(run_settings({"actuator": ACTUATORS[actuator]}))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.control import Task
+from panto_env.control.settings import run_settings
 from panto_env.policies import find_policy
 
 from .settings import BenchmarkSettings, Line
@@ -96,14 +97,18 @@ def check_format(path: str | Path) -> None:
 def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """Spans to evaluate; raises InputError where a line can't be run as told."""
     task = Task(
-        catenary=line.catenary,
-        pantograph=line.pantograph,
-        speed_kmh=(min(line.speeds_kmh), max(line.speeds_kmh)),
-        actuator=settings.actuator,
-        sensors=settings.sensors,
-        line_condition=settings.line_condition,
-        distance=line.distance,
-        control_interval=settings.control_interval,
+        run_settings(
+            {
+                "catenary": line.catenary,
+                "pantograph": line.pantograph,
+                "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
+                "actuator": settings.actuator,
+                "sensors": settings.sensors,
+                "line_condition": settings.line_condition,
+                "distance": line.distance,
+                "control_interval": settings.control_interval,
+            }
+        )
     )
     last = math.floor(task.distance / task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SPAN, last)

@@ -2,42 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.control.task import CONTROL_INTERVAL
-from panto_env.plant.actuators.lagged import ACTUATORS, Actuator
+from panto_env.control.settings import default, description
+from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
-from panto_env.plant.sensors.delayed import SENSORS, Sensors
+from panto_env.plant.sensors import SensorSettings, sensor_settings
 
 S = TypeVar("S", bound=Settings)
 REFERENCE = "passive"
 """The policy that every other one is compared with."""
 
 
-def _preset(kind: type[S], presets: Mapping[str, S]) -> Callable[[Any], S]:
-    """Reader of a preset's name or a table, for a field."""
+def _clause(read: Callable[[Any], S]) -> Callable[[Any], S]:
+    """A reader of a field whose errors are clauses: pydantic adds the key and the value."""
 
-    def read(value: Any) -> S:
+    def read_field(value: Any) -> S:
         try:
-            return parse(kind, value, "it", presets)
-        except InputError as error:  # as a clause: pydantic adds the key and the value
+            return read(value)
+        except InputError as error:
             raise ValueError(str(error).rstrip(".")) from error
 
-    return read
+    return read_field
+
+
+def _condition(value: Any) -> LineCondition:
+    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
+
+
+_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(_clause(actuator_settings))]]
+_Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(_clause(sensor_settings))]]
 
 
 class Line(Settings):
     """A pantograph on a line, and the speeds to run at."""
 
-    catenary: str = Field("en50318-2002", description="catalogue name or TOML file")
-    pantograph: str = Field("en50318-2002", description="catalogue name or TOML file")
+    catenary: str = Field(default("catenary"), description=description("catenary"))
+    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
     distance: Positive | None = Field(None, description="of a run (m), to the line's end if not given")
     spans: tuple[int, int] | None = Field(
@@ -66,12 +74,16 @@ class BenchmarkSettings(Settings):
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
         tuple(range(5)), min_length=1, description="seeds, or how many from 0 on"
     )
-    actuator: Annotated[Actuator, BeforeValidator(_preset(Actuator, ACTUATORS))] = Actuator()
-    sensors: Annotated[Sensors, BeforeValidator(_preset(Sensors, SENSORS))] = Sensors()
-    line_condition: Annotated[LineCondition, BeforeValidator(_preset(LineCondition, LINE_CONDITIONS))] = (
-        Field(LINE_CONDITIONS["fair"], description="on a new line all seeds are alike")
+    actuator: _Actuator = Field(
+        default("actuator"), validate_default=True, description=description("actuator")
     )
-    control_interval: Positive = Field(CONTROL_INTERVAL, description="time between actions (s)")
+    sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
+    line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
+        LINE_CONDITIONS["fair"], description="on a new line all seeds are alike"
+    )
+    control_interval: Positive = Field(
+        default("control_interval"), description=description("control_interval")
+    )
 
     def policies_on(self, line: Line) -> tuple[str, ...]:
         """Policies that run on a line."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -9,40 +10,40 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Task
+from ..control.arguments import check_arguments, parameters
+from ..control.settings import RunSettings, default, run_settings
 from ..metrics.trajectory import Trajectory
 from ..policies import Policy, find_policy
 
+_LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
+
 
 def simulate(
-    catenary: Any = "en50318-2002",
-    pantograph: Any = "en50318-2002",
-    speed_kmh: float = 300.0,
+    catenary: Any = _LINE,
+    pantograph: Any = _PANTOGRAPH,
+    speed_kmh: float = _SPEED_KMH,
     policy: Any = None,
     *,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    record_droppers: bool = True,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
 
-    catenary, pantograph: catalogue names or TOML files. policy: None, a name ("pd"), a model file, or
-    an object with reset and act. seed: of the line's irregularity and the sensors' noise. progress:
-    called with the share done. settings: any other of ``Task`` (actuator, sensors, line_condition,
-    distance (m), spans, control_interval (s), time_step (s), spacing (m), bilateral, ...).
+    policy: None, a name ("pd"), a model file, or an object with reset and act. seed: of the line's
+    irregularity and the sensors' noise. progress: called with the share done. record_droppers: keep the
+    tension of every dropper. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the
+    full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
-    Raises InputError for what is not valid.
+    Raises InputError for what is not valid, TypeError for an unknown argument.
     """
-    task = Task(
-        catenary=catenary,
-        pantograph=pantograph,
-        speed_kmh=speed_kmh,
-        **{"record_droppers": True} | settings,
-    )
-    if task.lanes != 1:
-        raise InputError("simulate makes one pass; leave lanes at 1.")
+    check_arguments(settings, RunSettings, "simulate")
+    given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
+    task = Task(run_settings(given), record_droppers=record_droppers)
     task.reset(0, np.random.default_rng(seed))
     if policy is None:
-        task.coast()
+        task.run_passively()
         return task.trajectory(0, seed=seed)
     name = policy if isinstance(policy, str) else type(policy).__name__
     run_policy(task, find_policy(policy), progress)
@@ -66,4 +67,14 @@ def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | N
             )
         task.step(action[None])
         if progress is not None:
-            progress(float(task.plant.step[0] / task.end(0)))
+            progress(float(task.plant.steps_done[0] / task.end(0)))
+
+
+def _explicit() -> inspect.Signature:
+    """The signature of ``simulate`` with every setting by name."""
+    own = inspect.signature(simulate).parameters
+    first = [each for each in own.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+    return inspect.Signature([*first, *(each for each in parameters() if each.name not in own)])
+
+
+simulate.__signature__ = _explicit()  # type: ignore[attr-defined]

@@ -11,13 +11,10 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..base.machine import cores
-from ..base.settings import Settings, hint, parse
-from ..catalog import load_catenary, load_pantograph
-from ..control.task import DEFAULT_LINE, DEFAULT_SPEED_KMH
+from ..base.settings import Settings, hint
+from ..control.arguments import check_arguments
+from ..control.settings import RunSettings, default, run_settings
 from ..metrics.figures import Figures
-from ..plant.actuators.lagged import ACTUATORS, Actuator
-from ..plant.line_condition import LINE_CONDITIONS, LineCondition
-from ..plant.sensors.delayed import SENSORS, Sensors
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
 from .simulation import simulate
@@ -29,13 +26,8 @@ MOST_PARAMETERS = 2
 
 Progress = Callable[[int, int], None]
 Row = dict[str, Any]
-_READERS: dict[str, Callable[[Any], Settings]] = {
-    "catenary": load_catenary,
-    "pantograph": load_pantograph,
-    "actuator": lambda value: parse(Actuator, value, "actuator", ACTUATORS),
-    "sensors": lambda value: parse(Sensors, value, "sensors", SENSORS),
-    "line_condition": lambda value: parse(LineCondition, value, "line_condition", LINE_CONDITIONS),
-}
+FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
+"""Settings whose own values can be swept, as ``pantograph.masses.0``."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +42,9 @@ class _Pass:
 def sweep(
     parameters: Mapping[str, Sequence[float]],
     *,
-    catenary: Any = DEFAULT_LINE,
-    pantograph: Any = "en50318-2002",
-    speed_kmh: float = DEFAULT_SPEED_KMH,
     policies: Sequence[str | Path | None] = (None,),
     spans: tuple[int, int] | None = None,
-    actuator: Any = "ideal",
-    sensors: Any = "ideal",
-    line_condition: Any = "new",
+    seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
     **settings: Any,
@@ -69,7 +56,8 @@ def sweep(
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
     figures cover, first and last from 1; the whole run by default. workers: threads, one a core by
     default; the outcome does not depend on it. progress: called with the passes done and of all.
-    settings: any other of ``simulate`` (seed, distance (m), bilateral, ...).
+    seed, settings: as for
+    ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
     Returns one row a pass, in the order of values, then policies: the swept values, what was run, and
     every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
@@ -78,17 +66,16 @@ def sweep(
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
-    given = {
-        "catenary": catenary,
-        "pantograph": pantograph,
-        "actuator": actuator,
-        "sensors": sensors,
-        "line_condition": line_condition,
-    }
-    entries = {family: _READERS[family](value) for family, value in given.items()}
+    check_arguments(settings, RunSettings, "sweep")
+    checked = run_settings(settings)
+    if len(checked.line_condition) != 1:
+        raise InputError("A sweep takes one condition of the line, not a list of them.")
+    entries: dict[str, Settings] = {family: getattr(checked, family) for family in FAMILIES[:-1]}
+    entries["line_condition"] = checked.line_condition[0]
+    given = settings | {"seed": seed}
     _check(parameters, entries, policies)
     passes = [
-        _prepare(dict(zip(parameters, values, strict=True)), policy, entries, speed_kmh, settings)
+        _prepare(dict(zip(parameters, values, strict=True)), policy, entries, given)
         for values in product(*parameters.values())
         for policy in policies
     ]
@@ -133,10 +120,9 @@ def _prepare(
     values: dict[str, float],
     policy: str | Path | None,
     entries: Mapping[str, Settings],
-    speed_kmh: float,
     settings: dict[str, Any],
 ) -> _Pass:
-    changed = dict(entries)
+    changed, speed_kmh = dict(entries), settings.get(SPEED, default(SPEED))
     own: list[str] = []
     for name, value in values.items():
         family, _, rest = name.partition(".")

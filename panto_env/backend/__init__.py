@@ -1,1 +1,38 @@
-"""All that touches Numba's and llvmlite's insides."""
+"""All that touches Numba's and llvmlite's insides; the rest of the house writes plain functions.
+
+``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` let a
+function differ by the type of what it works on; ``new_block`` gives a kernel memory on its stack; ``bind``
+packs a kernel's arguments once; ``constants`` gives kernels the names of rows; ``lane_table`` and
+``aligned_zeros`` are memory that vector instructions like; ``lane_threads`` shares lanes among cores.
+With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
+"""
+
+from .block import LANES_ABREAST, new_block, new_blocks
+from .compile import JIT, constants, inlined, kernel, python_function, subroutine
+from .dispatch import implements, operation
+from .mathematics import floor
+from .memory import CACHE_LINE, aligned_zeros, lane_table
+from .packed import bind, open_packed
+from .threads import LaneThreads, lane_threads
+
+__all__ = [
+    "CACHE_LINE",
+    "JIT",
+    "LANES_ABREAST",
+    "LaneThreads",
+    "aligned_zeros",
+    "bind",
+    "constants",
+    "floor",
+    "implements",
+    "inlined",
+    "kernel",
+    "lane_table",
+    "lane_threads",
+    "new_block",
+    "new_blocks",
+    "open_packed",
+    "operation",
+    "python_function",
+    "subroutine",
+]

@@ -1,58 +1,25 @@
-"""How kernels are compiled: cached on disk, never stale, never at import.
-
-Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the cache folder is named by a hash of all of the package's sources: any edit opens a new one.
-"""
+"""How kernels are compiled: on their first call, kept on disk, never stale, never at import."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
-from typing import Any, TypeVar
+from enum import IntEnum
+from typing import Any, NamedTuple, TypeVar
 
 import numba
 
+from .cache import cache_folder
+
 F = TypeVar("F", bound=Callable[..., Any])
-PACKAGE = Path(__file__).resolve().parents[1]
+E = TypeVar("E", bound=IntEnum)
+
+JIT = not numba.config.DISABLE_JIT
+"""Whether kernels are compiled. With ``NUMBA_DISABLE_JIT=1`` the same source runs as plain Python, some
+hundred times slower: for debuggers and for coverage."""
 
 # "contract" lets multiply and add fuse; it leaves the order of operations alone. Kernels allocate
 # nothing, so without Numba's run-time they need not count references to the arrays they are given.
 OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
-PART: dict[str, Any] = OPTIONS | {"forceinline": True}
-"""Options of a catenary's overloads: inlined by the compiler, as a call costs as much as most parts do."""
-
-
-@cache
-def source_hash() -> str:
-    """Hash of every source file of the package."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(PACKAGE.rglob("*.py")):
-        digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-@cache
-def cache_folder() -> Path:
-    """Folder of the compiled kernels, made on first use; in the temporary folder as a last resort.
-
-    ``PANTO_CACHE_DIR`` overrides where it lies.
-    """
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    base = Path(os.environ.get("PANTO_CACHE_DIR") or Path(home) / "panto_env")
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    for parent in (base, Path(tempfile.gettempdir()) / f"panto_env-{user}"):
-        folder = parent / source_hash()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    raise OSError(f"no folder can be written for compiled kernels; set PANTO_CACHE_DIR (not {base})")
 
 
 def kernel(function: F) -> F:
@@ -69,7 +36,32 @@ def kernel(function: F) -> F:
         numba.config.CACHE_DIR = previous
 
 
-def part(function: F) -> F:
-    """A part of kernels, inlined where it is called before types are known, as if it were written there."""
+def inlined(function: F) -> F:
+    """A function that kernels call; its source is put in the place of the call before types are known."""
     compiled: F = numba.njit(inline="always", **OPTIONS)(function)
     return compiled
+
+
+def subroutine(function: F) -> F:
+    """A function that kernels call, compiled by itself and then inlined by the compiler.
+
+    It compiles sooner than an ``inlined`` one where it is called several times or is long.
+    """
+    compiled: F = numba.njit(forceinline=True, **OPTIONS)(function)
+    return compiled
+
+
+def python_function(compiled: Callable[..., Any]) -> Callable[..., Any]:
+    """The Python source behind a compiled function, for a call from Python with arrays or numbers."""
+    source: Callable[..., Any] = getattr(compiled, "py_func", compiled)
+    return source
+
+
+def constants(names: type[E]) -> type[E]:
+    """The members of an enum as plain integers under the same names, for use in kernels.
+
+    Numba before 0.68, and its GPU compiler still, refuse a member of an enum as an index of an array.
+    """
+    numbers: Any = NamedTuple(names.__name__, [(member.name, int) for member in names])
+    members: type[E] = numbers(*(int(member) for member in names))
+    return members

@@ -1,7 +1,7 @@
-"""Arguments of kernels held in their compiled form.
+"""Arguments of kernels, packed once in their compiled form.
 
 To turn Python tuples of fifty arrays into what a kernel works on takes a microsecond in each call, as
-long as a step of the plant. ``bind`` does it once; the kernel is given where each lies and reads the
+long as a step of the plant. ``bind`` does it once; the kernel is given where each tuple lies and reads the
 fields that it uses, as ``line.span``. The arrays must keep their memory, as those of tuples that are never
 rebuilt do.
 """
@@ -29,55 +29,55 @@ from numba.extending import (
     unbox,
 )
 
-from .compile import kernel
+from .compile import JIT, kernel
 
 POINTER = np.dtype(np.intp).itemsize
 
 
-class Held:
+class Packed:
     """Named tuples, and where their compiled forms lie."""
 
     def __init__(self, arguments: tuple[Any, ...]) -> None:
-        """Hold ``arguments``, which stay alive with this object."""
+        """Pack ``arguments``, which stay alive with this object."""
         self.arguments = arguments
-        self._memory = [np.empty(_hold(each, 0), dtype=np.uint8) for each in arguments]
+        self._memory = [np.empty(_pack(argument, 0), dtype=np.uint8) for argument in arguments]
         self._table = np.array([form.ctypes.data for form in self._memory], dtype=np.intp)
-        for each, place in zip(arguments, self._table.tolist(), strict=True):
-            _hold(each, place)
+        for argument, place in zip(arguments, self._table.tolist(), strict=True):
+            _pack(argument, place)
         self.address = self._table.ctypes.data
 
 
-class HeldType(types.Type):  # type: ignore[misc]
-    """Type of held arguments in a kernel: the address of a table of their addresses."""
+class PackedType(types.Type):  # type: ignore[misc]
+    """Type of packed arguments in a kernel: the address of a table of their addresses."""
 
     def __init__(self, forms: tuple[Any, ...]) -> None:
-        self.forms = tuple(HeldTupleType(form) for form in forms)
-        super().__init__(f"Held({forms})")
+        self.forms = tuple(PackedTupleType(form) for form in forms)
+        super().__init__(f"Packed({forms})")
 
 
-class HeldTupleType(types.Type):  # type: ignore[misc]
-    """Type of one held named tuple: the address of its compiled form."""
+class PackedTupleType(types.Type):  # type: ignore[misc]
+    """Type of one packed named tuple: the address of its compiled form."""
 
     def __init__(self, form: Any) -> None:
         self.form = form
         self.instance_class = form.instance_class
-        super().__init__(f"HeldTuple({form})")
+        super().__init__(f"PackedTuple({form})")
 
 
-@typeof_impl.register(Held)  # type: ignore[untyped-decorator]
-def _type_of(held: Held, context: Any) -> HeldType:
-    return HeldType(tuple(numba.typeof(each) for each in held.arguments))
+@typeof_impl.register(Packed)  # type: ignore[untyped-decorator]
+def _type_of(packed: Packed, context: Any) -> PackedType:
+    return PackedType(tuple(numba.typeof(argument) for argument in packed.arguments))
 
 
-@register_model(HeldType)
-@register_model(HeldTupleType)
-class _HeldModel(models.OpaqueModel):  # type: ignore[misc]
+@register_model(PackedType)
+@register_model(PackedTupleType)
+class _PackedModel(models.OpaqueModel):  # type: ignore[misc]
     """An address."""
 
 
-@unbox(HeldType)  # type: ignore[untyped-decorator]
-def _unbox(_: HeldType, held: Any, c: Any) -> NativeValue:
-    number = c.pyapi.object_getattr_string(held, "address")
+@unbox(PackedType)  # type: ignore[untyped-decorator]
+def _unbox(_: PackedType, packed: Any, c: Any) -> NativeValue:
+    number = c.pyapi.object_getattr_string(packed, "address")
     address = c.pyapi.long_as_longlong(number)
     c.pyapi.decref(number)
     return NativeValue(c.builder.inttoptr(address, cgutils.voidptr_t))
@@ -90,34 +90,40 @@ def _constant(builder: Any, place: Any) -> Any:
     return value
 
 
-def _open(typing: Any, held: Any) -> Any:
+def _open(typing: Any, packed: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         table = builder.bitcast(arguments[0], cgutils.voidptr_t.as_pointer())
-        places = [_constant(builder, cgutils.gep_inbounds(builder, table, k)) for k in range(len(held.forms))]
+        count = len(packed.forms)
+        places = [_constant(builder, cgutils.gep_inbounds(builder, table, k)) for k in range(count)]
         return context.make_tuple(builder, signature.return_type, places)
 
-    return types.Tuple(held.forms)(held), build
+    return types.Tuple(packed.forms)(packed), build
 
 
-open_held: Any = intrinsic(_open)
-"""In a kernel: the named tuples held."""
+def _open_plain(packed: tuple[Any, ...]) -> tuple[Any, ...]:
+    return packed
+
+
+open_packed: Any = intrinsic(_open) if JIT else _open_plain
+"""In a kernel: the named tuples that were packed, in their order."""
 
 
 @infer_getattr
-class _HeldFields(AttributeTemplate):  # type: ignore[misc]
-    key = HeldTupleType
+class _PackedFields(AttributeTemplate):  # type: ignore[misc]
+    key = PackedTupleType
 
-    def generic_resolve(self, held: HeldTupleType, name: str) -> Any:
-        return held.form[held.form.fields.index(name)] if name in held.form.fields else None
-
-
-@lower_getattr_generic(HeldTupleType)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, held: HeldTupleType, value: Any, name: str) -> Any:
-    form = builder.bitcast(value, context.get_value_type(held.form).as_pointer())
-    return _constant(builder, cgutils.gep_inbounds(builder, form, 0, held.form.fields.index(name)))
+    def generic_resolve(self, packed: PackedTupleType, name: str) -> Any:
+        form = packed.form
+        return form[form.fields.index(name)] if name in form.fields else None
 
 
-def _put(typing: Any, argument: Any, address: Any) -> Any:
+@lower_getattr_generic(PackedTupleType)  # type: ignore[untyped-decorator]
+def _field(context: Any, builder: Any, packed: PackedTupleType, value: Any, name: str) -> Any:
+    form = builder.bitcast(value, context.get_value_type(packed.form).as_pointer())
+    return _constant(builder, cgutils.gep_inbounds(builder, form, 0, packed.form.fields.index(name)))
+
+
+def _write(typing: Any, argument: Any, address: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         value, place = values
         with builder.if_then(builder.icmp_unsigned("!=", place, ir.Constant(place.type, 0))):
@@ -127,22 +133,24 @@ def _put(typing: Any, argument: Any, address: Any) -> Any:
     return types.intp(argument, types.intp), build
 
 
-_put_held: Any = intrinsic(_put)
+_write_packed: Any = intrinsic(_write)
 
 
 @kernel
-def _hold(argument, address):
-    """Write the compiled form of a named tuple to an address, none if 0; its size in bytes."""
-    return _put_held(argument, address)
+def _pack(argument: Any, address: int) -> Any:
+    """Write the compiled form of a named tuple to an address, nowhere if that is 0; its size in bytes."""
+    return _write_packed(argument, address)
 
 
 def bind(compiled: Callable[..., Any], fixed: tuple[Any, ...], *changing: Any) -> Callable[..., Any]:
     """A kernel's entry, to be called with arguments of the types of ``changing`` alone.
 
-    The kernel takes the named tuples ``fixed`` as one held argument before them. Numba's look at the types
-    of arguments is skipped as well.
+    The kernel takes the named tuples ``fixed``, packed, as one argument before them. Numba's look at the
+    types of arguments is skipped as well.
     """
-    held = Held(fixed)
-    signature = tuple(numba.typeof(argument) for argument in (held, *changing))
+    if not JIT:
+        return partial(compiled, fixed)
+    packed = Packed(fixed)
+    signature = tuple(numba.typeof(argument) for argument in (packed, *changing))
     compiled.compile(signature)  # type: ignore[attr-defined]
-    return partial(compiled.overloads[signature].entry_point, held)  # type: ignore[attr-defined]
+    return partial(compiled.overloads[signature].entry_point, packed)  # type: ignore[attr-defined]

@@ -9,12 +9,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from ..base.machine import cores
 
-BLOCKS_A_CHUNK = 4
-"""Blocks of lanes abreast that a thread takes at a time; fewer are not worth the taking."""
+BLOCKS_PER_CHUNK = 4
+"""Blocks of lanes that a thread takes at a time; fewer are not worth the taking."""
 
 
-class Crew:
-    """The caller's thread and one beside it for each further core."""
+class LaneThreads:
+    """The caller's thread, and one further thread for each further core."""
 
     def __init__(self, lanes: int, chunk: int, threads: int) -> None:
         """Share ``lanes`` out in chunks."""
@@ -45,8 +45,8 @@ class Crew:
             job.result()
 
 
-def crew(lanes: int, abreast: int) -> Crew | None:
+def lane_threads(lanes: int, lanes_abreast: int) -> LaneThreads | None:
     """Threads for a batch of lanes, of which so many go abreast; None where one thread is enough."""
-    chunk = BLOCKS_A_CHUNK * abreast
+    chunk = BLOCKS_PER_CHUNK * lanes_abreast
     threads = min(cores(), lanes // (2 * chunk))
-    return Crew(lanes, chunk, threads) if threads > 1 else None
+    return LaneThreads(lanes, chunk, threads) if threads > 1 else None

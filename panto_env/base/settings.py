@@ -43,6 +43,21 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
 
 
+def parse_kind(
+    kinds: Mapping[str, type[S]], value: Any, name: str, presets: Mapping[str, S] | None = None
+) -> S:
+    """As ``parse``, where the table's key "kind" says which of several settings are meant; else the first."""
+    family = tuple(kinds.values())
+    if isinstance(value, family):
+        return value
+    chosen = value.get("kind", next(iter(kinds))) if isinstance(value, Mapping) else next(iter(kinds))
+    if chosen not in kinds:
+        raise InputError(
+            f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
+        )
+    return parse(kinds[chosen], value, name, presets)
+
+
 def explain(error: ValidationError) -> str:
     """One clause a problem: the key, what was expected, what was given."""
     parts = []
@@ -52,6 +67,20 @@ def explain(error: ValidationError) -> str:
         given = problem["input"]
         shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
         parts.append(f"key '{key}': {message}{shown}" if key else message)
+    return "; ".join(parts)
+
+
+def sentence(error: ValidationError) -> str:
+    """What is wrong with keyword arguments, in one sentence without its full stop."""
+    parts = []
+    for problem in error.errors():
+        name = ".".join(str(part) for part in problem["loc"])
+        cause = problem.get("ctx", {}).get("error")
+        if isinstance(cause, InputError):
+            parts.append(str(cause).removesuffix("."))
+            continue
+        words = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        parts.append(f"{name} {words}, not {problem['input']!r}")
     return "; ".join(parts)
 
 

@@ -6,7 +6,7 @@ import difflib
 import reprlib
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
@@ -15,25 +15,18 @@ from pydantic_core import ErrorDetails
 from ..base.errors import InputError
 from ..base.files import read_toml
 from ..base.settings import Settings
-from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
-from ..plant.catenary.schema import CatenaryData
-from ..plant.catenary.three_span.schema import ThreeSpanData
+from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.pantograph.schema import PantographData
 
 FOLDERS = {
     "catenary": Path(__file__).parent / "catenaries",
     "pantograph": Path(__file__).parent / "pantographs",
 }
+_KINDS: dict[int | str, type[Settings]] = {name: kind.schema for name, kind in CATENARIES.items()}
 _CATENARY: TypeAdapter[Any] = TypeAdapter(
-    Annotated[FlexibleCatenaryData | ThreeSpanData | PeriodicStiffnessData, Field(discriminator="kind")]
+    Annotated[Union[tuple(_KINDS.values())], Field(discriminator="kind")]  # noqa: UP007 - of a list
 )
 _PANTOGRAPH: TypeAdapter[Any] = TypeAdapter(PantographData)
-_KINDS: dict[int | str, type[Settings]] = {
-    "flexible": FlexibleCatenaryData,
-    "three_span": ThreeSpanData,
-    "periodic_stiffness": PeriodicStiffnessData,
-}
 _UNION_PARTS = {"constrained-float", "literal['rigid']"}  # how pydantic names alternatives
 _WORDS = {
     "float_parsing": "must be a number",

@@ -1,32 +1,26 @@
-"""What a policy sees: scaled readings, float32, within finite bounds."""
+"""What a policy sees: scaled entries, float32, within finite bounds."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend.compile import part
-from ..base.arrays import Array
-from ..plant import step as coupling
-from ..plant.actuators.lagged import Actuator
+from ..backend import inlined, subroutine
+from ..base.arrays import Array, Index
+from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
-from ..plant.trigonometry import cosine_of_turns, sine_of_turns
-from .rows import ENTRY, READING, READINGS
+from . import entries as of
+from .entries import WRITERS, Entry
+from .state import MAX_ENTRIES, TASK_ROW
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
-OBSERVATIONS = ("measured", "full")
-
-
-class Entry(NamedTuple):
-    """One entry of the observation: physical value = entry * scale."""
-
-    name: str
-    scale: float
-    unit: str
+NOT_NEGATIVE = 0xFFFFFFF
+"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +32,13 @@ class Layout:
 
     @property
     def scale(self) -> Array:
-        """Scale of each entry, in its unit."""
+        """Scale of each entry, (entries,), in its unit."""
         return np.array([entry.scale for entry in self.entries])
+
+    @property
+    def writers(self) -> Index:
+        """Writer and number of each entry, (entries, 2)."""
+        return np.array([(entry.writer, entry.number) for entry in self.entries])
 
     def index(self, name: str) -> int:
         """Place of an entry."""
@@ -51,77 +50,84 @@ class Layout:
         return float(observation[place]) * self.entries[place].scale
 
 
-def layout(kind: str, actuator: Actuator, pantograph: PantographData) -> Layout:
-    """Entries of the observation ``kind``.
-
-    "measured" is what a train can measure; "full" adds the wire above the head, the actuators and
-    all masses between head and frame, free of noise and delay.
-    """
-    entries = [
-        Entry("head displacement", 0.1, "m"),
-        Entry("frame displacement", 0.1, "m"),
-        Entry("head velocity", 1.0, "m/s"),
-        Entry("frame velocity", 1.0, "m/s"),
-        Entry("contact force", 100.0, "N"),
-        Entry("sine of span position", 1.0, "-"),
-        Entry("cosine of span position", 1.0, "-"),
-        Entry("speed", 100.0, "m/s"),
+def measured(actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
+    """What a train can measure."""
+    kinds = (
+        of.head_displacement,
+        of.frame_displacement,
+        of.head_velocity,
+        of.frame_velocity,
+        of.contact_force,
+        of.span_sine,
+        of.span_cosine,
+        of.speed,
+    )
+    actions = enumerate(place.name.lower() for place in actuator.places)
+    return [kind.entry() for kind in kinds] + [
+        of.last_action.entry(f"last {place} action", number=k) for k, place in actions
     ]
-    places = ("frame", "head")
-    entries += [Entry(f"last {places[k]} action", 1.0, "-") for k in actuator.channels]
-    if kind == "full":
+
+
+def full(actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
+    """Beside it the wire above the head, the actuators and all masses, free of noise and delay."""
+    entries = measured(actuator, pantograph)
+    entries += [of.wire_displacement.entry()]
+    entries += [kind.entry(scale=actuator.force_limit) for kind in (of.frame_force, of.head_force)]
+    for k in range(1, len(pantograph.masses) - 1):  # those between head and frame
         entries += [
-            Entry("wire displacement", 0.1, "m"),
-            Entry("frame force", actuator.force_limit, "N"),
-            Entry("head force", actuator.force_limit, "N"),
+            of.mass_displacement.entry(f"mass {k + 1} displacement", number=k),
+            of.mass_velocity.entry(f"mass {k + 1} velocity", number=k),
         ]
-        for k in range(2, len(pantograph.masses)):
-            entries += [
-                Entry(f"mass {k} displacement", 0.1, "m"),
-                Entry(f"mass {k} velocity", 1.0, "m/s"),
-            ]
-    return Layout(kind, tuple(entries))
+    return entries
 
 
-@part
-def observe(episode, size, block, scores, begin, count):
-    """Observation of a block into ``episode.observation`` as float32.
+OBSERVATIONS: dict[str, Callable[[ActuatorSettings, PantographData], list[Entry]]] = {
+    "measured": measured,
+    "full": full,
+}
+"""Kinds of observation by name."""
 
-    size: of the pantograph's state.
+
+def layout(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> Layout:
+    """Entries of the observation ``kind``, one of OBSERVATIONS."""
+    entries = tuple(OBSERVATIONS[kind](actuator, pantograph))
+    if len(entries) > MAX_ENTRIES:
+        raise ValueError(f"the observation '{kind}' has {len(entries)} entries; at most are {MAX_ENTRIES}")
+    return Layout(kind, entries)
+
+
+def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
+    """Kernel code that writes a row of entries with the writer at a place known only as it runs.
+
+    Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
     """
-    entries, per_unit = scores[ENTRY:], episode.per_unit
-    for k in range(READINGS):
-        if episode.noisy:
-            noise = episode.noise[k, begin : begin + count]
+    names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
+    lines = ["def write(chosen, episode, block, readings, begin, number, per_unit, row, count):"]
+    for place in range(len(writers)):
+        value = f"writer_{place}(episode, block, readings, (begin + i) & {NOT_NEGATIVE}, number, i)"
+        lines += [f"    if chosen == {place}:", "        for i in range(count):"]
+        lines += [f"            row[i] = {value} * per_unit"]
+    exec("\n".join(lines), names)
+    write: Callable[..., Any] = subroutine(names["write"])
+    return write
+
+
+_write = _branches(WRITERS)
+
+
+@inlined
+def observe(episode, sensors, block, task, begin, count):
+    """Observation of a block into ``episode.observation``; noise is added to the readings."""
+    readings, entries = task[TASK_ROW.READING :], task[TASK_ROW.ENTRY :]
+    if sensors.noise.shape[1] > 0:
+        for k in range(sensors.noise.shape[0]):
+            noise = sensors.noise[k, begin : begin + count]
             for i in range(count):
-                scores[READING + k, i] += noise[i]
-        factor = per_unit[k]
+                readings[k, i] += noise[i]
+    for k in range(episode.writers.shape[0]):
+        chosen, number = episode.writers[k, 0], episode.writers[k, 1]
+        _write(chosen, episode, block, readings, begin, number, episode.per_unit[k], entries[k], count)
+    for k in range(episode.writers.shape[0]):
+        seen = episode.observation[begin : begin + count, k]
         for i in range(count):
-            entries[k, i] = scores[READING + k, i] * factor
-    spans, speed = 1.0 / episode.span, per_unit[7] / episode.time_step
-    for i in range(count):
-        turns = block[coupling.STRIDE, i] * block[coupling.STEP, i] * spans
-        entries[5, i] = sine_of_turns(turns)
-        entries[6, i] = cosine_of_turns(turns)
-        entries[7, i] = block[coupling.STRIDE, i] * speed
-    k = 8
-    for a in range(episode.channels.size):
-        action = episode.action[begin : begin + count, a]
-        for i in range(count):
-            entries[k, i] = action[i]
-        k += 1
-    if episode.full:
-        for i in range(count):
-            entries[k, i] = block[coupling.WIRE_HEIGHT, i] * per_unit[k]
-            entries[k + 1, i] = block[coupling.FRAME_FORCE, i] * per_unit[k + 1]
-            entries[k + 2, i] = block[coupling.HEAD_FORCE, i] * per_unit[k + 2]
-        k += 3
-        for m in range(coupling.STATE + 1, coupling.STATE + size // 2 - 1):
-            for i in range(count):
-                entries[k, i] = block[m, i] * per_unit[k]
-                entries[k + 1, i] = block[m + size // 2, i] * per_unit[k + 1]
-            k += 2
-    for r in range(k):
-        seen = episode.observation[begin : begin + count, r]
-        for i in range(count):
-            seen[i] = min(max(entries[r, i], -BOUND), BOUND)
+            seen[i] = min(max(entries[k, i], -BOUND), BOUND)

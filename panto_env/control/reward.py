@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ..backend.compile import part
+from ..backend import inlined
+from ..base.arrays import Array
 from ..base.settings import NonNegative, Settings
-from ..plant.step import FORCE, STEP, STRIDE
-from .rows import BEFORE, COST, DISTANCE, GONE, LOST, NOMINAL, REWARD, TERM
-
-# Columns of the terms, each summed over one control step and not weighted.
-COST_FUNCTION, CONTACT_LOSS, EFFORT, RATE = 0, 1, 2, 3
-TERMS = ("cost_function", "contact_loss", "effort", "rate")  # N m, %, -, -
+from ..plant.state import ROW
+from .state import TASK_ROW, TERM, TERMS
 
 
 class Reward(Settings):
@@ -25,23 +22,39 @@ class Reward(Settings):
     effort: NonNegative = Field(0.0, description="weight of the squared action (-)")
     rate: NonNegative = Field(0.0, description="weight of the squared change of action (-)")
 
+    @property
+    def weights(self) -> Array:
+        """(terms,): in the order of the terms."""
+        return np.array([getattr(self, name) for name in TERMS])
 
-@part
-def judge_sample(block, scores, count):
-    """Add the step that a block has just made to the cost and the loss of its control step."""
+
+@inlined
+def begin_terms(block, task, count):
+    """Begin a control step."""
     for i in range(count):
-        force, nominal = block[FORCE, i], scores[NOMINAL, i]
+        task[TASK_ROW.FORCE_BEFORE, i] = block[ROW.FORCE, i]
+        task[TASK_ROW.COST, i] = 0.0
+        task[TASK_ROW.LOSS_STEPS, i] = 0.0
+
+
+@inlined
+def add_sample_to_terms(block, task, count):
+    """Add the plant step that a block has just made to the cost and the loss of its control step."""
+    for i in range(count):
+        force, nominal_force = block[ROW.FORCE, i], block[ROW.NOMINAL_FORCE, i]
         # An interval lies between two samples: before the first one there is none.
-        between = 1.0 if block[STEP, i] > 1.5 else 0.0
-        scores[COST, i] += between * (abs(scores[BEFORE, i] - nominal) + abs(force - nominal))
+        between = 1.0 if block[ROW.STEP, i] > 1.5 else 0.0
+        task[TASK_ROW.COST, i] += between * (
+            abs(task[TASK_ROW.FORCE_BEFORE, i] - nominal_force) + abs(force - nominal_force)
+        )
         lost = 1.0 if force <= 0.0 else 0.0
-        scores[GONE, i] += lost
-        scores[LOST, i] = lost * (scores[LOST, i] + 1.0)
-        scores[BEFORE, i] = force
+        task[TASK_ROW.LOSS_STEPS, i] += lost
+        task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] = lost * (task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] + 1.0)
+        task[TASK_ROW.FORCE_BEFORE, i] = force
 
 
-@part
-def judge(episode, block, scores, begin, count):
+@inlined
+def compute_reward(episode, block, task, begin, count):
     """Terms and reward of the control step that a block has just made.
 
     The terms "cost_function" (N m) and "contact_loss" (%) sum over an episode to the CF and CL of its
@@ -49,28 +62,33 @@ def judge(episode, block, scores, begin, count):
     """
     steps, weights = episode.control_steps, episode.weights
     for i in range(count):
-        scores[TERM + EFFORT, i] = 0.0
-        scores[TERM + RATE, i] = 0.0
-    for a in range(episode.channels.size):
+        task[TASK_ROW.TERM + TERM.EFFORT, i] = 0.0
+        task[TASK_ROW.TERM + TERM.RATE, i] = 0.0
+    for a in range(episode.places.size):
         action = episode.action[begin : begin + count, a]
         last_action = episode.last_action[begin : begin + count, a]
         for i in range(count):
             change = 0.5 * (action[i] - last_action[i])
-            scores[TERM + EFFORT, i] += action[i] * action[i]
-            scores[TERM + RATE, i] += change * change
+            task[TASK_ROW.TERM + TERM.EFFORT, i] += action[i] * action[i]
+            task[TASK_ROW.TERM + TERM.RATE, i] += change * change
             last_action[i] = action[i]
     for i in range(count):
-        cost, gone = 0.5 * scores[COST, i], scores[GONE, i]
-        scores[TERM + COST_FUNCTION, i] = block[STRIDE, i] * cost
-        scores[TERM + CONTACT_LOSS, i] = 100.0 * gone * block[STRIDE, i] / scores[DISTANCE, i]
-        scores[REWARD, i] = -(
-            weights[COST_FUNCTION] * cost / (scores[NOMINAL, i] * steps)
-            + weights[CONTACT_LOSS] * gone / steps
-            + weights[EFFORT] * scores[TERM + EFFORT, i]
-            + weights[RATE] * scores[TERM + RATE, i]
+        cost, loss_steps = 0.5 * task[TASK_ROW.COST, i], task[TASK_ROW.LOSS_STEPS, i]
+        stride = block[ROW.STRIDE, i]
+        task[TASK_ROW.TERM + TERM.COST_FUNCTION, i] = stride * cost
+        task[TASK_ROW.TERM + TERM.CONTACT_LOSS, i] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE, i]
+        task[TASK_ROW.REWARD, i] = -(
+            weights[TERM.COST_FUNCTION] * cost / (block[ROW.NOMINAL_FORCE, i] * steps)
+            + weights[TERM.CONTACT_LOSS] * loss_steps / steps
+            + weights[TERM.EFFORT] * task[TASK_ROW.TERM + TERM.EFFORT, i]
+            + weights[TERM.RATE] * task[TASK_ROW.TERM + TERM.RATE, i]
         )
 
 
-def weights(reward: Reward) -> np.ndarray:
-    """Weights in the order of the terms."""
-    return np.array([getattr(reward, name) for name in TERMS])
+@inlined
+def charge_early_end(episode, block, task, i):
+    """A run that ends early pays as if it went on without contact: ending must not be a way out."""
+    left = (task[TASK_ROW.END, i] - block[ROW.STEP, i]) / episode.control_steps
+    task[TASK_ROW.REWARD, i] -= left * (
+        episode.weights[TERM.COST_FUNCTION] + episode.weights[TERM.CONTACT_LOSS]
+    )

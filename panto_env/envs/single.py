@@ -11,34 +11,16 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.settings import suggest
-from ..control import Task
-from ..control.context import Context
-from ..control.observation import BOUND
-from ..control.reward import CONTACT_LOSS, COST_FUNCTION, EFFORT, RATE
-from ..control.rows import REWARD, TERM
+from ..catalog import load_pantograph
+from ..control import Context, Task
+from ..control.arguments import table, takes
+from ..control.observation import BOUND, layout
+from ..control.settings import check_names, default, run_settings
+from ..control.state import TERMS, TaskRow
 from ..metrics.trajectory import Trajectory
-from ..plant.step import CONTACT_FORCE, FRAME_FORCE, HEAD_FORCE, HEAD_HEIGHT, STEP, STRIDE, WIRE_HEIGHT
-
-SETTINGS = (
-    "catenary",
-    "pantograph",
-    "speed_kmh",
-    "actuator",
-    "sensors",
-    "line_condition",
-    "pantograph_scatter",
-    "observation",
-    "reward",
-    "distance",
-    "spans",
-    "control_interval",
-    "time_step",
-    "spacing",
-    "window",
-    "precision",
-    "bilateral",
-)
+from ..plant.actuators import actuator_settings
+from ..plant.state import Row
+from .settings import EnvironmentSettings
 
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -52,7 +34,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     modal catenary, paper 2).
 
     ## Action Space
-    `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={"place": "both"}`: share of the actuator's
+    `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={{"place": "both"}}`: share of the actuator's
     force limit (100 N unless told otherwise), up on the frame or up on the head and down on the mass
     below it. Held for one control interval (10 ms). Values outside are clipped; NaN, infinite or
     wrongly shaped actions raise an error and leave the environment as it was.
@@ -60,17 +42,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Observation Space
     `Box(-10, 10, (n,), float32)`, each entry a physical value over its scale:
 
-    | Num | Observation | Scale |
-    |-----|-------------|-------|
-    | 0 | head displacement | 0.1 m |
-    | 1 | frame displacement | 0.1 m |
-    | 2 | head velocity | 1 m/s |
-    | 3 | frame velocity | 1 m/s |
-    | 4 | measured contact force | 100 N |
-    | 5 | sine of the position within the span | 1 |
-    | 6 | cosine of the position within the span | 1 |
-    | 7 | speed | 100 m/s |
-    | 8 | last action (8 and 9 with two actuators) | 1 |
+    {observation}
 
     `observation="full"` appends the wire's height, the actuators' forces and the state of masses
     between head and frame. Entries 0-4 carry the noise and delay of `sensors`.
@@ -90,13 +62,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     `info["figures"]` holds the episode's figures, those of `Trajectory.summary()`.
 
     ## Arguments
-    `catenary`, `pantograph` (catalogue names or TOML files), `speed_kmh` (a number or a range to draw
-    from), `actuator` ("ideal", "realistic" or a table), `sensors` (likewise), `line_condition` ("new",
-    "fair", "worn" or a table; of a list one is drawn for each episode), `pantograph_scatter` (rms
-    relative difference of masses, springs and dampers, drawn for each episode), `observation` ("measured"
-    or "full"), `reward` (a table of weights), `distance` (m), `spans`, `control_interval` (s),
-    `time_step` (s), `spacing` (grid, m), `window` (spans computed about the train), `precision`,
-    `bilateral` (let the contact pull, as paper 3's equations do), `render_mode` (None or "rgb_array").
+    {arguments}
+
     `reset(options=...)` takes the same for one episode, but those that change a space.
 
     ## Version History
@@ -105,14 +72,13 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(self, render_mode: str | None = None, **settings: Any) -> None:
-        """See the class. Raises InputError for an argument that is unknown or not valid."""
-        check_names(settings, "argument")
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"render_mode must be None or 'rgb_array', not {render_mode!r}.")
-        self.render_mode = render_mode
-        self._settings = settings
-        self._usual = Task(**settings)
+    @takes(EnvironmentSettings)
+    def __init__(self, given: dict[str, Any]) -> None:
+        """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
+        settings = run_settings(given, EnvironmentSettings)
+        self.render_mode = settings.render_mode
+        self._given = given
+        self._usual = Task(settings)
         self._watch(self._usual)
         self._running = False
         shape = self.task.episode.observation[0].shape
@@ -146,15 +112,15 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task, episode = task, task.episode
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
-        self._plant_column, self._task_column = task.plant.run.lanes[:, 0], episode.lanes[:, 0]
+        self._plant_column, self._task_column = task.plant.run.table[0, :, 0], episode.table[:, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
         check_names(options, "option")
         if not options:
             return self._usual
-        task = Task(**self._settings | options)
-        if task.layout != self._usual.layout or task.actuator.channels != self._usual.actuator.channels:
+        task = Task(run_settings(self._given | options, EnvironmentSettings))
+        if task.layout != self._usual.layout or task.actuator.places != self._usual.actuator.places:
             raise InputError(
                 f"The options {', '.join(options)} would change the observation or action space; "
                 "make another environment for that."
@@ -169,25 +135,20 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise InputError("The episode has not begun or has ended; call reset before step.")
         self.task.step(checked(action, self._shape))
         terminated, truncated = self._terminated.item(), self._truncated.item()
-        plant, scores = self._plant_column.tolist(), self._task_column.tolist()
+        plant, task = self._plant_column.tolist(), self._task_column.tolist()
         info: dict[str, Any] = {
-            "contact_force": plant[CONTACT_FORCE],
-            "head": plant[HEAD_HEIGHT],
-            "wire": plant[WIRE_HEIGHT],
-            "frame_force": plant[FRAME_FORCE],
-            "head_force": plant[HEAD_FORCE],
-            "position": plant[STEP] * plant[STRIDE],
-            "reward_terms": {
-                "cost_function": scores[TERM + COST_FUNCTION],
-                "contact_loss": scores[TERM + CONTACT_LOSS],
-                "effort": scores[TERM + EFFORT],
-                "rate": scores[TERM + RATE],
-            },
+            "contact_force": plant[Row.CONTACT_FORCE],
+            "head": plant[Row.HEAD_HEIGHT],
+            "wire": plant[Row.WIRE_HEIGHT],
+            "frame_force": plant[Row.FRAME_FORCE],
+            "head_force": plant[Row.HEAD_FORCE],
+            "position": plant[Row.STEP] * plant[Row.STRIDE],
+            "reward_terms": dict(zip(TERMS, task[TaskRow.TERM :], strict=True)),
         }
         if terminated or truncated:
             self._running = False
             info["figures"] = self.task.figures(0).as_dict()
-        reward = scores[REWARD]
+        reward = task[TaskRow.REWARD]
         return self._observation.copy(), reward, terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -217,8 +178,18 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     return force
 
 
-def check_names(given: dict[str, Any], what: str) -> None:
-    """Raise InputError for a name that is not one of ``SETTINGS``."""
-    for name in given:
-        if name not in SETTINGS:
-            raise InputError(f"Unknown {what} '{name}': {suggest(str(name), SETTINGS)}.")
+def _observation_table() -> str:
+    """The entries of the default observation as a Markdown table."""
+    actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
+    entries = layout(default("observation"), actuator, pantograph).entries
+    rows = [f"| {k} | {each.name} | {each.scale:g} {each.unit} |" for k, each in enumerate(entries)]
+    return "\n".join(("| Num | Observation | Scale |", "|-----|-------------|-------|", *rows))
+
+
+def _indented(text: str) -> str:
+    return text.replace("\n", "\n    ")
+
+
+PantographEnv.__doc__ = (PantographEnv.__doc__ or "").format(
+    observation=_indented(_observation_table()), arguments=_indented(table(EnvironmentSettings))
+)

@@ -14,9 +14,12 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..control import Task
+from ..control.arguments import takes
 from ..control.observation import BOUND
-from ..control.reward import TERMS
-from .single import check_names, checked
+from ..control.settings import run_settings
+from ..control.state import TERMS
+from .settings import VectorSettings
+from .single import checked
 
 Lanes = NDArray[np.bool_]
 
@@ -35,35 +38,24 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        render_mode: None = None,
-        **settings: Any,
-    ) -> None:
-        """See the class. Raises InputError for an argument that is unknown or not valid."""
-        check_names(settings, "argument")
-        if render_mode is not None:
-            raise InputError("The vector environment does not render; leave render_mode at None.")
-        try:
-            self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError as error:
-            names = ", ".join(mode.value for mode in AutoresetMode)
-            raise InputError(f"autoreset_mode must be one of {names}, not {autoreset_mode!r}.") from error
+    @takes(VectorSettings)
+    def __init__(self, given: dict[str, Any]) -> None:
+        """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
+        settings = run_settings(given, VectorSettings)
+        self.autoreset_mode = settings.autoreset_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.num_envs = num_envs
+        self.num_envs = settings.num_envs
         self.render_mode = None
-        self.task = Task(**settings, lanes=num_envs, keep_samples=False)
+        self.task = Task(settings, lanes=self.num_envs, keep_samples=False)
         episode = self.task.episode
         self.single_observation_space = gymnasium.spaces.Box(
             -BOUND, BOUND, episode.observation[0].shape, np.float32
         )
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, episode.action[0].shape, np.float32)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._random: list[np.random.Generator] = []
-        self._ended: Lanes = np.zeros(num_envs, dtype=np.bool_)
+        self._ended: Lanes = np.zeros(self.num_envs, dtype=np.bool_)
         self._any_ended = False
 
     def reset(
@@ -116,8 +108,8 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         self._ended = terminated | truncated
         self._any_ended = bool(self._ended.any())
         infos: dict[str, Any] = {
-            "contact_force": task.plant.force.copy(),
-            "position": task.plant.step * task.plant.stride,
+            "contact_force": task.plant.contact_force.copy(),
+            "position": task.plant.steps_done * task.plant.stride,
             **dict(zip(TERMS, task.terms.copy(), strict=True)),
         }
         if self._any_ended:

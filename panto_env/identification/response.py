@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..backend.compile import kernel
+from ..backend import kernel
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .model import Parameters, matrices

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..backend.compile import part
+from ..backend import inlined
 
 
-@part
+@inlined
 def contact_force(stiffness_0, gap_0, stiffness_1, gap_free, damping, compliance, lowest):
     """Mean contact force over one step (N), implicit and without sub-iteration.
 

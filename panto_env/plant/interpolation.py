@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..backend.compile import part
+from ..backend import inlined, python_function
 
 
-@part
+@inlined
 def cubic_weights(fraction):
     """Lagrange weights of the nodes at -1, 0, 1, 2 for a point at ``fraction`` in [0, 1)."""
     s = fraction
@@ -25,5 +25,5 @@ def stencil(positions: ArrayLike, spacing: float) -> tuple[NDArray[np.int64], ND
     ratio = np.asarray(positions, dtype=float) / spacing
     # A point on a node but for rounding is on the node.
     left = np.floor(ratio + 1e-9).astype(np.int64)
-    weights = np.array(cubic_weights.py_func(ratio - left)).T  # type: ignore[attr-defined]
+    weights = np.array(python_function(cubic_weights)(ratio - left)).T
     return left - 1, weights

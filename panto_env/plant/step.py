@@ -1,92 +1,21 @@
-"""The step that joins pantograph, contact, catenary and actuators: one kernel for every line.
+"""The step that joins pantographs, contacts, catenary and actuators: one kernel for every line.
 
-A catenary takes part by three functions, which it provides for its own type of line as overloads:
-``move_wire``, ``load_wire`` and ``record_wire``. Numba picks them when the kernel is compiled for
-that type, so they are inlined and the compiled kernel can be kept on disk (a function passed as an
-argument could not). ``stack.WIDTH`` says how many lanes go side by side through each part of a step.
+Lanes go through it in blocks of lanes that go abreast (``LANES_ABREAST``): a kernel copies some columns of
+the table to a block on its stack, steps the block, and copies it back.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-from ..backend.block import stack
-from ..backend.compile import kernel, part
-from ..backend.memory import aligned_zeros
-from ..backend.packed import open_held
-from ..base.arrays import Array
-from .actuators.lagged import FRAME, HEAD, actuate
+from ..backend import inlined, kernel, new_blocks, open_packed
+from .actuators import drive
+from .catenary.protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
 from .contact import contact_force
-from .pantograph.build import MAX_STATE, move_free, press
+from .pantograph.step import add_contact_force, move_freely
+from .state import BLOCK_ROWS, CONTACTS, PLACE, ROW, SAMPLE_ROWS
 from .trigonometry import cosine_of_turns
 
-# Rows of a lane's column in ``Run.lanes``. The sample of the last step comes first; each of its values is
-# the mean over the step, so it belongs to the middle of the step.
-CONTACT_FORCE, HEAD_HEIGHT, FRAME_HEIGHT, WIRE_HEIGHT = 0, 1, 2, 3  # N, m, m, m
-HEAD_VELOCITY, FRAME_VELOCITY, FRAME_FORCE, HEAD_FORCE = 4, 5, 6, 7  # m/s, m/s, N, N
-CHANNELS = 8
-STEP = 8  # steps since the start
-STRIDE = 9  # distance covered in one step (m)
-LIFT = 10  # static and aerodynamic uplift on the lowest mass (N)
-FORCE = 11  # mean contact force over the last step (N)
-GAP = 12  # head height minus wire height now (m)
-STIFFNESS = 13  # of contact spring and massless line in series now (N/m)
-DRIVE = 14  # force of the actuators on frame and head (N), two rows
-STATE = 16  # displacements (m) and velocities (m/s) of the pantograph, head first
-# Rows that only a block has.
-FREE = STATE + MAX_STATE  # the state at the end of the step, were there no contact force
-COMMAND = FREE + MAX_STATE  # of the actuators on frame and head (N), two rows
-DUE = COMMAND + 2  # the command that arrives now (N)
-ROUGH = DUE + 1  # height of the irregularity at the end of the step (m)
-BLOCK_ROWS = ROUGH + 1
 
-
-class Run(NamedTuple):
-    """Where each lane is on its line, its pantograph's motion, and its contact."""
-
-    lanes: Array  # (STATE + 2n, lanes and spare columns): the rows above
-    waves: Array  # (waves, 3, lanes): irregularity as amplitude (m), turns a metre (1/m), phase in turns
-    lowest_force: float  # 0, or -inf for a contact that may pull (N)
-
-
-def lane_table(rows: int, lanes: int) -> Array:
-    """Zeros of at least ``lanes`` columns, an odd number of cache lines a row.
-
-    Rows a power of two apart would fall on the same few places of a cache and drive each other out.
-    """
-    lines = -(-lanes // 8)
-    return aligned_zeros((rows, 8 * (lines + 1 - lines % 2)))
-
-
-class Samples(NamedTuple):
-    """What a kernel call records; arrays of no columns or one row record nothing."""
-
-    channels: Array  # (lanes, rows, CHANNELS); row 0 is the start
-    uplift: Array  # (lanes, rows, supports): of the contact wire at the end of the step (m)
-    tension: Array  # (lanes, rows, droppers): mean over the step (N)
-
-
-def move_wire(line: Any, wire: Any, lane: int, x0: float, x1: float, force: float) -> Any:
-    """Move one lane's wire over a step without the new contact force.
-
-    x0, x1: the contact point at the step's start and end (m); force: over the last step (N).
-    Returns at x1: the wire's height (m), its yield to 1 N over the step (m/N), and the compliance
-    of a massless spring in series (m/N, 0 if none).
-    """
-    raise NotImplementedError("a catenary overloads this for its type of line")
-
-
-def load_wire(line: Any, wire: Any, lane: int, x0: float, x1: float, force: float) -> Any:
-    """Add the contact force over the step (N) and end the step of one lane."""
-    raise NotImplementedError("a catenary overloads this for its type of line")
-
-
-def record_wire(line: Any, wire: Any, lane: int, uplift: Array, tension: Array) -> Any:
-    """Write uplift at the supports (m) and dropper tensions (N) of one lane, as far as asked for."""
-    raise NotImplementedError("a catenary overloads this for its type of line")
-
-
-@part
+@inlined
 def load(table, block, first, begin, count):
     """Copy rows from ``first`` on of ``count`` lanes from ``begin`` on to a block."""
     for r in range(first, table.shape[0]):
@@ -95,7 +24,7 @@ def load(table, block, first, begin, count):
             block[r, i] = lanes[i]
 
 
-@part
+@inlined
 def store(block, table, begin, count):
     """Copy a block's rows back."""
     for r in range(table.shape[0]):
@@ -104,108 +33,147 @@ def store(block, table, begin, count):
             lanes[i] = block[r, i]
 
 
-@part
-def roughen(waves, block, begin, count):
+@inlined
+def read_irregularity(waves, block, begin, count):
     """Height of the contact wire's irregularity at the end of the step (m): a sum of cosines."""
     for i in range(count):
-        block[ROUGH, i] = 0.0
+        block[ROW.IRREGULARITY, i] = 0.0
     for k in range(waves.shape[0]):
         wave = waves[k, :, begin : begin + count]
         for i in range(count):
-            turns = wave[1, i] * (block[STRIDE, i] * (block[STEP, i] + 1.0)) + wave[2, i]
-            block[ROUGH, i] += wave[0, i] * cosine_of_turns(turns)
+            turns = wave[1, i] * (block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)) + wave[2, i]
+            block[ROW.IRREGULARITY, i] += wave[0, i] * cosine_of_turns(turns)
 
 
-@part
-def step_block(line, wire, body, drive, run, block, begin, count):
-    """One step of a block of lanes of one variety, under the commands in it; its sample."""
-    variety, size = body.variety[begin], body.transition.shape[1]
-    frame, frame_velocity, head_velocity = STATE + size // 2 - 1, STATE + size - 1, STATE + size // 2
-    actuate(drive, block[DRIVE:], block[COMMAND:], block[DUE], begin, count)
-    move_free(body, variety, block[STATE:], block[FREE:], block[LIFT], block[DRIVE:], count)
-    roughen(run.waves, block, begin, count)
-    contact_input, strip = body.contact_input[variety, 0], body.strip[variety]
+@inlined
+def approach(pantographs, actuators, run, contact, block, begin, count):
+    """Begin the step of one contact's pantographs: all but the contact force."""
+    force = block[ROW.ACTUATOR_FORCE :]
+    drive(actuators, contact, force, block[ROW.COMMAND :], block[ROW.ARRIVING_COMMAND], begin, count)
+    state, free_state = block[ROW.STATE :], block[ROW.FREE_STATE :]
+    variant = pantographs.variant[begin]
+    move_freely(pantographs, variant, state, free_state, block[ROW.NOMINAL_FORCE], force, count)
+    read_irregularity(run.waves, block, begin, count)
+
+
+@inlined
+def meet(line, wire, pantographs, run, contact, block, begin, count):
+    """The contact force over the step, from head and wire as they would move without it."""
+    variant = pantographs.variant[begin]
+    contact_input = pantographs.contact_input[variant, 0]
+    strip, damping = pantographs.strip_compliance[variant], pantographs.strip_damping[variant]
     for i in range(count):
-        x0 = block[STRIDE, i] * block[STEP, i]
-        x1 = block[STRIDE, i] * (block[STEP, i] + 1.0)
-        height, wire_yield, spring = move_wire(line, wire, begin + i, x0, x1, block[FORCE, i])
-        height += block[ROUGH, i]
-        stiffness = 1.0 / (strip[0] + spring)
-        gap = block[GAP, i]
+        x0 = block[ROW.STRIDE, i] * block[ROW.STEP, i]
+        x1 = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
+        height, wire_yield, spring = look_at_contact(line, wire, begin + i, contact, x0, x1)
+        height += block[ROW.IRREGULARITY, i]
+        stiffness = 1.0 / (strip + spring)
+        gap = block[ROW.GAP, i]
         force = contact_force(
-            block[STIFFNESS, i],
+            block[ROW.STIFFNESS, i],
             gap,
             stiffness,
-            block[FREE, i] - height,
-            strip[1],
+            block[ROW.FREE_STATE, i] - height,
+            damping,
             wire_yield - contact_input,
             run.lowest_force,
         )
-        head = block[FREE, i] + contact_input * force
+        head = block[ROW.FREE_STATE, i] + contact_input * force
         new_gap = head - height - wire_yield * force
-        mean_head = 0.5 * (block[STATE, i] + head)
-        block[GAP, i] = new_gap
-        block[STIFFNESS, i] = stiffness
-        block[FORCE, i] = force
-        block[CONTACT_FORCE, i] = force
-        block[HEAD_HEIGHT, i] = mean_head
-        block[WIRE_HEIGHT, i] = mean_head - 0.5 * (gap + new_gap) + spring * force
-        load_wire(line, wire, begin + i, x0, x1, force)
-    for i in range(count):
-        block[FRAME_HEIGHT, i] = block[frame, i]
-        block[HEAD_VELOCITY, i] = block[head_velocity, i]
-        block[FRAME_VELOCITY, i] = block[frame_velocity, i]
-    press(body, variety, block[STATE:], block[FREE:], block[FORCE], count)
-    for i in range(count):
-        block[FRAME_HEIGHT, i] = 0.5 * (block[FRAME_HEIGHT, i] + block[frame, i])
-        block[HEAD_VELOCITY, i] = 0.5 * (block[HEAD_VELOCITY, i] + block[head_velocity, i])
-        block[FRAME_VELOCITY, i] = 0.5 * (block[FRAME_VELOCITY, i] + block[frame_velocity, i])
-        block[FRAME_FORCE, i] = block[DRIVE + FRAME, i]
-        block[HEAD_FORCE, i] = block[DRIVE + HEAD, i]
-        block[STEP, i] += 1.0
+        mean_head = 0.5 * (block[ROW.STATE, i] + head)
+        block[ROW.GAP, i] = new_gap
+        block[ROW.STIFFNESS, i] = stiffness
+        block[ROW.FORCE, i] = force
+        block[ROW.CONTACT_FORCE, i] = force
+        block[ROW.HEAD_HEIGHT, i] = mean_head
+        block[ROW.WIRE_HEIGHT, i] = mean_head - 0.5 * (gap + new_gap) + spring * force
+        apply_force(line, wire, begin + i, contact, x0, x1, force)
 
 
-@part
-def record_block(line, wire, samples, block, begin, count):
-    """Write the sample of a step, the run's n-th, to row n of each lane, or to the last there is."""
-    channels, uplift, tension = samples.channels, samples.uplift, samples.tension
-    if channels.shape[1] > 1:
-        for i in range(count):
-            row = channels[begin + i, int(block[STEP, i])]
-            for c in range(CHANNELS):
-                row[c] = block[c, i]
+@inlined
+def finish(pantographs, block, begin, count):
+    """End the step of one contact's pantographs, and complete its sample."""
+    size = pantographs.transition.shape[1]
+    frame, head_velocity = ROW.STATE + size // 2 - 1, ROW.STATE + size // 2
+    frame_velocity = ROW.STATE + size - 1
+    for i in range(count):
+        block[ROW.FRAME_HEIGHT, i] = block[frame, i]
+        block[ROW.HEAD_VELOCITY, i] = block[head_velocity, i]
+        block[ROW.FRAME_VELOCITY, i] = block[frame_velocity, i]
+    state, free_state = block[ROW.STATE :], block[ROW.FREE_STATE :]
+    add_contact_force(pantographs, pantographs.variant[begin], state, free_state, block[ROW.FORCE], count)
+    for i in range(count):
+        block[ROW.FRAME_HEIGHT, i] = 0.5 * (block[ROW.FRAME_HEIGHT, i] + block[frame, i])
+        block[ROW.HEAD_VELOCITY, i] = 0.5 * (block[ROW.HEAD_VELOCITY, i] + block[head_velocity, i])
+        block[ROW.FRAME_VELOCITY, i] = 0.5 * (block[ROW.FRAME_VELOCITY, i] + block[frame_velocity, i])
+        block[ROW.FRAME_FORCE, i] = block[ROW.ACTUATOR_FORCE + PLACE.FRAME, i]
+        block[ROW.HEAD_FORCE, i] = block[ROW.ACTUATOR_FORCE + PLACE.HEAD, i]
+        block[ROW.STEP, i] += 1.0
+
+
+@inlined
+def step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count):
+    """One step of the lanes in the blocks, one per contact, under the commands in them; its samples.
+
+    All the lanes have pantographs of one variant.
+    """
+    for c in range(blocks.shape[0]):
+        approach(pantographs, actuators, run, c, blocks[c], begin, count)
+    for i in range(count):
+        advance_wire(line, wire, begin + i)
+    for c in range(blocks.shape[0]):
+        meet(line, wire, pantographs, run, c, blocks[c], begin, count)
+    for i in range(count):
+        end_step(line, wire, begin + i)
+    for c in range(blocks.shape[0]):
+        finish(pantographs, blocks[c], begin, count)
+
+
+@inlined
+def record_blocks(line, wire, samples, blocks, begin, count):
+    """Write the samples of a step, the run's n-th, to row n of each lane, or to the last there is."""
+    rows, uplift, tension = samples.rows, samples.uplift, samples.tension
+    if rows.shape[1] > 1:
+        for c in range(blocks.shape[0]):
+            for i in range(count):
+                row = rows[begin + i, int(blocks[c, ROW.STEP, i]), c]
+                for k in range(SAMPLE_ROWS):
+                    row[k] = blocks[c, k, i]
     if uplift.shape[2] > 0 or tension.shape[2] > 0:
         for i in range(count):
-            n = min(int(block[STEP, i]), uplift.shape[1] - 1)
+            n = min(int(blocks[0, ROW.STEP, i]), uplift.shape[1] - 1)
             record_wire(line, wire, begin + i, uplift[begin + i, n], tension[begin + i, n])
 
 
-@part
-def alike(body, block, begin, last):
-    """How many lanes from ``begin`` to before ``last`` can share a block: those of one variety."""
-    count, limit = 1, min(block.shape[1], last - begin)
-    while count < limit and body.variety[begin + count] == body.variety[begin]:
+@inlined
+def lanes_of_one_variant(pantographs, begin, limit):
+    """How many lanes from ``begin`` on, up to a limit, have pantographs of the same variant."""
+    count = 1
+    while count < limit and pantographs.variant[begin + count] == pantographs.variant[begin]:
         count += 1
     return count
 
 
 @kernel
-def advance(held, samples, command, steps, first, last):
-    """Advance lanes from ``first`` to before ``last`` by ``steps`` under commands (lanes, 2) of force (N).
+def advance(packed, samples, command, steps, first, last):
+    """Advance lanes from ``first`` to before ``last`` by ``steps``.
 
-    held: line, wire, body, drive and run.
+    packed: line, wire, pantographs, actuators and run. command: of the actuators (N), (lanes, contacts,
+    places).
     """
-    line, wire, body, drive, run = open_held(held)
-    block = stack(line, BLOCK_ROWS)
+    line, wire, pantographs, actuators, run = open_packed(packed)
+    blocks = new_blocks(line, CONTACTS, BLOCK_ROWS)
     begin = first
     while begin < last:
-        count = alike(body, block, begin, last)
-        load(run.lanes, block, STEP, begin, count)
-        for c in range(2):
-            for i in range(count):
-                block[COMMAND + c, i] = command[begin + i, c]
+        count = lanes_of_one_variant(pantographs, begin, min(blocks.shape[2], last - begin))
+        for c in range(blocks.shape[0]):
+            load(run.table[c], blocks[c], ROW.STEP, begin, count)
+            for place in range(command.shape[2]):
+                for i in range(count):
+                    blocks[c, ROW.COMMAND + place, i] = command[begin + i, c, place]
         for _ in range(steps):
-            step_block(line, wire, body, drive, run, block, begin, count)
-            record_block(line, wire, samples, block, begin, count)
-        store(block, run.lanes, begin, count)
+            step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count)
+            record_blocks(line, wire, samples, blocks, begin, count)
+        for c in range(blocks.shape[0]):
+            store(blocks[c], run.table[c], begin, count)
         begin += count

@@ -1,27 +1,25 @@
-"""Cosine and sine of whole turns as plain arithmetic: a call to the library's would keep loops over lanes
-from becoming vector instructions.
+"""Cosine and sine of whole turns as plain arithmetic: a call of the library's functions would keep loops
+over lanes from becoming vector instructions.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ..backend.compile import part
+from ..backend import floor, inlined
 
 # Taylor's series about 0 over a quarter turn either way: the first term left out is 1e-17.
 _TURN = 2 * math.pi
 SINE = tuple((-1) ** k * _TURN ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(11))
 
 
-@part
+@inlined
 def sine_of_turns(turns):
     """sin(2 pi turns), within 1e-15 for |turns| below a million."""
     # The nearest half turn is taken off; odd ones change the sign.
-    halves = np.floor(2.0 * turns + 0.5)
+    halves = floor(2.0 * turns + 0.5)
     rest = turns - 0.5 * halves
-    odd = halves - 2.0 * np.floor(0.5 * halves)
+    odd = halves - 2.0 * floor(0.5 * halves)
     square = rest * rest
     total = SINE[10]
     for k in range(9, -1, -1):
@@ -29,7 +27,7 @@ def sine_of_turns(turns):
     return (1.0 - 2.0 * odd) * rest * total
 
 
-@part
+@inlined
 def cosine_of_turns(turns):
     """cos(2 pi turns), likewise."""
     return sine_of_turns(turns + 0.25)

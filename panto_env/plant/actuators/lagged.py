@@ -1,4 +1,4 @@
-"""Actuators on the frame and the head: pure delay, first-order lag, limits of rate and force."""
+"""An actuator with a pure delay, a first-order lag, and limits of rate and force."""
 
 from __future__ import annotations
 
@@ -7,78 +7,62 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend.compile import part
+from ...backend import implements
 from ...base.arrays import Array
-from ...base.settings import NonNegative, Positive, Settings
+from ...base.settings import NonNegative, Positive
+from ..state import CONTACTS, Place
+from .base import ActuatorSettings, drive
 
-FRAME, HEAD = 0, 1  # the two places a force can act, rows of the arrays below
 
+class LaggedActuator(ActuatorSettings):
+    """Force that follows its command late."""
 
-class Actuator(Settings):
-    """Actuators as a user asks for them; frame and head have the same data."""
-
-    place: Literal["frame", "head", "both"] = Field("frame", description="where the force acts")
-    force_limit: Positive = Field(100.0, description="largest force either way (N)")
+    kind: Literal["lagged"] = "lagged"
     delay: NonNegative = Field(0.0, description="pure delay, rounded to whole time steps (s)")
     lag: NonNegative = Field(0.0, description="time constant of the first-order lag (s)")
     rate_limit: Positive | None = Field(None, description="largest change of force (N/s)")
 
-    @property
-    def channels(self) -> tuple[int, ...]:
-        """Columns that an action drives."""
-        return {"frame": (FRAME,), "head": (HEAD,), "both": (FRAME, HEAD)}[self.place]
+    def arrays(self, time_step: float, lanes: int) -> LaggedArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
+        steps = round(self.delay / time_step)
+        share = 1.0 if self.lag == 0 else 1.0 - np.exp(-time_step / self.lag)
+        rate = np.inf if self.rate_limit is None else self.rate_limit * time_step
+        return LaggedArrays(
+            pending=np.zeros((CONTACTS, steps, len(Place), lanes)),
+            share=np.full(len(Place), share),
+            rate=np.full(len(Place), rate),
+            limit=np.full(len(Place), self.force_limit),
+        )
 
 
-ACTUATORS = {
-    "ideal": Actuator(),
-    # Published active pantographs: delay 4-5 ms, lag 15-40 ms, about 2500 N/s, +-80 to +-100 N.
-    "realistic": Actuator(delay=0.005, lag=0.015, rate_limit=2500.0),
-}
+class LaggedArrays(NamedTuple):
+    """Actuators of all lanes; all have a row per place."""
+
+    pending: Array  # (contacts, delay, places, lanes): commands on their way, the next to arrive first (N)
+    share: Array  # (places,): of the way to the command that is gone in one step
+    rate: Array  # (places,): largest change of force in one step (N)
+    limit: Array  # (places,): largest force (N)
+
+    def reset(self, lane: int) -> None:
+        """Let no command be on its way in one lane."""
+        self.pending[..., lane] = 0.0
 
 
-class Drive(NamedTuple):
-    """Actuators of all lanes; all have a row for frame and head."""
-
-    pending: Array  # (delay, 2, lanes): commands that have not arrived, the next to arrive first (N)
-    follow: Array  # (2,): share of the way to the command gone in one step
-    rate: Array  # (2,): largest change of force in one step (N)
-    limit: Array  # (2,): largest force (N)
-
-
-def drive(actuator: Actuator, time_step: float, lanes: int) -> Drive:
-    """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
-    steps = round(actuator.delay / time_step)
-    follow = 1.0 if actuator.lag == 0 else 1.0 - np.exp(-time_step / actuator.lag)
-    rate = np.inf if actuator.rate_limit is None else actuator.rate_limit * time_step
-    return Drive(
-        pending=np.zeros((steps, 2, lanes)),
-        follow=np.full(2, follow),
-        rate=np.full(2, rate),
-        limit=np.full(2, actuator.force_limit),
-    )
-
-
-def release(drive: Drive, lane: int) -> None:
-    """Let nothing be pending in one lane."""
-    drive.pending[:, :, lane] = 0.0
-
-
-@part
-def actuate(drive, force, command, due, begin, count):
-    """Move the forces, (2, count), of lanes from ``begin`` on a step towards their commands (N)."""
-    depth = drive.pending.shape[0]
-    for c in range(2):
-        follow, rate, limit = drive.follow[c], drive.rate[c], drive.limit[c]
+@implements(drive, LaggedArrays)
+def _drive(actuators, contact, force, command, arriving, begin, count):
+    steps = actuators.pending.shape[1]
+    for p in range(actuators.share.size):
+        share, rate, limit = actuators.share[p], actuators.rate[p], actuators.limit[p]
         for i in range(count):
-            due[i] = command[c, i]
-        if depth > 0:
-            pending = drive.pending[:, c, begin : begin + count]
+            arriving[i] = command[p, i]
+        if steps > 0:
+            pending = actuators.pending[contact, :, p, begin : begin + count]
             for i in range(count):
-                due[i] = pending[0, i]
-                for k in range(depth - 1):
+                arriving[i] = pending[0, i]
+                for k in range(steps - 1):
                     pending[k, i] = pending[k + 1, i]
-                pending[depth - 1, i] = command[c, i]
+                pending[steps - 1, i] = command[p, i]
         for i in range(count):
-            target = min(max(due[i], -limit), limit)
-            change = follow * (target - force[c, i])
-            force[c, i] += min(max(change, -rate), rate)
+            target = min(max(arriving[i], -limit), limit)
+            change = share * (target - force[p, i])
+            force[p, i] += min(max(change, -rate), rate)

@@ -1,18 +1,22 @@
-"""The catenaries: one model a file.
+"""The catenaries: one folder per kind, with what it is made of, how it is built, and its step.
 
-Each module provides the functions that ``Plant`` calls (``wave_speed``, ``line_length``, ``line_end``,
-``build``, ``at_rest``, ``start_point``, ``settle``, ``supports``, ``droppers``) and overloads those of
-``coupling`` for its own type of line. One whose line can have defects also has ``DefectiveLine``.
+A new kind is a module with a schema, a ``CatenaryModel`` and its sources of the operations of ``protocol``,
+and a line in ``CATENARIES``.
 """
 
-from types import ModuleType
+from __future__ import annotations
 
-from .flexible import build as flexible
-from .periodic_stiffness import build as periodic_stiffness
-from .three_span import build as three_span
+from .flexible import FlexibleCatenary, FlexibleCatenaryData
+from .periodic_stiffness import PeriodicStiffness, PeriodicStiffnessData
+from .protocol import CatenaryKind, CatenaryModel
+from .schema import CatenaryData
+from .three_span import ThreeSpan, ThreeSpanData
 
-MODELS: dict[str, ModuleType] = {
-    "flexible": flexible,
-    "periodic_stiffness": periodic_stiffness,
-    "three_span": three_span,
+__all__ = ["CATENARIES", "CatenaryData", "CatenaryKind", "CatenaryModel"]
+
+CATENARIES: dict[str, CatenaryKind] = {
+    "flexible": CatenaryKind(FlexibleCatenaryData, FlexibleCatenary),
+    "three_span": CatenaryKind(ThreeSpanData, ThreeSpan),
+    "periodic_stiffness": CatenaryKind(PeriodicStiffnessData, PeriodicStiffness),
 }
+"""Kinds by the word that a line's TOML file has under ``kind``."""

@@ -10,6 +10,7 @@ from ...base.settings import NonNegative, Positive, Settings
 class CatenaryData(Settings):
     """What every line has."""
 
+    kind: str = Field(description="which of CATENARIES it is")
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
     span_length: Positive = Field(description="distance between supports (m)")

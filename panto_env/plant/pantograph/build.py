@@ -1,4 +1,4 @@
-"""Pantograph: a chain of lumped masses, discretised exactly with the matrix exponential."""
+"""A pantograph's equations of motion, discretised exactly with the matrix exponential."""
 
 from __future__ import annotations
 
@@ -7,31 +7,51 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...backend.compile import part
 from ...base.arrays import Array, Index
-from ..actuators.lagged import FRAME, HEAD
 from .schema import PantographData
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
 
 
-MAX_STATE = 16
-"""Entries of the state of a pantograph at most: the schema allows eight masses."""
-
-
-class Body(NamedTuple):
-    """What the pantographs of all lanes are made of: all the same, or each a variety of its own.
+class Pantographs(NamedTuple):
+    """What the pantographs of all lanes are made of: all alike, or each a variant of its own.
 
     n masses: the state is n displacements, then n velocities.
     """
 
-    variety: Index  # (lanes,): which of the varieties a lane has
-    transition: Array  # (varieties, 2n, 2n): exp(A dt)
-    contact_input: Array  # (varieties, 2n): change of the state by 1 N of contact force over a step
-    frame_input: Array  # (varieties, 2n): by 1 N up on the frame (the lowest mass)
-    head_input: Array  # (varieties, 2n): by 1 N up on the head and down on the mass below it
-    strip: Array  # (varieties, 2): compliance of the contact spring (m/N); damper over the step (N/m)
+    variant: Index  # (lanes,): which of the variants a lane has
+    transition: Array  # (variants, 2n, 2n): exp(A dt)
+    contact_input: Array  # (variants, 2n): change of the state by 1 N of contact force over a step
+    frame_input: Array  # (variants, 2n): by 1 N up on the frame (the lowest mass)
+    head_input: Array  # (variants, 2n): by 1 N up on the head and down on the mass below it
+    strip_compliance: Array  # (variants,): of the contact spring (m/N)
+    strip_damping: Array  # (variants,): of the damper beside it, divided by the time step (N/m)
+
+    def set_variant(self, variant: int, pantograph: PantographData, massless: bool, time_step: float) -> None:
+        """Make one variant this pantograph; massless: whether the wire is, so that a strip can be rigid."""
+        transition, inputs = discretise(pantograph, time_step)
+        self.transition[variant] = transition
+        self.contact_input[variant] = inputs[:, 0]
+        self.frame_input[variant] = inputs[:, 1]
+        self.head_input[variant] = inputs[:, 2]
+        rigid = 0.0 if massless else 1 / STRIP_STIFFNESS
+        stiffness = pantograph.contact_stiffness
+        self.strip_compliance[variant] = rigid if stiffness == "rigid" else 1 / stiffness
+        self.strip_damping[variant] = pantograph.contact_damping / time_step
+
+
+def pantographs(size: int, lanes: int, variants: int = 1) -> Pantographs:
+    """Arrays for the pantographs of ``lanes`` lanes, of ``size`` entries of state each, all zero."""
+    return Pantographs(
+        variant=np.zeros(lanes, dtype=np.int64),
+        transition=np.zeros((variants, size, size)),
+        contact_input=np.zeros((variants, size)),
+        frame_input=np.zeros((variants, size)),
+        head_input=np.zeros((variants, size)),
+        strip_compliance=np.zeros(variants),
+        strip_damping=np.zeros(variants),
+    )
 
 
 def matrices(pantograph: PantographData) -> tuple[Array, Array]:
@@ -65,38 +85,13 @@ def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Arr
 
     a, b = matrices(pantograph)
     n, m = b.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = a * time_step, b * time_step
-    whole = expm(block)
+    augmented = np.zeros((n + m, n + m))
+    augmented[:n, :n], augmented[:n, n:] = a * time_step, b * time_step
+    whole = expm(augmented)
     return whole[:n, :n].copy(), whole[:n, n:].copy()
 
 
-def body(size: int, lanes: int, varieties: int = 1) -> Body:
-    """Room for the pantographs of ``lanes`` lanes, of ``size`` entries of state; ``equip`` fills it."""
-    return Body(
-        variety=np.zeros(lanes, dtype=np.int64),
-        transition=np.zeros((varieties, size, size)),
-        contact_input=np.zeros((varieties, size)),
-        frame_input=np.zeros((varieties, size)),
-        head_input=np.zeros((varieties, size)),
-        strip=np.zeros((varieties, 2)),
-    )
-
-
-def equip(body: Body, variety: int, pantograph: PantographData, massless: bool, time_step: float) -> None:
-    """Make one variety this pantograph; massless: whether the wire is, so that a strip can be rigid."""
-    transition, inputs = discretise(pantograph, time_step)
-    body.transition[variety] = transition
-    body.contact_input[variety] = inputs[:, 0]
-    body.frame_input[variety] = inputs[:, 1]
-    body.head_input[variety] = inputs[:, 2]
-    rigid = 0.0 if massless else 1 / STRIP_STIFFNESS
-    stiffness = pantograph.contact_stiffness
-    compliance = rigid if stiffness == "rigid" else 1 / stiffness
-    body.strip[variety] = compliance, pantograph.contact_damping / time_step
-
-
-def vary(pantograph: PantographData, scatter: float, random: np.random.Generator) -> PantographData:
+def with_scatter(pantograph: PantographData, scatter: float, random: np.random.Generator) -> PantographData:
     """A pantograph whose masses, springs and dampers differ at random, by ``scatter`` rms (relative)."""
 
     def drawn(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -106,13 +101,15 @@ def vary(pantograph: PantographData, scatter: float, random: np.random.Generator
     return pantograph.model_copy(update=chain)
 
 
-def rest(pantograph: PantographData, lift: float, wire: float, compliance: float) -> Array:
-    """State, (2n,), in static equilibrium under ``lift`` (N) against a point of the wire.
+def rest_state(
+    pantograph: PantographData, nominal_force: float, wire_height: float, compliance: float
+) -> Array:
+    """State, (2n,), in static equilibrium under the nominal force (N) against a point of the wire.
 
-    The point stands at height ``wire`` (m) and yields ``compliance`` (m/N), contact spring included.
+    The point stands at ``wire_height`` (m) and yields ``compliance`` (m/N), contact spring included.
     """
     flexibility = _flexibility(pantograph.stiffnesses, compliance)
-    heights = flexibility[:, -1] * lift + flexibility[:, 0] * (wire / compliance)
+    heights = flexibility[:, -1] * nominal_force + flexibility[:, 0] * (wire_height / compliance)
     return np.concatenate([heights, np.zeros(len(heights))])
 
 
@@ -122,26 +119,3 @@ def _flexibility(stiffnesses: tuple[float, ...], compliance: float) -> Array:
     stiffness = _chain(stiffnesses)
     stiffness[0, 0] += 1 / compliance
     return np.linalg.inv(stiffness)
-
-
-@part
-def move_free(body, variety, state, free, lift, drive, count):
-    """States, (2n, count), after a step without contact force, into ``free``; drive: forces (N)."""
-    size = body.transition.shape[1]
-    for r in range(size):
-        frame_input, head_input = body.frame_input[variety, r], body.head_input[variety, r]
-        for i in range(count):
-            free[r, i] = frame_input * (lift[i] + drive[FRAME, i]) + head_input * drive[HEAD, i]
-        for j in range(0, size, 2):  # in pairs: there are as many velocities as displacements
-            a, b = body.transition[variety, r, j], body.transition[variety, r, j + 1]
-            for i in range(count):
-                free[r, i] += a * state[j, i] + b * state[j + 1, i]
-
-
-@part
-def press(body, variety, state, free, force, count):
-    """End the step: the free motion and what the contact force (N) adds to it."""
-    for r in range(body.transition.shape[1]):
-        contact_input = body.contact_input[variety, r]
-        for i in range(count):
-            state[r, i] = free[r, i] + contact_input * force[i]

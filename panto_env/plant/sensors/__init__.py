@@ -1,1 +1,44 @@
-"""Sensors of a train."""
+"""Sensors of a train: one kind per file, found by ``kind`` in its table.
+
+A new kind is a file with its settings, its arrays and its sources of the operations, and a line in
+``SENSORS``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...base.settings import parse_kind
+from .base import READING, Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
+from .delayed import DelayedSensors
+from .noise import Noise
+
+__all__ = [
+    "READING",
+    "SENSORS",
+    "SENSOR_PRESETS",
+    "Noise",
+    "Reading",
+    "SensorArrays",
+    "SensorSettings",
+    "sensor_settings",
+    "take_first_readings",
+    "take_readings",
+]
+
+SENSORS: dict[str, type[SensorSettings]] = {
+    "delayed": DelayedSensors,
+}
+"""Kinds by name; the first is meant where a table names none."""
+
+SENSOR_PRESETS: dict[str, SensorSettings] = {
+    "ideal": DelayedSensors(),
+    # Force and displacement as published; the velocity's is an own choice: an accelerometer of
+    # 0.01 m/s^2 integrated over some seconds.
+    "realistic": DelayedSensors(force_noise=2.0, displacement_noise=2e-5, velocity_noise=5e-3, delay=0.005),
+}
+
+
+def sensor_settings(value: Any) -> SensorSettings:
+    """Sensors from a preset's name, a table of their keys, or the settings. InputError if not valid."""
+    return parse_kind(SENSORS, value, "sensors", SENSOR_PRESETS)

@@ -1,29 +1,81 @@
-"""Sensors of a train: noise on each reading, and a delay."""
+"""Sensors with a delay, and with noise on each reading."""
 
 from __future__ import annotations
 
+from typing import Literal, NamedTuple
+
+import numpy as np
 from pydantic import Field
 
-from ...base.settings import NonNegative, Settings
+from ...backend import implements, lane_table
+from ...base.arrays import Array
+from ...base.settings import NonNegative
+from ..state import Row
+from .base import Reading, SensorSettings, take_first_readings, take_readings
+
+SENSED = (Row.HEAD_HEIGHT, Row.FRAME_HEIGHT, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.CONTACT_FORCE)
+"""Rows of a sample that are read, in the order of ``Reading``."""
+_SENSED = tuple(int(row) for row in SENSED)
 
 
-class Sensors(Settings):
+class DelayedSensors(SensorSettings):
     """What is added to the readings of contact force, displacement and velocity."""
 
+    kind: Literal["delayed"] = "delayed"
     force_noise: NonNegative = Field(0.0, description="rms noise of the contact force (N)")
     displacement_noise: NonNegative = Field(0.0, description="rms noise of displacements (m)")
     velocity_noise: NonNegative = Field(0.0, description="rms noise of velocities (m/s)")
     delay: NonNegative = Field(0.0, description="age of a reading, rounded to time steps (s)")
 
     @property
-    def noisy(self) -> bool:
-        """Whether any reading carries noise."""
-        return self.force_noise > 0 or self.displacement_noise > 0 or self.velocity_noise > 0
+    def noise_rms(self) -> tuple[float, ...] | None:
+        """Noise of each ``Reading``, rms, in its unit; None where no reading carries any."""
+        displacement, velocity = self.displacement_noise, self.velocity_noise
+        rms = (displacement, displacement, velocity, velocity, self.force_noise)
+        return rms if any(rms) else None
+
+    def arrays(self, time_step: float, control_steps: int, lanes: int) -> DelayedArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
+        whole, rest = divmod(round(self.delay / time_step), control_steps)
+        return DelayedArrays(
+            past=np.zeros((whole, len(Reading), lanes)),
+            read_at=control_steps - rest,
+            noise=lane_table(len(Reading), lanes) if self.noise_rms else np.zeros((len(Reading), 0)),
+        )
 
 
-SENSORS = {
-    "ideal": Sensors(),
-    # Force and displacement as published; the velocity's is an own choice: an accelerometer of
-    # 0.01 m/s^2 integrated over some seconds.
-    "realistic": Sensors(force_noise=2.0, displacement_noise=2e-5, velocity_noise=5e-3, delay=0.005),
-}
+class DelayedArrays(NamedTuple):
+    """Sensors of all lanes."""
+
+    past: Array  # (control steps, readings, lanes): readings on their way, the next to arrive first
+    read_at: int  # plant step of a control step whose sample is read, counted from 1
+    noise: Array  # (readings, lanes): of the next reading, in its units; or (readings, 0) for none
+
+    def reset(self, lane: int, sample: Array) -> None:
+        """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""
+        self.past[:, :, lane] = sample[list(SENSED)]
+
+
+@implements(take_readings, DelayedArrays)
+def _take_readings(sensors, step, block, readings, begin, count):
+    if step != sensors.read_at:
+        return
+    control_steps = sensors.past.shape[0]
+    for k in range(len(_SENSED)):
+        for i in range(count):
+            readings[k, i] = block[_SENSED[k], i]
+        if control_steps > 0:
+            past = sensors.past[:, k, begin : begin + count]
+            for i in range(count):
+                taken = readings[k, i]
+                readings[k, i] = past[0, i]
+                for j in range(control_steps - 1):
+                    past[j, i] = past[j + 1, i]
+                past[control_steps - 1, i] = taken
+
+
+@implements(take_first_readings, DelayedArrays)
+def _take_first_readings(sensors, block, readings, begin, count):
+    for k in range(len(_SENSED)):
+        for i in range(count):
+            readings[k, i] = block[_SENSED[k], i]

@@ -19,6 +19,7 @@ from ...base.errors import InputError
 from ...base.machine import cores
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
+from ...control.settings import run_settings
 from ...metrics.figures import Figures
 from ...metrics.trajectory import Trajectory
 from ...policies import find_policy
@@ -74,16 +75,18 @@ def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Traject
     """Whole records of cases that differ in their policy alone: lanes of one task."""
     case = cases[0]
     line = load_catenary(case.line)
-    task = Task(
-        catenary=line,
-        pantograph=pantograph,
-        speed_kmh=case.speed_kmh,
-        actuator=ACTUATORS[case.actuator],
-        control_interval=case.control_interval,
-        distance=RUN_SPANS * line.span_length,
-        lanes=len(cases),
-        **(FINE if case.fine else USUAL),
+    settings = run_settings(
+        {
+            "catenary": line,
+            "pantograph": pantograph,
+            "speed_kmh": case.speed_kmh,
+            "actuator": ACTUATORS[case.actuator],
+            "control_interval": case.control_interval,
+            "distance": RUN_SPANS * line.span_length,
+        }
+        | (FINE if case.fine else USUAL)
     )
+    task = Task(settings, lanes=len(cases))
     policies = [find_policy(each.policy) for each in cases]
     for lane, policy in enumerate(policies):
         task.reset(lane, np.random.default_rng(0))

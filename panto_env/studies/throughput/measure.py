@@ -17,6 +17,7 @@ import numpy as np
 from ...base.machine import CAN_CHOOSE_CORES, cores, on_cores
 from ...catalog import load_catenary
 from ...control import Task
+from ...control.settings import run_settings
 from ...envs import IDS
 from . import roofline
 
@@ -70,14 +71,14 @@ class EnvSpeed:
 
 def plant_speed(settings: dict[str, Any], repeats: int) -> tuple[PlantSpeed, Task]:
     """Times real time of whole passes at 300 km/h without a policy, on one core; and the task."""
-    task = Task(**settings, speed_kmh=SPEED_KMH)
+    task = Task(run_settings(settings | {"speed_kmh": SPEED_KMH}))
     travelled = 0.0
 
     def run() -> float:
         nonlocal travelled
         task.reset(0, np.random.default_rng(0))
         start = time.perf_counter()
-        task.coast()
+        task.run_passively()
         travelled = float(task.end(0) * task.plant.time_step)
         return time.perf_counter() - start
 
@@ -137,10 +138,10 @@ def measure(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]
         speed, task = plant_speed(dict(settings), repeats)
         plants.append({"id": name} | asdict(speed))
         if name == "Pantograph-v0":
-            line, single = task.plant.line, task.plant.line.stencil.itemsize == 4
+            line, single = task.plant.model.line, task.plant.model.line.stencil.itemsize == 4
             limits = roofline.measure(
                 2 * line.mobility.shape[1],
-                len(line.dropper_node),
+                len(line.link_node),
                 task.plant.time_step,
                 speed.times_real_time,
                 single,
@@ -187,8 +188,8 @@ def _scaling(repeats: int, report: Report) -> dict[str, list[dict[str, Any]]]:
         shown = ", ".join(f"{key} {value}" for key, value in settings.items())
         speed, task = timed(flexible | settings, f"the flexible plant, {shown or 'defaults'}")
         plant = task.plant
-        used = {"spacing": plant.line.spacing, "time_step": plant.time_step}
-        precision = "single" if plant.line.stencil.itemsize == 4 else "double"
+        used = {"spacing": plant.model.line.spacing, "time_step": plant.time_step}
+        precision = "single" if plant.model.line.stencil.itemsize == 4 else "double"
         discretisations.append(used | {"precision": precision} | speed)
     return {"spans": spans, "modes": modes, "discretisation": discretisations}
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...backend.compile import kernel
+from ...backend import kernel
 
 # Arithmetic of one step, counted in the source of flexible_parts: adds and multiplies.
 FLOPS_A_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1

@@ -19,8 +19,8 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
+from .line import CONTACT, MESSENGER, FlexibleLine
 from .schema import FlexibleCatenaryData
-from .state import CONTACT, MESSENGER, FlexibleLine
 from .static_shape import solve
 
 HELD = 1e18  # N/m, that holds a wire at the anchor
@@ -72,22 +72,22 @@ class DefectiveLine:
         self._band[0, [0, 2, -4, -2]] = HELD
         self.decay = _decay(data.contact_wire)
 
-    def room(self, line: FlexibleLine, rows: int) -> FlexibleLine:
-        """The line with tables for ``rows`` defective ones, which ``impose`` fills."""
-        droppers, real = len(self._static), line.dropper_static.dtype
+    def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
+        """The line with tables for ``rows`` defective ones, which ``write`` fills."""
+        droppers, real = len(self._static), line.link_static.dtype
         return line._replace(
-            dropper_static=np.zeros((rows, droppers), dtype=real),
-            dropper_gap=np.zeros((rows, droppers), dtype=real),
+            link_static=np.zeros((rows, droppers), dtype=real),
+            link_gap=np.zeros((rows, droppers), dtype=real),
             rise=np.zeros((rows, len(self._unknowns), 4)),
             rise_breaks=self.breaks,
             rise_decay=self.decay,
         )
 
-    def impose(self, line: FlexibleLine, row: int, scatter: Array | None = None) -> StaticState:
+    def write(self, line: FlexibleLine, row: int, scatter: Array | None = None) -> StaticState:
         """Write the state under this scatter of the droppers' lengths (m) into the line's tables."""
         state = self.solve(scatter)
-        line.dropper_static[row] = state.tension
-        line.dropper_gap[row] = state.gap
+        line.link_static[row] = state.tension
+        line.link_gap[row] = state.gap
         line.rise[row] = state.rise
         return state
 

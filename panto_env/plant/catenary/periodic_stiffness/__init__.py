@@ -1,1 +1,7 @@
-"""Paper 3's catenary: a massless spring."""
+"""Periodic stiffness (paper 3, Eqs 1-5): a massless spring k(x) = k_m (1 + eps cos(2 pi x / L))."""
+
+from . import step as step
+from .build import PeriodicStiffness
+from .schema import PeriodicStiffnessData
+
+__all__ = ["PeriodicStiffness", "PeriodicStiffnessData"]

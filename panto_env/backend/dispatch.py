@@ -1,0 +1,62 @@
+"""Operations of kernels that differ by the type of what they work on: one name, one source per type.
+
+Numba picks the source when it compiles a kernel for a type, so that it is inlined and the compiled kernel
+can be kept on disk (a function passed as an argument could not). Without compilation Python picks it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
+
+from numba.extending import overload
+
+from .compile import JIT, OPTIONS
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+INLINED: dict[str, Any] = OPTIONS | {"forceinline": True}
+"""Compiler options of an implementation: a call would cost as much as what most of them do."""
+
+
+def operation(declaration: F) -> F:
+    """An operation that each type of its first argument, a class of named tuples, implements for itself.
+
+    ``declaration`` has the arguments and the docstring; its body is never run. ``implements`` adds a type.
+    """
+    sources: dict[type, Callable[..., Any]] = {}
+
+    @wraps(declaration)
+    def chosen(*arguments: Any) -> Any:
+        return sources[type(arguments[0])](*arguments)
+
+    chosen.sources = sources  # type: ignore[attr-defined]
+    if JIT:
+
+        def choose(*types: Any) -> Any:
+            return sources.get(getattr(types[0], "instance_class", None))  # type: ignore[arg-type]
+
+        # Numba wants the signature of the source, which has no types.
+        names = inspect.signature(declaration).parameters.values()
+        untyped = [name.replace(annotation=inspect.Parameter.empty) for name in names]
+        choose.__signature__ = inspect.Signature(untyped)  # type: ignore[attr-defined]
+        overload(chosen, jit_options=INLINED)(choose)
+    return chosen  # type: ignore[return-value]
+
+
+def implements(of: Callable[..., Any], kind: type) -> Callable[[F], F]:
+    """Decorator of the source of operation ``of`` for named tuples of class ``kind``.
+
+    Raises TypeError where the arguments are not those of the operation.
+    """
+
+    def register(source: F) -> F:
+        wanted, given = (list(inspect.signature(each).parameters) for each in (of, source))
+        if wanted != given:
+            raise TypeError(f"{of.__name__} takes {', '.join(wanted)}, but its source {', '.join(given)}.")
+        of.sources[kind] = source  # type: ignore[attr-defined]
+        return source
+
+    return register

@@ -1,0 +1,20 @@
+"""Functions of a number that the processor and a GPU's compiler know under different names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from .dispatch import INLINED
+
+
+def floor(x: Any) -> Any:
+    """Largest whole number not above x, as a float: loops over lanes stay vector instructions."""
+    return np.floor(x)
+
+
+@overload(floor, jit_options=INLINED)  # type: ignore[untyped-decorator]
+def _floor(x):  # type: ignore[no-untyped-def] # the signature must be that of the source below
+    return lambda x: np.floor(x)

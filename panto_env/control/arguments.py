@@ -1,0 +1,65 @@
+"""Settings as keyword arguments of a class: names, defaults and types stand in the settings alone."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Mapping
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from .settings import RunSettings, fields
+
+P = ParamSpec("P")
+O = TypeVar("O")  # noqa: E741 - the class whose ``__init__`` it is
+
+
+def takes(
+    kind: Callable[P, RunSettings],
+) -> Callable[[Callable[[Any, dict[str, Any]], None]], Callable[Concatenate[Any, P], None]]:
+    """Give an ``__init__`` the keyword arguments of a class of settings, explicitly.
+
+    What is decorated gets what was given, by name. An unknown argument raises TypeError, as Python does.
+    """
+
+    def decorate(
+        initialise: Callable[[Any, dict[str, Any]], None],
+    ) -> Callable[Concatenate[Any, P], None]:
+        @wraps(initialise)
+        def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
+            if arguments:
+                raise TypeError(f"{type(self).__name__}() takes its arguments by name, as catenary='re250'")
+            check_arguments(given, kind, type(self).__name__)  # type: ignore[arg-type]
+            initialise(self, given)
+
+        own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+        with_keywords.__signature__ = inspect.Signature([own, *parameters(kind)])  # type: ignore[attr-defined,arg-type]
+        return with_keywords  # type: ignore[return-value]
+
+    return decorate
+
+
+def parameters(kind: type[RunSettings] = RunSettings) -> list[inspect.Parameter]:
+    """The settings as parameters of a signature, to be given by name."""
+    return [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=field.get_default())
+        for name, field in fields(kind).items()
+    ]
+
+
+def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function: str) -> None:
+    """Raise TypeError for a name that is no setting, as Python does for an unknown argument."""
+    for name in given:
+        if name not in kind.model_fields:
+            near = difflib.get_close_matches(name, kind.model_fields, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(fields(kind))}"
+            raise TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
+
+
+def table(kind: type[RunSettings] = RunSettings) -> str:
+    """The settings as a Markdown table for a docstring."""
+    rows = [
+        f"| `{name}` | `{field.get_default()!r}` | {field.description} |"
+        for name, field in fields(kind).items()
+    ]
+    return "\n".join(("| Argument | Default | Meaning |", "|---|---|---|", *rows))

@@ -1,0 +1,160 @@
+"""What a run can be told, stated once: name, default, unit and help of every setting.
+
+Python's arguments, the tables of trainings and benchmarks and the command line all take theirs from here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationError
+from pydantic.fields import FieldInfo
+
+from ..base.errors import InputError
+from ..base.settings import parse, sentence, suggest
+from ..catalog import load_catenary, load_pantograph
+from ..plant.actuators import ActuatorSettings, actuator_settings
+from ..plant.catenary import CatenaryData
+from ..plant.line_condition import LINE_CONDITIONS, LineCondition
+from ..plant.numerics import Numerics
+from ..plant.pantograph.schema import PantographData
+from ..plant.sensors import SensorSettings, sensor_settings
+from .observation import OBSERVATIONS
+from .reward import Reward
+
+R = TypeVar("R", bound="RunSettings")
+
+
+def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
+    several = value if isinstance(value, list | tuple) else [value]
+    if not several:
+        raise InputError("line_condition must name at least one condition.")
+    return tuple(parse(LineCondition, each, "line_condition", LINE_CONDITIONS) for each in several)
+
+
+def _weights(value: Any) -> Reward:
+    return parse(Reward, {} if value is None else value, "reward")
+
+
+def _observation(value: Any) -> str:
+    if value not in OBSERVATIONS:
+        raise InputError(f"observation must be one of {', '.join(OBSERVATIONS)}, not {value!r}.")
+    return str(value)
+
+
+def _spans(value: Any) -> int | None:
+    if value is not None and not (isinstance(value, int) and 3 <= value <= 1000):
+        raise InputError(f"spans must be a whole number from 3 to 1000, not {value!r}.")
+    return value
+
+
+def _distance(value: Any) -> float | None:
+    if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+        raise InputError(f"distance must be a positive number (m), not {value!r}.")
+    return value
+
+
+def _scatter(value: Any) -> float:
+    if not (isinstance(value, int | float) and 0 <= value <= 0.3):
+        raise InputError(f"pantograph_scatter must lie in 0 to 0.3, not {value!r}.")
+    return value
+
+
+def speed_range(speed_kmh: Any) -> tuple[float, float]:
+    """Lowest and highest speed (km/h) of a number or a range; InputError where it is neither."""
+    values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
+    try:
+        low, high = (float(value) for value in values)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"speed_kmh must be a number or a range of two (km/h), not {speed_kmh!r}."
+        ) from error
+    if low > high:
+        raise InputError(f"The range speed_kmh must not fall, as {speed_kmh!r} does.")
+    return low, high
+
+
+class RunSettings(Numerics):
+    """All that a run can be told. ``time_step``, ``spacing``, ``window``, ``precision``: see ``Numerics``."""
+
+    catenary: Annotated[CatenaryData, BeforeValidator(load_catenary)] = Field(
+        "en50318-2002", validate_default=True, description="line: a name of the catalogue or a TOML file"
+    )
+    pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
+        "en50318-2002",
+        validate_default=True,
+        description="pantograph: a name of the catalogue or a TOML file",
+    )
+    speed_kmh: Annotated[tuple[float, float], BeforeValidator(speed_range)] = Field(
+        300.0,
+        validate_default=True,
+        description="train speed (km/h): a number, or a range of two to draw from",
+    )
+    actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
+        "ideal", validate_default=True, description='actuator: "ideal", "realistic" or a table'
+    )
+    sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
+        "ideal", validate_default=True, description='sensors: "ideal", "realistic" or a table'
+    )
+    line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
+        "new",
+        validate_default=True,
+        description='condition of the line: "new", "fair", "worn" or a table; of a list one is drawn per run',
+    )
+    pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
+        0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
+    )
+    observation: Annotated[str, BeforeValidator(_observation)] = Field(
+        "measured", description='what a policy sees: "measured" or "full"'
+    )
+    reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
+        None, validate_default=True, description="weights of the reward's terms: a table"
+    )
+    distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
+        None, description="of a run (m); None: to the end of the line, which gets more spans if too short"
+    )
+    spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
+        None, description="spans of the line; None: as the catalogue has it"
+    )
+    # Published active pantographs are controlled at 50-100 Hz.
+    control_interval: float = Field(0.01, description="time between two actions (s)")
+    bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
+
+    @property
+    def numerics(self) -> Numerics:
+        """How the plant is computed."""
+        return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
+
+
+def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:
+    """Settings by name in the order in which they are shown: how a run is computed comes last."""
+    last = {name: field for name, field in kind.model_fields.items() if name in Numerics.model_fields}
+    return {name: field for name, field in kind.model_fields.items() if name not in last} | last
+
+
+def default(name: str) -> Any:
+    """Default of a setting, as a user would give it."""
+    return RunSettings.model_fields[name].default
+
+
+def description(name: str) -> str:
+    """Help of a setting, with its unit."""
+    return RunSettings.model_fields[name].description or ""
+
+
+def run_settings(given: Mapping[str, Any], kind: type[R] = RunSettings) -> R:  # type: ignore[assignment]
+    """Settings from what is given by name. Raises InputError where a value is not valid."""
+    try:
+        return kind.model_validate(dict(given))
+    except ValidationError as error:
+        raise InputError(f"{sentence(error)}.") from error
+
+
+def check_names(given: Mapping[str, Any], what: str) -> None:
+    """Raise InputError for a name that is no setting; what: such as "option"."""
+    for name in given:
+        if name not in RunSettings.model_fields:
+            raise InputError(f"Unknown {what} '{name}': {suggest(str(name), list(fields()))}.")

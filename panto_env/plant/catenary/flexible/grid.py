@@ -1,0 +1,74 @@
+"""Grid and time step of a flexible catenary, and the weights of its finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import InputError
+from ...numerics import Numerics
+from ..schema import Wire
+from .schema import FlexibleCatenaryData
+
+FINEST, FINE_ENOUGH = 1 / 3, 0.375
+"""Grid (m) unless told otherwise, where it is stable, and the coarsest for which the longer time step is
+taken: docs/validation.md shows what it costs."""
+LONG_STEP, SHORT_STEP = 2.5e-3, 2e-3
+"""Time steps (s) unless told otherwise."""
+
+
+def time_step(data: FlexibleCatenaryData, numerics: Numerics) -> float:
+    """Time step (s) asked for, or the longer usual one where a grid fine enough is stable with it."""
+    if numerics.time_step is not None:
+        return numerics.time_step
+    grid = numerics.spacing or FINE_ENOUGH
+    return LONG_STEP if stable(data, data.span_length / _nodes(data, grid), LONG_STEP) else SHORT_STEP
+
+
+def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
+    """Nodes per span of the grid asked for (m), or of the finest up to FINEST that is stable.
+
+    Raises InputError where the time step is too long for the grid to be stable.
+    """
+    if spacing is not None:
+        nodes = _nodes(data, spacing)
+        if not stable(data, data.span_length / nodes, step):
+            raise InputError(
+                f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m "
+                f"for line '{data.name}'; take a shorter step or a coarser grid."
+            )
+        return nodes
+    for nodes in range(_nodes(data, FINEST), 7, -1):
+        if stable(data, data.span_length / nodes, step):
+            return nodes
+    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
+
+
+def _nodes(data: FlexibleCatenaryData, spacing: float) -> int:
+    return int(np.ceil(data.span_length / spacing - 1e-9))
+
+
+def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
+    """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
+    angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
+    for wire in (data.contact_wire, data.messenger_wire):
+        near, far = stencil_weights(wire, dx, step)
+        squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+        if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
+            return False
+    return True
+
+
+def spring_levels(stiffness: float, damping: float, step: float) -> Array:
+    """Weights of a spring (N/m) and damper (N s/m) on three time levels, newest first (N/m)."""
+    mean = stiffness * np.array([0.25, 0.5, 0.25])
+    return np.asarray(mean + damping / (2 * step) * np.array([1.0, 0.0, -1.0]))
+
+
+def stencil_weights(wire: Wire, dx: float, step: float) -> Array:
+    """Weights of the neighbours and of theirs in the wire's force, as a displacement in a step."""
+    courant = np.sqrt(wire.tension / wire.mass) * step / dx
+    second = wire.tension / dx**2
+    fourth = -second * (1 - courant**2) / 12 - wire.bending_stiffness / dx**4
+    weights = np.array([second - 4 * fourth, fourth])
+    return np.asarray(step**2 / wire.mass * weights)

@@ -1,0 +1,86 @@
+"""A flexible catenary for a number of lanes, intact or with defects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....base.arrays import Array
+from ...line_condition import DrawnLine, LineCondition
+from ...numerics import Numerics
+from ..protocol import StartPoint
+from .build import at_rest, constants, dropper_positions
+from .defects import DefectiveLine
+from .grid import time_step
+from .schema import FlexibleCatenaryData
+from .static_shape import solve
+
+
+class FlexibleCatenary:
+    """Two tensioned beams with droppers between them; a run starts at the line's first anchor."""
+
+    massless = False
+
+    def __init__(
+        self,
+        data: FlexibleCatenaryData,
+        *,
+        lanes: int,
+        spans: int,
+        numerics: Numerics,
+        conditions: Sequence[LineCondition],
+    ) -> None:
+        """Build the line.
+
+        Raises InputError where grid and time step are not stable together, or the line has not what a
+        condition says is defective.
+        """
+        self.time_step = time_step(data, numerics)
+        self.line = constants(data, spans, numerics)
+        self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+        self.length = spans * data.span_length
+        self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
+        self.supports = data.span_length * np.arange(1, spans)
+        self.droppers = dropper_positions(data, spans)
+        self._tension = np.tile(solve(data).dropper_tension, (1, spans))
+        self._defective: dict[LineCondition, DefectiveLine] = {}
+        self._lines_differ = False
+        if any(condition.defective for condition in conditions):
+            self._make_defective(data, spans, conditions, lanes)
+        self.wire = at_rest(self.line, lanes)
+        # The anchor does not yield: the pantograph is at rest there exactly.
+        self.start_point = StartPoint(float(self.line.shape[0]), 0.0, 0.0)
+
+    def _make_defective(
+        self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
+    ) -> None:
+        """Give the line its defects, or tables for them where each lane draws its own."""
+        self._defective = {condition: DefectiveLine(data, spans, condition) for condition in conditions}
+        first = conditions[0]
+        self._lines_differ = len(conditions) > 1 or first.dropper_scatter > 0
+        rows = lanes if self._lines_differ else 1
+        self.line = self._defective[first].with_tables(self.line, rows)
+        self._tension = np.repeat(self._tension, rows, axis=0)
+        self._write_defects(0, DrawnLine(first))
+
+    def _write_defects(self, row: int, drawn: DrawnLine) -> None:
+        state = self._defective[drawn.condition].write(self.line, row, drawn.scatter)
+        self._tension[row] = state.tension
+
+    def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
+        """Put one lane's wires at rest, as ``drawn`` has them; a force (N) at the anchor moves no wire."""
+        line, wire = self.line, self.wire
+        if self._lines_differ:
+            self._write_defects(lane, drawn)
+        for array in (wire.displacement, wire.increment, wire.change, wire.position):
+            array[lane] = 0.0
+        gap = line.link_gap[min(lane, len(line.link_gap) - 1)]
+        wire.extension[lane] = 0.0 - gap[: len(line.link_node)]
+        wire.first_span[lane] = 0
+        wire.force[lane] = force
+
+    def rest_tension(self, lane: int) -> Array:
+        """Tension (N), (droppers,), of one lane's droppers at rest."""
+        tension: Array = self._tension[min(lane, len(self._tension) - 1)]
+        return tension

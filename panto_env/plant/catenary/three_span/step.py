@@ -1,0 +1,75 @@
+"""The step of a three-span catenary: modes propagate exactly, forces act through the mode shapes."""
+
+from __future__ import annotations
+
+from ....backend import implements, inlined
+from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from .build import MARGIN, ThreeSpanLine
+
+
+@inlined
+def read_shape(line, wire, lane, x, shape):
+    """Mode shapes at x (m along the line), seen from the central span, into ``shape``, (modes,)."""
+    local = x - wire.central_span[lane] * line.span + MARGIN
+    ratio = min(max(local / line.spacing, 0.0), line.shape.shape[0] - 1.001)
+    k = int(ratio)
+    for m in range(shape.size):
+        shape[m] = line.shape[k, m] + (ratio - k) * (line.shape[k + 1, m] - line.shape[k, m])
+
+
+@implements(advance_wire, ThreeSpanLine)
+def _advance(line, wire, lane):
+    q, v = wire.modal[lane, 0], wire.modal[lane, 1]
+    for m in range(q.size):
+        coordinate, rate = q[m], v[m]
+        q[m] = line.propagate[0, m] * coordinate + line.propagate[1, m] * rate
+        v[m] = line.propagate[2, m] * coordinate + line.propagate[3, m] * rate
+
+
+@implements(look_at_contact, ThreeSpanLine)
+def _look(line, wire, lane, contact, x0, x1):
+    q, middle, end = wire.modal[lane, 0], wire.mid_shape[lane, contact], wire.scratch[lane, 0]
+    # The force acts all along the step: it is as good as one at mid-step, to the second order.
+    read_shape(line, wire, lane, 0.5 * (x0 + x1), middle)
+    read_shape(line, wire, lane, x1, end)
+    height, compliance = 0.0, 0.0
+    for m in range(q.size):
+        height += end[m] * q[m]
+        compliance += end[m] * line.impulse[0, m] * middle[m]
+    return height, compliance, 0.0
+
+
+@implements(apply_force, ThreeSpanLine)
+def _apply(line, wire, lane, contact, x0, x1, force):
+    modal, shape = wire.modal[lane], wire.mid_shape[lane, contact]
+    for m in range(shape.size):
+        modal[0, m] += line.impulse[0, m] * shape[m] * force
+        modal[1, m] += line.impulse[1, m] * shape[m] * force
+    wire.position[lane, contact] = x1
+
+
+@implements(end_step, ThreeSpanLine)
+def _end(line, wire, lane):
+    if wire.position[lane, 0] >= (wire.central_span[lane] + 1) * line.span:
+        modal, before = wire.modal[lane], wire.scratch[lane]
+        size = modal.shape[1]
+        for k in range(2):
+            for m in range(size):
+                before[k, m] = modal[k, m]
+            for m in range(size):
+                total = 0.0
+                for j in range(size):
+                    total += line.project[m, j] * before[k, j]
+                modal[k, m] = total
+        wire.central_span[lane] += 1
+
+
+@implements(record_wire, ThreeSpanLine)
+def _record(line, wire, lane, uplift, tension):
+    for side in range(2):
+        support = wire.central_span[lane] - 1 + side
+        if 0 <= support < uplift.size:
+            total = 0.0
+            for m in range(line.at_support.shape[1]):
+                total += line.at_support[side, m] * wire.modal[lane, 0, m]
+            uplift[support] = total

@@ -1,0 +1,60 @@
+"""What every kind of sensors has, and what they do in a kernel."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from enum import IntEnum
+from typing import Any, Protocol
+
+from ...backend import constants, operation
+from ...base.arrays import Array
+from ...base.settings import Settings
+
+
+class Reading(IntEnum):
+    """Rows of a block of readings."""
+
+    HEAD_HEIGHT = 0  # m
+    FRAME_HEIGHT = 1  # m
+    HEAD_VELOCITY = 2  # m/s
+    FRAME_VELOCITY = 3  # m/s
+    CONTACT_FORCE = 4  # N
+
+
+READING = constants(Reading)
+
+
+class SensorArrays(Protocol):
+    """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
+
+    noise: Array  # (readings, lanes): of the next reading, in its units; or (readings, 0) for none
+
+    def reset(self, lane: int, sample: Array) -> None:
+        """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""
+
+
+class SensorSettings(Settings, ABC):
+    """Sensors as a user asks for them."""
+
+    @property
+    @abstractmethod
+    def noise_rms(self) -> tuple[float, ...] | None:
+        """Noise of each ``Reading``, rms, in its unit; None where no reading carries any."""
+
+    @abstractmethod
+    def arrays(self, time_step: float, control_steps: int, lanes: int) -> SensorArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
+
+
+@operation
+def take_readings(sensors: Any, step: int, block: Array, readings: Array, begin: int, count: int) -> None:
+    """What the sensors read after plant step ``step`` of a control step, counted from 1, without noise.
+
+    block: of the lanes from ``begin`` on, at the end of the step. readings: (readings, count), written to
+    at least once in each control step.
+    """
+
+
+@operation
+def take_first_readings(sensors: Any, block: Array, readings: Array, begin: int, count: int) -> None:
+    """What the sensors read at the start of a run, in a block as above."""
