@@ -30,6 +30,7 @@ from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
 from panto_env import InputError, simulate
 from panto_env.control import Task
+from panto_env.control.settings import run_settings
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
@@ -188,7 +189,7 @@ class TestPolicy:
     def test_acts_as_stable_baselines_does(self, finished):
         model = getattr(stable_baselines3, algorithm_of(finished).upper()).load(finished.model)
         policy = load(finished.model)
-        task = Task(**settings(algorithm_of(finished)).arguments)
+        task = Task(run_settings(settings(algorithm_of(finished)).arguments))
         policy.reset(task.context(0))
         for observation in np.random.default_rng(0).uniform(-2, 2, (50, 9)).astype(np.float32):
             expected, _ = model.predict(observation, deterministic=True)
