@@ -224,7 +224,7 @@ class TestPolicy:
         subprocess.run([sys.executable, "-c", code], check=True)
 
     @pytest.mark.parametrize(
-        ("change", "told"),
+        ("change", "message"),
         [
             ({"observation": "full"}, "observation='measured'"),
             ({"actuator": {"place": "head"}}, "'place': 'frame'"),
@@ -232,11 +232,11 @@ class TestPolicy:
             ({"control_interval": 0.02}, "control_interval of 0.01 s"),
         ],
     )
-    def test_refuses_another_task(self, finished, change, told):
+    def test_refuses_another_task(self, finished, change, message):
         line = settings(algorithm_of(finished)).arguments | change
         with pytest.raises(InputError, match="does not fit") as caught:
             simulate(**line, policy=str(finished.model))
-        assert told in str(caught.value)
+        assert message in str(caught.value)
         assert finished.model.name in str(caught.value)
 
     def test_broken_files(self, copied, tmp_path):
@@ -270,7 +270,7 @@ class TestSettings:
         assert load_training(path).total_steps > 0
 
     @pytest.mark.parametrize(
-        ("change", "told"),
+        ("change", "message"),
         [
             ({"algorithm": "pppo"}, "unknown algorithm 'pppo': did you mean 'ppo'?"),
             ({"total_step": 5}, "unknown key 'total_step' in the top level: did you mean 'total_steps'?"),
@@ -292,10 +292,10 @@ class TestSettings:
             ({"environment": LINE | {"reward": {"calm": 1.0}}}, "key 'calm'"),
         ],
     )
-    def test_errors_name_the_key(self, change, told):
+    def test_errors_name_the_key(self, change, message):
         with pytest.raises(InputError) as caught:
             settings("ppo", **change)
-        assert told in str(caught.value)
+        assert message in str(caught.value)
         assert str(caught.value).startswith("test: ")
         assert "\n" not in str(caught.value)
 
@@ -342,21 +342,21 @@ class TestCommand:
         monkeypatch.chdir(tmp_path)
         result = panto("train", config, "--seed", 3, "--steps", 128, "--json")
         assert result.exit_code == 0, result.stderr
-        told = json.loads(result.stdout)
-        assert told["output"] == "runs/tiny-ppo-seed3"
-        assert told["model_steps"] == 128
+        report = json.loads(result.stdout)
+        assert report["output"] == "runs/tiny-ppo-seed3"
+        assert report["model_steps"] == 128
         assert "σ" in result.stderr  # the evaluation's line beside the bar
 
-        result = panto("evaluate", told["best"], "--plot", "forces.png", "--json")
+        result = panto("evaluate", report["best"], "--plot", "forces.png", "--json")
         assert result.exit_code == 0, result.output
         passes = json.loads(result.stdout)["passes"]
         assert [entry["speed_kmh"] for entry in passes] == [250, 275, 300]
         assert np.mean([1 + entry["std_change_percent"] / 100 for entry in passes]) == pytest.approx(
-            told["best_ratio"]
+            report["best_ratio"]
         )
         assert Path("forces.png").read_bytes().startswith(b"\x89PNG")
 
-        table = panto("evaluate", told["best"], "--speed", 280, "--seeds", 2)
+        table = panto("evaluate", report["best"], "--speed", 280, "--seeds", 2)
         assert "standard deviation" in table.stdout
         assert "280" in table.stdout
 
