@@ -124,9 +124,9 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
 
 
 def test_progress_counts_all_passes() -> None:
-    told: list[tuple[int, int]] = []
-    benchmark.run(settings(), workers=1, progress=lambda done, total: told.append((done, total)))
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    calls: list[tuple[int, int]] = []
+    benchmark.run(settings(), workers=1, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 # --- statistics ----------------------------------------------------------------------------------
@@ -206,7 +206,7 @@ def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> Non
         ({"lines": [{"distance": 200.0}]}, "no spans 4 to 3 to evaluate"),
         ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
         ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
-        ({"actuator": "strong"}, "key 'actuator': it must be 'ideal' or 'realistic'"),
+        ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
         ({"control_interval": 0.0015}, "whole number of time steps"),
     ],
@@ -354,7 +354,7 @@ def test_command_raises_one_sentence_and_overwrites_nothing(
 
 def test_the_command_is_looked_up_fast() -> None:
     code = (
-        "import sys, panto_baselines.command; "
+        "import sys, panto_baselines.benchmark.command; "
         "print({'torch', 'matplotlib', 'pyarrow', 'scipy.stats'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -23,7 +23,7 @@ FOLDERS = {
     "pantograph": Path(__file__).parent / "pantographs",
 }
 _KINDS: dict[int | str, type[Settings]] = {name: kind.schema for name, kind in CATENARIES.items()}
-_CATENARY: TypeAdapter[Any] = TypeAdapter(
+_CATENARY: TypeAdapter[Any] = TypeAdapter(  # type: ignore[arg-type]
     Annotated[Union[tuple(_KINDS.values())], Field(discriminator="kind")]  # noqa: UP007 - of a list
 )
 _PANTOGRAPH: TypeAdapter[Any] = TypeAdapter(PantographData)
