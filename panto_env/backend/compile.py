@@ -63,5 +63,6 @@ def constants(names: type[E]) -> type[E]:
 
     Numba before 0.68, and its GPU compiler still, refuse a member of an enum as an index of an array.
     """
-    numbers: Any = namedtuple(names.__name__, [member.name for member in names])
-    return numbers(*(int(member) for member in names))  # type: ignore[no-any-return]
+    numbers: Any = namedtuple("numbers", [member.name for member in names])  # type: ignore[misc]
+    members: Any = numbers(*(int(member) for member in names))
+    return members  # type: ignore[no-any-return]
