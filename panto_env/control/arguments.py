@@ -35,7 +35,7 @@ def takes(
 
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
         with_keywords.__signature__ = inspect.Signature([own, *parameters(settings)])  # type: ignore[attr-defined]
-        return with_keywords  # type: ignore[return-value]
+        return with_keywords
 
     return decorate
 

@@ -63,10 +63,14 @@ def installed(before: str, after: str | None, keep: Path | None) -> Iterator[tup
 
     keep: folder in which they stay for the next time; a temporary one unless given.
     """
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # as an exception, so that all is cleared away
+    signal.signal(signal.SIGTERM, _end)
     with tempfile.TemporaryDirectory(prefix="before-") as temporary:
         root = Path(temporary) if keep is None else keep.resolve()
         yield _install(before, root / "before"), _install(after, root / "after")
+
+
+def _end(*_: object) -> None:
+    sys.exit("Ended by a signal.")  # as an exception, so that all is cleared away
 
 
 def _install(commit: str | None, root: Path) -> Version:

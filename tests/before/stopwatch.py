@@ -1,7 +1,7 @@
 """Time one row of ``speed.py`` with whatever version of the project is on PYTHONPATH.
 
 ``python stopwatch.py ROW`` warms up, prints "ready", and for each line that it is sent runs one chunk of work
-and prints the seconds it took. So two versions can be timed in turns, while the other one waits.
+and prints the seconds it took, by the clock and of the processor. So two versions can be timed in turns, while the other one waits.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
-Chunk = Callable[[], float]
-"""Runs the work; the seconds that it took."""
+Chunk = Callable[[], NDArray[np.float64]]
+"""Runs the work; the seconds that it took, by the clock and of the processor (all threads together)."""
 
 WARM_UP = 2  # chunks, the first of which loads kernels or compiles them
 
@@ -39,14 +40,14 @@ def plant(name: str, interval: float, steps: int, episodes: int) -> Chunk:
     env = gymnasium.make(f"panto_env:{name}", control_interval=interval)
     action = np.zeros(env.action_space.shape or (), dtype=np.float32)
 
-    def run() -> float:
-        spent = 0.0
+    def run() -> NDArray[np.float64]:
+        spent = np.zeros(2)
         for _ in range(episodes):
             env.reset(seed=0)
-            start = time.perf_counter()
+            start = _now()
             for _ in range(steps):
                 env.step(action)
-            spent += time.perf_counter() - start
+            spent += _now() - start
         return spent
 
     return run
@@ -56,11 +57,11 @@ def one_pass(passes: int, **settings: Any) -> Chunk:
     """Whole calls of ``simulate``, set-up and record included."""
     from panto_env import simulate
 
-    def run() -> float:
-        start = time.perf_counter()
+    def run() -> NDArray[np.float64]:
+        start = _now()
         for _ in range(passes):
             simulate(record_droppers=False, **settings)
-        return time.perf_counter() - start
+        return _now() - start
 
     return run
 
@@ -71,13 +72,13 @@ def steps_alone(name: str, count: int) -> Chunk:
     env.reset(seed=0)
     actions = _actions(env)
 
-    def run() -> float:
-        start = time.perf_counter()
+    def run() -> NDArray[np.float64]:
+        start = _now()
         for k in range(count):
             _, _, terminated, truncated, _ = env.step(actions[k % len(actions)])
             if terminated or truncated:
                 env.reset()
-        return time.perf_counter() - start
+        return _now() - start
 
     return run
 
@@ -90,13 +91,17 @@ def steps_abreast(name: str, lanes: int, count: int) -> Chunk:
     envs.reset(seed=0)
     actions = _actions(envs)
 
-    def run() -> float:
-        start = time.perf_counter()
+    def run() -> NDArray[np.float64]:
+        start = _now()
         for k in range(count):
             envs.step(actions[k % len(actions)])
-        return time.perf_counter() - start
+        return _now() - start
 
     return run
+
+
+def _now() -> NDArray[np.float64]:
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 def _actions(env: Any) -> list[Any]:
@@ -144,7 +149,7 @@ def main() -> None:
         run()
     print("ready", flush=True)
     for _ in sys.stdin:
-        print(run(), flush=True)
+        print(*run().tolist(), flush=True)
 
 
 if __name__ == "__main__":
