@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from panto_env.analysis.options import with_settings
 from panto_env.base.errors import InputError
 from panto_env.metrics.labels import LABELS
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
@@ -79,18 +80,16 @@ def train(
     console.print(f"panto evaluate {report['best']}", soft_wrap=True)
 
 
+@with_settings(
+    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "distance"), defaults=False
+)
 def evaluate(
+    settings: dict[str, Any],
     policy: Annotated[str, typer.Argument(help="Model file, or a policy's name (with parameters).")],
     speed: Annotated[
         list[float] | None, typer.Option(help="Speed (km/h); repeatable; those of the training by default.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs at each speed, seeds 0, 1, ...")] = 1,
-    catenary: Annotated[str | None, typer.Option(help="Line: a name or TOML file.")] = None,
-    pantograph: Annotated[str | None, typer.Option(help="Pantograph, likewise.")] = None,
-    actuator: Annotated[str | None, typer.Option(help="Actuator: ideal or realistic.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="Sensors: ideal or realistic.")] = None,
-    line_condition: Annotated[str | None, typer.Option(help="Line: new, fair or worn.")] = None,
-    distance: Annotated[float | None, typer.Option(help="How far to run (m).")] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -106,15 +105,7 @@ def evaluate(
 
     driver = find_policy(policy)
     environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
-    options = {
-        "catenary": catenary,
-        "pantograph": pantograph,
-        "actuator": actuator,
-        "sensors": sensors,
-        "line_condition": line_condition,
-        "distance": distance,
-    }
-    environment = environment | {key: value for key, value in options.items() if value is not None}
+    environment = environment | settings
     comparison = Comparison(arguments(environment), speed or speeds(environment), seeds)
     with progress_console.status("running"):
         pairs = comparison.run(driver)

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from panto_env.analysis.options import with_settings
 from panto_env.terminal import Json, Plot, print_json, progress_console
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
 
 
+@with_settings(
+    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    defaults=False,
+)
 def benchmark(
+    given: dict[str, Any],
     policies: Annotated[
         list[str] | None,
         typer.Argument(help="Names, with parameters (p:gain=0.5) or without, or model files."),
@@ -21,17 +27,8 @@ def benchmark(
     config: Annotated[
         Path | None, typer.Option(help="TOML file; other options take precedence over it.")
     ] = None,
-    catenary: Annotated[
-        str | None, typer.Option(help="Line: catalogue name or TOML file, in place of the config's lines.")
-    ] = None,
-    pantograph: Annotated[
-        str | None, typer.Option(help="Catalogue name or TOML file, in place of the config's.")
-    ] = None,
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
     seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
-    actuator: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
-    line_condition: Annotated[str | None, typer.Option(help="'new', 'fair' or 'worn'.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     output: Annotated[
         Path | None,
@@ -54,14 +51,13 @@ def benchmark(
     from .report import WIDTH, tables
     from .run import check_format, run
 
+    line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
         config,
-        line={"catenary": catenary, "pantograph": pantograph, "speeds_kmh": speed or None},
+        line=line | {"speeds_kmh": speed or None},
         policies=policies or None,
         seeds=seeds,
-        actuator=actuator,
-        sensors=sensors,
-        line_condition=line_condition,
+        **given,
     )
     if output is not None:
         check_format(output)

@@ -118,7 +118,7 @@ class RunSettings(Numerics):
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,
-        description="distance to run (m); by default to the end of the line, which gets more spans if too short",
+        description="distance to run (m), by default to the end of the line; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
