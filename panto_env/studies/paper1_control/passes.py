@@ -17,7 +17,7 @@ from ...base.arrays import Array
 from ...base.errors import InputError
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
-from ...control.settings import run_settings
+from ...control.settings import RunSettings, run_settings
 from ...metrics.figures import Figures
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData
@@ -63,7 +63,7 @@ def records(cases: Sequence[Case], pantograph: str | PantographData = PANTOGRAPH
     """Whole records of cases that differ in their policy alone: lanes of one task."""
     first = cases[0]
     line = load_catenary(first.line)
-    settings = run_settings(
+    settings: RunSettings = run_settings(
         {
             "catenary": line,
             "pantograph": pantograph,
