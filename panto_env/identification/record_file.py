@@ -37,7 +37,7 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     """Read a record: columns time, y_p1, y_p2, y_p3 and, where measured, force.
 
     Units stand in the header, as ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which wins.
-    Other columns are left alone; lines that are empty or begin with # too. The separator is a comma,
+    Other columns are ignored, and so are lines that are empty or begin with #. The separator is a comma,
     semicolon or tab. Raises InputError, naming the line and the column, for anything missing or not a number.
     """
     lines = _lines(path)

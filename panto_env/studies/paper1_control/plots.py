@@ -43,7 +43,7 @@ WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
 
 def all_plots(results: Results) -> dict[str, Figure]:
     """Figs 13 to 18, by file name."""
-    shown = {f"fig{14 + k}-{speed}kmh": passage(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
+    shown = {f"fig{14 + k}-{speed}kmh": forces_along_line(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
     return {
         "fig13-phase-angle": phase_angle(results),
         **shown,
@@ -74,7 +74,7 @@ def phase_angle(results: Results) -> Figure:
     return figure
 
 
-def passage(speed: int) -> Figure:
+def forces_along_line(speed: int) -> Figure:
     """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
     from matplotlib.figure import Figure
 
