@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from ..base.errors import InputError
-from ..base.settings import Settings, hint
+from ..base.settings import Settings, hint, message
 
 S = TypeVar("S", bound=Settings)
 
@@ -52,7 +52,7 @@ def change(entry: S, name: str, value: float) -> S:
     try:
         return type(entry).model_validate(_put(entry.model_dump(), path, value))
     except ValidationError as error:
-        words = dict.fromkeys(problem["msg"].removeprefix("Value error, ") for problem in error.errors())
+        words = dict.fromkeys(message(problem) for problem in error.errors())
         raise InputError(f"{name} can't be {value:g}: {' or '.join(words)}.") from error
 
 

@@ -66,7 +66,7 @@ def sweep(
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     check_arguments(settings, RunSettings, "sweep")
-    checked = run_settings(settings)
+    checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
     entries: dict[str, Settings] = {family: getattr(checked, family) for family in FAMILIES[:-1]}

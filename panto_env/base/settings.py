@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from .errors import InputError
 
@@ -59,14 +60,12 @@ def parse_kind(
 
 
 def explain(error: ValidationError) -> str:
-    """One clause a problem: the key, what was expected, what was given."""
+    """One clause per problem: the key, what was expected, what was given."""
     parts = []
     for problem in error.errors():
-        key = ".".join(str(part) for part in problem["loc"])
-        message = problem["msg"].removeprefix("Value error, ")
-        given = problem["input"]
+        key, given = _key(problem), problem["input"]
         shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
-        parts.append(f"key '{key}': {message}{shown}" if key else message)
+        parts.append(f"key '{key}': {message(problem)}{shown}" if key else message(problem))
     return "; ".join(parts)
 
 
@@ -74,14 +73,23 @@ def sentence(error: ValidationError) -> str:
     """What is wrong with keyword arguments, in one sentence without its full stop."""
     parts = []
     for problem in error.errors():
-        name = ".".join(str(part) for part in problem["loc"])
         cause = problem.get("ctx", {}).get("error")
         if isinstance(cause, InputError):
             parts.append(str(cause).removesuffix("."))
             continue
-        words = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        parts.append(f"{name} {words}, not {problem['input']!r}")
+        words = message(problem).replace("Input should be", "must be")
+        parts.append(f"{_key(problem)} {words}, not {problem['input']!r}")
     return "; ".join(parts)
+
+
+def message(problem: ErrorDetails) -> str:
+    """What Pydantic or a validator of ours says of one problem."""
+    return problem["msg"].removeprefix("Value error, ")
+
+
+def _key(problem: ErrorDetails) -> str:
+    """The dotted key that a problem is at."""
+    return ".".join(str(part) for part in problem["loc"])
 
 
 def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
@@ -91,5 +99,11 @@ def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
 
 def hint(name: str, known: list[str] | tuple[str, ...]) -> str:
     """A question that names the nearest known name, or nothing if none is near."""
+    near = nearest(name, known)
+    return "" if near is None else f"did you mean '{near}'? "
+
+
+def nearest(name: str, known: list[str] | tuple[str, ...]) -> str | None:
+    """The known name that is nearest to a misspelt one, if any is near."""
     near = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean '{near[0]}'? " if near else ""
+    return near[0] if near else None

@@ -11,10 +11,13 @@ from rich.table import Table
 
 from ..base.errors import InputError
 from ..catalog import available, load_catenary, load_pantograph
+from ..plant.catenary.schema import CatenaryData
+from ..plant.pantograph.schema import PantographData
 from ..policies import policy_names
 from ..terminal import Json, console, print_json
 
-LOADERS: dict[str, Callable[[str], Any]] = {"catenary": load_catenary, "pantograph": load_pantograph}
+Entry = CatenaryData | PantographData
+LOADERS: dict[str, Callable[[str], Entry]] = {"catenary": load_catenary, "pantograph": load_pantograph}
 
 
 def list_entries(
@@ -35,32 +38,32 @@ def _overview(json: bool) -> None:
     entries = {family: [LOADERS[family](name) for name in available(family)] for family in LOADERS}
     if json:
         print_json(
-            {family: [entry.model_dump() for entry in found] for family, found in entries.items()}
+            {family: [entry.model_dump() for entry in listed] for family, listed in entries.items()}
             | {"policy": policy_names()}
         )
         return
-    for family, found in entries.items():
+    for family, listed in entries.items():
         table = Table("name", "kind", "description", title=family, title_justify="left")
-        for entry in found:
+        for entry in listed:
             table.add_row(entry.name, entry.kind, entry.description.split(".")[0] + ".")
         console.print(table)
     console.print("policies:", ", ".join(policy_names()))
 
 
 def _entry(name: str, json: bool) -> None:
-    found: dict[str, Any] = {}
+    entries: dict[str, Entry] = {}
     failures = []
     for family, load in LOADERS.items():
         try:
-            found[family] = load(name)
+            entries[family] = load(name)
         except InputError as error:
             failures.append(str(error))
-    if not found:
+    if not entries:
         raise InputError(failures[0] if name.endswith(".toml") else " ".join(failures))
     if json:
-        print_json({family: entry.model_dump() for family, entry in found.items()})
+        print_json({family: entry.model_dump() for family, entry in entries.items()})
         return
-    for family, entry in found.items():
+    for family, entry in entries.items():
         table = Table("key", "value", "meaning", "source", title=f"{family} {entry.name}")
         for key, value, meaning in _leaves(entry, ""):
             table.add_row(key, str(value), meaning, entry.sources.get(key, ""))

@@ -43,16 +43,17 @@ def run_trials(
 
     The noise is that of ``add_noise`` with seeds 0 to ``trials`` - 1.
     """
-    seeds = [range(first, min(first + TRIALS_PER_JOB, trials)) for first in range(0, trials, TRIALS_PER_JOB)]
+    starts = range(0, trials, TRIALS_PER_JOB)
+    chunks = [range(start, min(start + TRIALS_PER_JOB, trials)) for start in starts]
     jobs = [
-        partial(_run_seeds, excitation, free_offset, dict(truth), some)
+        partial(_run_seeds, excitation, free_offset, dict(truth), seeds)
         for excitation, free_offset in experiments
-        for some in seeds
+        for seeds in chunks
     ]
     parts = in_processes(jobs, progress=progress)
     results = []
-    for first in range(0, len(parts), len(seeds)):
-        of_experiment = parts[first : first + len(seeds)]
+    for first in range(0, len(parts), len(chunks)):
+        of_experiment = parts[first : first + len(chunks)]
         rows = {
             method: np.array([row for part in of_experiment for row in part[method]])
             for method in of_experiment[0]

@@ -1,4 +1,4 @@
-"""What an identification found, and how sure it is."""
+"""The parameters that a method identified from a record, and how certain they are."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Fit:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Parameters whose 95 % interval holds 0: the record says nothing of them."""
+        """Parameters whose 95 % interval contains 0: the record does not determine them."""
         return tuple(name for name, share in zip(self.names, self.rsd, strict=True) if Z * share > 100)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""The same linear-phase low-pass for all sensors: the equations of motion hold for what it leaves.
+"""The same linear-phase low-pass for all sensors: the filtered record still obeys the equations of motion.
 
-Noise outside the band of the excitation carries no information, but ruins derivatives (and rings the
-model's own resonance). A linear filter commutes with a linear model, so filtering every channel alike
-changes nothing else; whole ends are cut off, not padded.
+Noise outside the band of the excitation carries no information, but ruins derivatives (and excites the
+model's own resonance). A linear filter commutes with a linear model, so the same filter on every channel
+changes nothing else. Both ends are cut off, not padded.
 """
 
 from __future__ import annotations

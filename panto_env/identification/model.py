@@ -15,7 +15,7 @@ Parameters = Mapping[str, float]
 """Values by the names in ``UNITS``, SI."""
 
 MEASURED = ("k1T", "m2", "k2")
-"""What paper 1 weighs or presses with the pantograph in pieces (section 3)."""
+"""What paper 1 measures on the dismantled pantograph (section 3)."""
 
 IDENTIFIED = ("c1T", "c2", "m3", "c3", "k3")
 """What the records give, in the order of X (Eq. 5)."""

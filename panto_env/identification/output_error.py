@@ -57,19 +57,21 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
     for _ in range(PASSES):
-        found = least_squares(
+        fitted = least_squares(
             misfit.residuals, solution, misfit.jacobian, bounds=(misfit.lowest(), np.inf), x_scale="jac"
         )
-        solution = found.x
+        solution = fitted.x
         misfit.weigh(solution)
     jacobian = misfit.jacobian(solution)
     length = np.linalg.norm(jacobian, axis=0)
     _, singular, rows = np.linalg.svd(jacobian / length, full_matrices=False)
     dependence = float(singular[0] / singular[-1])
-    if not found.success:
-        raise InputError(f"The output-error fit does not settle ({found.message}); check the record's units.")
+    if not fitted.success:
+        raise InputError(
+            f"The output-error fit does not settle ({fitted.message}); check the record's units."
+        )
     p = len(start.names)
-    values = np.where(found.active_mask[:p] == -1, 0.0, solution[:p]) * misfit.scale
+    values = np.where(fitted.active_mask[:p] == -1, 0.0, solution[:p]) * misfit.scale
     std = np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / length
     return Fit(
         OUTPUT_ERROR,

@@ -10,7 +10,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 
 SHORTEST = 20
-"""Samples that a record must have at least; what a method needs beyond this it says itself."""
+"""Samples that a record must have at least; a method that needs more raises its own error."""
 
 JITTER = 0.05
 """How far a time stamp may lie from equal steps, as a share of the step: more is no rounding of digits."""
@@ -18,7 +18,7 @@ JITTER = 0.05
 
 @dataclass(frozen=True)
 class Record:
-    """n samples at equal steps, displacements from where the unloaded pantograph rests, down or up alike."""
+    """n samples at equal steps; displacements are counted from where the unloaded pantograph rests."""
 
     time_step: float  # s
     plate: Array  # (n,): y_p1 of the contact plate (m)

@@ -37,7 +37,7 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     """Read a record: columns time, y_p1, y_p2, y_p3 and, where measured, force.
 
     Units stand in the header, as ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which wins.
-    Other columns are left alone; lines that are empty or begin with # too. The separator is a comma,
+    Other columns are ignored, and so are lines that are empty or begin with #. The separator is a comma,
     semicolon or tab. Raises InputError, naming the line and the column, for anything missing or not a number.
     """
     lines = _lines(path)
@@ -95,23 +95,23 @@ def _columns(path: str | Path, header: list[str], units: dict[str, str]) -> dict
     unknown = [name for name in units if name not in NAMES]
     if unknown:
         raise InputError(f"Unit of unknown column '{unknown[0]}': {suggest(unknown[0], list(NAMES))}.")
-    found: dict[str, tuple[int, float]] = {}
+    columns: dict[str, tuple[int, float]] = {}
     for place, heading in enumerate(header):
         match = _HEADING.match(heading.strip())
         plain = re.sub(r"[\s_-]", "", match["name"]).lower() if match else ""
         name = next((name for name, spellings in NAMES.items() if plain in spellings), None)
         if name is None or match is None:
             continue
-        if name in found:
+        if name in columns:
             raise InputError(f"{path} has column {name} twice; keep one.")
-        found[name] = (place, _scale(path, name, units.get(name) or match["unit"]))
-    missing = [name for name in NAMES if name != "force" and name not in found]
+        columns[name] = (place, _scale(path, name, units.get(name) or match["unit"]))
+    missing = [name for name in NAMES if name != "force" and name not in columns]
     if missing:
         raise InputError(
             f"{path} has no column {', '.join(missing)} (its header: {', '.join(header)}); "
             "name the columns time (s), force (N), y_p1 (mm), y_p2 (mm), y_p3 (mm)."
         )
-    return found
+    return columns
 
 
 def _scale(path: str | Path, name: str, unit: str | None) -> float:

@@ -25,8 +25,8 @@ def recur(transition, gains, states):
 def polynomials(values: Array, time_step: float) -> Array:
     """Value and three derivatives at the start of each step, (n - 1, 4), of the cubic spline through samples.
 
-    Held or straight input would do to the small difference of plate and head what sampling ten times
-    slower does; between samples of a smooth motion a spline is good to the fourth order.
+    Input that is constant or linear between samples would spoil the small difference of plate and head as
+    much as sampling ten times more slowly; a spline through a smooth motion is good to the fourth order.
     """
     from scipy.interpolate import CubicSpline  # slow to import
 

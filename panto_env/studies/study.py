@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Report = Callable[[str, float], None]
-"""Told what is being done and the share of the study that is done, 0..1."""
+"""Called with what is being done and the share of the study that is done, 0..1."""
 
 
 @dataclass(frozen=True)
 class Comparison:
     """One figure of ours beside the paper's, and the range in which they agree.
 
-    A statement in words has no figure: ``paper`` is then the sentence in short. ``low`` and ``high`` are
-    inclusive.
+    Where the paper makes a statement without a figure, ``paper`` is that statement in short. ``low`` and
+    ``high`` are inclusive.
     """
 
     quantity: str

@@ -35,14 +35,12 @@ class Validation:
     @property
     def tables(self) -> list[Table]:
         """For people: of the standard's table and of what was asked for."""
-        found = [tables.checks_table(self.checks)]
-        if self.convergence:
-            found.append(tables.convergence_table(self.convergence))
-        if self.windows:
-            found.append(tables.windows_table(self.windows))
-        if self.wear:
-            found.append(tables.wear_table(self.wear))
-        return found
+        return [
+            tables.checks_table(self.checks),
+            *([tables.convergence_table(self.convergence)] if self.convergence else []),
+            *([tables.windows_table(self.windows)] if self.windows else []),
+            *([tables.wear_table(self.wear)] if self.wear else []),
+        ]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the runs."""

@@ -62,8 +62,8 @@ DAMPING = {
 """What the paper does not have: feedback of the frame's velocity."""
 
 
-USUAL: dict[str, Any] = {"time_step": EVERY_STEP}
-FINE: dict[str, Any] = {"time_step": 1e-3, "spacing": 0.25}
+USUAL: dict[str, float] = {"time_step": EVERY_STEP}
+FINE: dict[str, float] = {"time_step": 1e-3, "spacing": 0.25}
 """Half the usual time step (s), and a finer grid (m), to see what depends on them."""
 
 

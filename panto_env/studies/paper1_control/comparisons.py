@@ -44,18 +44,18 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
     def none(quantity: str, ours: float, note: str, paper: str = "0: eliminated") -> Comparison:
         return Comparison(quantity, "%", ours, paper, 0.0, 0.0, note)
 
-    found = [
+    compared = [
         Comparison(
             "CL without control, 400 km/h", "%", loss(400, "passive"), "some, to eliminate", 0.1, 100.0
         )
     ]
     for gain, note in ((GAIN, CALIBRATED), (DEFAULT_GAIN, UNCALIBRATED)):
-        found += [
+        compared += [
             none(f"CL with FB+FF, gain {gain:g}, {speed} km/h", loss(speed, control(gain)), note)
             for speed in SHOWN_SPEEDS
         ]
     most = max(loss(speed, control()) for speed in SPEEDS)
-    found.append(
+    compared.append(
         none(f"largest CL with FB+FF, gain {GAIN}, 100-400 km/h", most, CALIBRATED + "; not at the others")
     )
     worst = {
@@ -67,15 +67,15 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
     best = min(worst, key=worst.__getitem__)
     for gains, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
         quantity = f"largest CL with FB+FF, {gains}, 300-400 km/h, realistic actuator"
-        found.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
-    return found
+        compared.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
+    return compared
 
 
 def _calm(results: Mapping[Case, Result]) -> list[Comparison]:
-    found = []
+    compared = []
     for speed in SHOWN_SPEEDS:
         passive, active = results[Case(speed)], results[Case(speed, control())]
-        found.append(
+        compared.append(
             Comparison(
                 f"raw σ with over without control, {speed} km/h",
                 "-",
@@ -93,11 +93,11 @@ def _calm(results: Mapping[Case, Result]) -> list[Comparison]:
     for speed in SHOWN_SPEEDS:
         note = STIFF if speed == 300 else ""
         quantity = f"CF with over without control, {speed} km/h"
-        found.append(Comparison(quantity, "-", ratio[speed], "below 1", 0.0, 1.0, note))
+        compared.append(Comparison(quantity, "-", ratio[speed], "below 1", 0.0, 1.0, note))
     worst = max(ratio, key=ratio.__getitem__)
     quantity = "CF with over without control, largest of 100-400 km/h"
-    found.append(Comparison(quantity, "-", ratio[worst], "below 1", 0.0, 1.0, f"at {worst} km/h"))
-    return found
+    compared.append(Comparison(quantity, "-", ratio[worst], "below 1", 0.0, 1.0, f"at {worst} km/h"))
+    return compared
 
 
 def _angles(results: Mapping[Case, Result]) -> list[Comparison]:

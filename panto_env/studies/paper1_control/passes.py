@@ -17,9 +17,10 @@ from ...base.arrays import Array
 from ...base.errors import InputError
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
-from ...control.settings import run_settings
+from ...control.settings import RunSettings, run_settings
 from ...metrics.figures import Figures
 from ...metrics.trajectory import Trajectory
+from ...plant.pantograph.schema import PantographData
 from ...policies import find_policy
 from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, USUAL, Case
 
@@ -58,11 +59,11 @@ def run(cases: Sequence[Case]) -> list[Result]:
     return [result_of(case, record) for case, record in zip(cases, records(cases), strict=True)]
 
 
-def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Trajectory]:
+def records(cases: Sequence[Case], pantograph: str | PantographData = PANTOGRAPH) -> list[Trajectory]:
     """Whole records of cases that differ in their policy alone: lanes of one task."""
     first = cases[0]
     line = load_catenary(first.line)
-    settings = run_settings(
+    settings: RunSettings = run_settings(
         {
             "catenary": line,
             "pantograph": pantograph,

@@ -43,7 +43,7 @@ WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
 
 def all_plots(results: Results) -> dict[str, Figure]:
     """Figs 13 to 18, by file name."""
-    shown = {f"fig{14 + k}-{speed}kmh": passage(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
+    shown = {f"fig{14 + k}-{speed}kmh": forces_along_line(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
     return {
         "fig13-phase-angle": phase_angle(results),
         **shown,
@@ -59,12 +59,12 @@ def phase_angle(results: Results) -> Figure:
     figure = Figure(figsize=(10, 5.2), layout="constrained")
     for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
         for k, speed in enumerate(ANGLE_SPEEDS):
-            found = cost_over_angle(results, speed, GAIN, reading)
+            curve = cost_over_angle(results, speed, GAIN, reading)
             colour = f"C{k}"
             axis.plot(
-                [math.degrees(theta) for theta in THETAS], found.cost, color=colour, label=f"{speed} km/h"
+                [math.degrees(theta) for theta in THETAS], curve.cost, color=colour, label=f"{speed} km/h"
             )
-            axis.plot(math.degrees(found.best), found.least, "o", color=colour)
+            axis.plot(math.degrees(curve.best), curve.least, "o", color=colour)
         axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
     figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
@@ -74,7 +74,7 @@ def phase_angle(results: Results) -> Figure:
     return figure
 
 
-def passage(speed: int) -> Figure:
+def forces_along_line(speed: int) -> Figure:
     """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
     from matplotlib.figure import Figure
 

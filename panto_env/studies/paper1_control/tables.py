@@ -117,15 +117,15 @@ def _actuators(results: Results) -> Table:
 def _angles(results: Results) -> Table:
     rows = []
     for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
-        found = cost_over_angle(results, speed, gain, reading)
+        curve = cost_over_angle(results, speed, gain, reading)
         span = reading == ANGLE_CONTROLS[0][1]
         rows.append(
             (
                 f"{reading}, gain {gain:g}",
                 str(speed),
-                f"{math.degrees(found.best):.0f}",
-                *(f"{value:.0f}" for value in (found.least, found.at_paper, max(found.cost), found.without)),
-                f"{math.degrees(found.cancelling):.0f}" if span else "–",
+                f"{math.degrees(curve.best):.0f}",
+                *(f"{value:.0f}" for value in (curve.least, curve.at_paper, max(curve.cost), curve.without)),
+                f"{math.degrees(curve.cancelling):.0f}" if span else "–",
             )
         )
     return Table(

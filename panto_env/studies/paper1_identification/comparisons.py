@@ -37,7 +37,7 @@ def comparisons(
 
 def _motion(truth: Parameters) -> list[Comparison]:
     """Table 1: the model under the printed motion of the plate."""
-    found = []
+    rows = []
     for printed in PUBLISHED:
         for motion in expected(truth, printed):
             force = motion.unit == "N"
@@ -45,7 +45,7 @@ def _motion(truth: Parameters) -> list[Comparison]:
             near = 0.1 * motion.printed_amplitude if force else 0.02
             about = 0.03 * motion.printed_offset if force else 0.1
             series = f"{printed.name}, {motion.name}"
-            found += [
+            rows += [
                 _about(
                     f"{series}, amplitude",
                     motion.unit,
@@ -56,7 +56,7 @@ def _motion(truth: Parameters) -> list[Comparison]:
                 ),
                 _about(f"{series}, offset", motion.unit, motion.offset, motion.printed_offset, about),
             ]
-    return found
+    return rows
 
 
 def _amplitude_note(experiment: str, name: str) -> str:
@@ -73,13 +73,13 @@ def _amplitude_note(experiment: str, name: str) -> str:
 
 def _without_noise(truth: Parameters, computed: Computed) -> list[Comparison]:
     """Table 2's parameters, from Experiment I sampled fast enough."""
-    found = []
+    rows = []
     fastest = -1
     for name, error in zip(IDENTIFIED, computed.sampling["I"][fastest], strict=True):
         true = truth[name]
         ours = true * (1 + error / 100)
-        found.append(_about(f"{name}, Experiment I without noise", UNITS[name], ours, true, BAR * abs(true)))
-    return found
+        rows.append(_about(f"{name}, Experiment I without noise", UNITS[name], ours, true, BAR * abs(true)))
+    return rows
 
 
 def _condition_numbers(computed: Computed) -> list[Comparison]:
@@ -91,15 +91,15 @@ def _condition_numbers(computed: Computed) -> list[Comparison]:
         "ours is of Table 1's sines, offset kept; noise in the derivatives lowers it, and the paper "
         "gives neither noise nor sampling"
     )
-    found = [
+    rows = [
         _about(f"{name}, condition number", "", ours[name], paper, 0.5 * paper, note)
         for name, paper in theirs.items()
     ]
     for name in ("II", "III"):
         quantity = f"condition number, {name} over I"
         ratio, paper = ours[name] / ours["I"], theirs[name] / theirs["I"]
-        found.append(Comparison(quantity, "", ratio, paper, 1.0, 10.0, "I is lowest"))
-    return found
+        rows.append(Comparison(quantity, "", ratio, paper, 1.0, 10.0, "I is lowest"))
+    return rows
 
 
 def _deviations(computed: Computed) -> list[Comparison]:
@@ -133,7 +133,7 @@ def _performance(matches: Sequence[Match]) -> list[Comparison]:
 
 def _tables_together(truth: Parameters) -> list[Comparison]:
     """Whether the printed tables fit together."""
-    found = [
+    rows = [
         _about(
             f"{printed.name}, best P_f of y_p1 by Tables 1 and 2",
             "%",
@@ -147,7 +147,7 @@ def _tables_together(truth: Parameters) -> list[Comparison]:
     ]
     for printed in PUBLISHED:
         mean_error = printed.mean_error[0]
-        found.append(
+        rows.append(
             Comparison(
                 f"{printed.name}, y_p1, largest mean error that the printed P_f allows",
                 "mm",
@@ -158,7 +158,7 @@ def _tables_together(truth: Parameters) -> list[Comparison]:
                 "a mean error cannot exceed the rms error that Eq. 9 gives with Table 1's amplitude",
             )
         )
-    return found
+    return rows
 
 
 def _coverage(coverage: Mapping[str, Mapping[str, Array]]) -> list[Comparison]:
@@ -166,12 +166,12 @@ def _coverage(coverage: Mapping[str, Mapping[str, Array]]) -> list[Comparison]:
         PRINTED: "noise in the derivatives biases least squares; RSD knows nothing of it",
         FILTERED: "bias mostly gone, intervals too narrow: the residuals of both equations are unlike",
     }
-    found = []
+    rows = []
     for method in METHODS:
         lowest = min(float(np.min(shares[method])) for shares in coverage.values())
         quantity = f"lowest coverage, {method}"
-        found.append(Comparison(quantity, "%", lowest, "95 % intervals", 90.0, 100.0, notes.get(method, "")))
-    return found
+        rows.append(Comparison(quantity, "%", lowest, "95 % intervals", 90.0, 100.0, notes.get(method, "")))
+    return rows
 
 
 def _about(quantity: str, unit: str, ours: float, paper: float, within: float, note: str = "") -> Comparison:

@@ -97,11 +97,11 @@ def _tables(
 ) -> tuple[Table, ...]:
     kept = computed.offset_kept
     return (
-        tables.table1(truth),
-        *(tables.table_of(kept[printed.name], printed, 2 + k) for k, printed in enumerate(PUBLISHED)),
-        tables.table5(driven),
-        tables.ranking(kept, computed.medians),
-        tables.cure(kept, computed.offset_free),
+        tables.motion_table(truth),
+        *(tables.parameters_table(kept[printed.name], printed, 2 + k) for k, printed in enumerate(PUBLISHED)),
+        tables.performance_table(driven),
+        tables.ranking_table(kept, computed.medians),
+        tables.frequency_sweep_table(kept, computed.offset_free),
         tables.coverage_table([_label(*experiment) for experiment in COVERED], trials, TRIALS),
         tables.friction_table(truth),
     )

@@ -24,7 +24,7 @@ Fits = Mapping[str, Identification]
 Row = tuple[str | float, ...]
 
 
-def table1(truth: Parameters) -> Table:
+def motion_table(truth: Parameters) -> Table:
     """Table 1: the model's motion under the printed motion of the plate."""
     rows: list[Row] = []
     for printed in PUBLISHED:
@@ -36,7 +36,7 @@ def table1(truth: Parameters) -> Table:
     return Table("Table 1: the model (Table 2's parameters) under the printed y_p1", headings, tuple(rows))
 
 
-def table_of(identification: Identification, printed: Published, number: int) -> Table:
+def parameters_table(identification: Identification, printed: Published, number: int) -> Table:
     """Tables 2 to 4: identified from one noisy record, beside the paper's."""
     rows: list[Row] = []
     for k, name in enumerate(IDENTIFIED):
@@ -58,7 +58,7 @@ def table_of(identification: Identification, printed: Published, number: int) ->
     )
 
 
-def table5(driven: Mapping[str, Sequence[Match]]) -> Table:
+def performance_table(driven: Mapping[str, Sequence[Match]]) -> Table:
     """Table 5: model by output error, driven by the contact force, beside the synthetic record."""
     rows: list[Row] = []
     for printed in PUBLISHED:
@@ -80,7 +80,7 @@ def table5(driven: Mapping[str, Sequence[Match]]) -> Table:
     return Table("Table 5: fitting performance and mean error", headings, tuple(rows))
 
 
-def ranking(kept: Fits, medians: Mapping[str, Sequence[float]]) -> Table:
+def ranking_table(kept: Fits, medians: Mapping[str, Sequence[float]]) -> Table:
     """Condition number and RSD of the experiments, ranked."""
     rows: list[Row] = []
     for printed in PUBLISHED:
@@ -101,7 +101,7 @@ def ranking(kept: Fits, medians: Mapping[str, Sequence[float]]) -> Table:
     )
 
 
-def cure(kept: Fits, free: Fits) -> Table:
+def frequency_sweep_table(kept: Fits, free: Fits) -> Table:
     """RSD of every parameter on a single sine and on a frequency sweep, offset kept and free."""
     rows: list[Row] = []
     for name in (EXPERIMENTS[0].name, FREQUENCY_SWEEP.name):

@@ -54,14 +54,14 @@ def _speed(passes: Sequence[Pass]) -> list[Comparison]:
     steps = f"least ratio from one speed to the next, {SPEEDS_KMH[0]:g} to {SPEEDS_KMH[-1]:g} km/h"
     swing = min(b.swing / a.swing for a, b in pairwise(passes))
     travel = min(b.travel / a.travel for a, b in pairwise(passes))
-    found = [
+    compared = [
         Comparison("amplitude of F_C over speed", "", swing, words, 1.0, inf, steps),
         Comparison("amplitude of z_1 over speed", "", travel, words, 1.0, inf, steps),
     ]
     for one_pass in passes[-2:]:
         for name, values in (("F_C", one_pass.force), ("z_1", one_pass.displacement)):
             place = float(one_pass.position[np.argmax(values)] / one_pass.span_length % 1)
-            found.append(
+            compared.append(
                 Comparison(
                     f"place of the largest {name} in its span, {one_pass.speed_kmh:g} km/h",
                     "spans",
@@ -70,7 +70,7 @@ def _speed(passes: Sequence[Pass]) -> list[Comparison]:
                     *MIDDLE,
                 )
             )
-    return found
+    return compared
 
 
 def _small_steps(rows: Sequence[Mapping[str, Any]]) -> Comparison:
@@ -90,32 +90,32 @@ def _small_steps(rows: Sequence[Mapping[str, Any]]) -> Comparison:
 
 def _standard(passes: Passes) -> list[Comparison]:
     """The conclusion: "in accordance with EN 50367"; it names the limits of the maximum alone."""
-    found = []
+    compared = []
     for one_pass in passes["speed"]:
         limit, largest = en50367.maximum_limit(one_pass.speed_kmh / 3.6), float(one_pass.force.max())
         bound = largest_static_force(one_pass)
         note = "" if largest <= limit else f"kept only with F_S up to {bound:.0f} N, which is not printed"
         name = f"largest F_C, {one_pass.speed_kmh:g} km/h"
-        found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit, note))
+        compared.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit, note))
     others = [
         one_pass for varied in passes.values() for one_pass in varied if one_pass.speed_kmh == SPEED_KMH
     ]
     largest = max(float(one_pass.force.max()) for one_pass in others)
     limit = en50367.maximum_limit(SPEED_KMH / 3.6)
     name = f"largest F_C of all variants, {SPEED_KMH:g} km/h"
-    found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit))
+    compared.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit))
 
     words = "in accordance with EN 50367"
     mean = max(
         one_pass.figures.mean / en50367.mean_limit(one_pass.speed_kmh / 3.6) for one_pass in passes["speed"]
     )
     note = "limit 0.00097 v² + 70 (recalled), not named in the paper; our F_S puts F(v) on it"
-    found.append(Comparison("F_m over its limit, any speed", "", mean, words, 0.0, 1.0, note))
+    compared.append(Comparison("F_m over its limit, any speed", "", mean, words, 0.0, 1.0, note))
     for one_pass in passes["speed"]:
         ratio = one_pass.figures.std / one_pass.figures.mean
         note = "limit 0.3 (recalled), not named in the paper; F_S drops out of it"
-        found.append(Comparison(f"σ / F_m, {one_pass.speed_kmh:g} km/h", "", ratio, words, 0.0, 0.3, note))
-    return found
+        compared.append(Comparison(f"σ / F_m, {one_pass.speed_kmh:g} km/h", "", ratio, words, 0.0, 0.3, note))
+    return compared
 
 
 def _extremes(what: str, passes: Sequence[Pass], better: str) -> list[Comparison]:
@@ -123,15 +123,15 @@ def _extremes(what: str, passes: Sequence[Pass], better: str) -> list[Comparison
     low, high = passes[0], passes[-1]
     good, bad = (low, high) if better == "low" else (high, low)
     note = f"between {FACTORS[0]:g} and {FACTORS[-1]:g} of the basic value"
-    found = []
+    compared = []
     for name, unit, scale, array in (("F_C", "N", 1.0, "force"), ("z_1", "mm", 1e3, "displacement")):
         ours, worse = scale * getattr(good, array), scale * getattr(bad, array)
         top, bottom = float(ours.max() - worse.max()), float(ours.min() - worse.min())
-        found += [
+        compared += [
             Comparison(f"{what}: change of the largest {name}", unit, top, "less", -inf, 0.0, note),
             Comparison(f"{what}: change of the least {name}", unit, bottom, "more", 0.0, inf, note),
         ]
-    return found
+    return compared
 
 
 def _along_the_span(passes: Sequence[Pass]) -> list[Comparison]:
@@ -193,13 +193,13 @@ def _suspension(measured: Mapping[str, Sensitivity]) -> list[Comparison]:
 
 def _order(measured: Mapping[str, Sensitivity]) -> list[Comparison]:
     """The conclusion: speed first, then the catenary's stiffness, the pantograph last."""
-    found = []
+    compared = []
     for name, key in (("σ of F_C", "std"), ("amplitude of z_1", "travel")):
         size = {influence: abs(getattr(change, key)) for influence, change in measured.items()}
         line = [size["variation"], size["mean-stiffness"]]
         pantograph = [size["mass"], size["suspension"]]
         note = f"ratio of the changes of the {name} over ±25 %"
-        found += [
+        compared += [
             Comparison(
                 f"v against the next ({name})",
                 "",
@@ -228,4 +228,4 @@ def _order(measured: Mapping[str, Sensitivity]) -> list[Comparison]:
                 note,
             ),
         ]
-    return found
+    return compared

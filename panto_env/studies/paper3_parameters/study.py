@@ -70,12 +70,12 @@ def run(report: Report) -> Outcome:
         title="Paper 3, Figs 4 to 13: its statements, contact that may pull",
         comparisons=comparisons[True],
         tables=(
-            tables.extremes(varied, passes[True]),
-            tables.ranking(ranking[True]),
-            tables.readings(varied, passes[True], passes[False], comparisons[True], comparisons[False]),
-            tables.static_force(passes[True]["speed"]),
-            tables.beginnings(beginnings),
-            tables.resonance(landmarks),
+            tables.extremes_table(varied, passes[True]),
+            tables.ranking_table(ranking[True]),
+            tables.readings_table(varied, passes[True], passes[False], comparisons[True], comparisons[False]),
+            tables.static_force_table(passes[True]["speed"]),
+            tables.beginnings_table(beginnings),
+            tables.resonance_table(landmarks),
         ),
         plots=all_plots(varied, passes[True], passes[False]),
         numbers={
@@ -103,19 +103,19 @@ def _sweep_speed(bilateral: bool) -> list[Row]:
 
 def _behind_plots(varied: Sequence[Influence], passes: Mapping[bool, Passes]) -> dict[str, Any]:
     """Extremes, mean and σ of every curve, by the name of its plot."""
-    found = {}
+    plots = {}
     for influence in varied:
         for quantity, key in (("displacement", "displacement_mm"), ("force", "contact_force_n")):
             curves: list[dict[str, Any]] = [{"value": value} for value in influence.values]
             for bilateral, name in READINGS.items():
                 for curve, one_pass in zip(curves, passes[bilateral][influence.key], strict=True):
                     curve[name] = one_pass.numbers()[key]
-            found[plot_name(influence, quantity)] = {
+            plots[plot_name(influence, quantity)] = {
                 "parameter": influence.parameter,
                 "unit": influence.unit,
                 "passes": curves,
             }
-    return found
+    return plots
 
 
 def _standard(varied: Sequence[Influence], passes: Passes) -> dict[str, Any]:

@@ -33,7 +33,7 @@ class Beginning:
         return cls(speed_kmh, equations.growth(), float(difference), SPANS[1] * equations.span_time)
 
 
-def extremes(influences: Sequence[Influence], passes: Passes) -> Table:
+def extremes_table(influences: Sequence[Influence], passes: Passes) -> Table:
     """Extremes, mean and σ of every curve, with EN 50367's limits."""
     rows: list[tuple[str | float, ...]] = []
     for influence in influences:
@@ -53,7 +53,7 @@ def extremes(influences: Sequence[Influence], passes: Passes) -> Table:
     return Table("500 to 600 m, contact that may pull", (*headings, "EN 50367 broken"), tuple(rows))
 
 
-def ranking(sensitivities: Sequence[Sensitivity]) -> Table:
+def ranking_table(sensitivities: Sequence[Sensitivity]) -> Table:
     """Changes of σ at every share, of the amplitudes at all; greatest change of σ at ±25 % first."""
     by_influence: dict[str, list[Sensitivity]] = {}
     for sensitivity in sensitivities:
@@ -76,7 +76,7 @@ def ranking(sensitivities: Sequence[Sensitivity]) -> Table:
     return Table(title, ("parameter", *headings), rows)
 
 
-def readings(
+def readings_table(
     influences: Sequence[Influence],
     pulling: Passes,
     pushing: Passes,
@@ -112,7 +112,7 @@ def _agreeing(comparisons: Sequence[Comparison]) -> str:
     return f"{sum(comparison.agrees for comparison in comparisons)} of {len(comparisons)}"
 
 
-def static_force(passes: Sequence[Pass]) -> Table:
+def static_force_table(passes: Sequence[Pass]) -> Table:
     """What does not depend on F_S, and the largest F_S that keeps the maximum within EN 50367."""
     rows = tuple(
         (
@@ -128,7 +128,7 @@ def static_force(passes: Sequence[Pass]) -> Table:
     return Table("F_S is not printed: all forces scale with F(v)", headings, rows)
 
 
-def beginnings(found: Sequence[Beginning]) -> Table:
+def beginnings_table(beginnings: Sequence[Beginning]) -> Table:
     """How long the start is felt."""
     rows = tuple(
         (
@@ -138,7 +138,7 @@ def beginnings(found: Sequence[Beginning]) -> Table:
             f"{beginning.difference:.4f}",
             f"{beginning.seconds:.1f}",
         )
-        for beginning in found
+        for beginning in beginnings
     )
     headings = ("km/h", "left after a span", "after 10 spans", "F_C, flat less at rest (N)", "to 600 m (s)")
     return Table(f"Initial values are not printed; the paper runs {RUN_TIME:g} s", headings, rows)
@@ -174,7 +174,7 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     }
 
 
-def resonance(speeds_kmh: Mapping[str, float]) -> Table:
+def resonance_table(speeds_kmh: Mapping[str, float]) -> Table:
     """The landmarks, in words."""
     rows = tuple((name, f"{speed:.0f}") for name, speed in speeds_kmh.items())
     return Table("Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N", ("what", "km/h"), rows)
