@@ -34,7 +34,7 @@ lint: $(READY)
 test: $(READY) lint
 	$(BIN)/pytest -n auto -m 'not slow'
 
-# Slow proofs: more lines against the finite-element judge, longer trainings.
+# Slow proofs: more lines against finite elements, longer trainings.
 proofs: $(READY)
 	$(BIN)/pytest -n auto -m slow
 

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from panto_env.base.errors import InputError
+from panto_env.metrics.labels import LABELS
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
 
 if TYPE_CHECKING:
@@ -17,16 +18,17 @@ if TYPE_CHECKING:
 
 REQUIRED_PACKAGES = ("torch", "stable_baselines3", "tensorboard")
 ROWS = (
-    ("mean", "mean force F_m (N)", 1.0),
-    ("std", "standard deviation σ (N)", 1.0),
-    ("max", "maximum (N)", 1.0),
-    ("min", "minimum (N)", 1.0),
-    ("cost_function", "cost function CF (N m)", 1.0),
-    ("contact_loss", "contact loss CL (%)", 1.0),
-    ("max_uplift", "maximum uplift (mm)", 1e3),
-    ("effort", "actuator force, rms (N)", 1.0),
-    ("effort_rate", "its rate, rms (N/s)", 1.0),
+    "mean",
+    "std",
+    "max",
+    "min",
+    "cost_function",
+    "contact_loss",
+    "max_uplift",
+    "effort",
+    "effort_rate",
 )
+"""Figures that `panto evaluate` prints."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
@@ -139,14 +141,15 @@ def _print_pairs(pairs: list[Pair]) -> None:
     for speed in sorted({pair.speed_kmh for pair in pairs}):
         pairs_here = [pair for pair in pairs if pair.speed_kmh == speed]
         table.add_section()
-        for key, label, scale in ROWS:
+        for key in ROWS:
+            label = LABELS[key]
             policy, passive = (
-                scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
+                label.scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
                 for column in ([pair.policy for pair in pairs_here], [pair.passive for pair in pairs_here])
             )
             change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 else ""
-            first = f"{speed:g}" if key == ROWS[0][0] else ""
-            table.add_row(first, label, number(policy), number(passive), change)
+            first = f"{speed:g}" if key == ROWS[0] else ""
+            table.add_row(first, label.heading, number(policy), number(passive), change)
         ended_early = sum(pair.terminated for pair in pairs_here)
         out_of_range = sum(not pair.qualified and not pair.terminated for pair in pairs_here)
         notes = [f"{ended_early} ended early"] * (ended_early > 0)

@@ -13,6 +13,7 @@ from panto_baselines.benchmark.run import FIRST_SPAN
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
 from panto_env.metrics.figures import Figures
+from panto_env.metrics.spans import last_whole_span
 
 NOT_OF_A_PASS = ("speed_kmh", "reward")
 """Arguments of an environment that a pass does not take over: it has a speed of its own and no reward."""
@@ -101,8 +102,8 @@ def pair(active: Trajectory, passive: Trajectory) -> Pair:
 
 def evaluated_spans(run: Trajectory) -> tuple[int, int] | None:
     """First and last span after the run-in, counted from 1; None (all spans) where the run is too short."""
-    covered = run.position[-1] + run.position[0]  # positions are those of the steps' middles
-    last = math.floor(covered / run.span_length + 1e-9)
+    covered = float(run.position[-1] + run.position[0])  # positions are those of the steps' middles
+    last = last_whole_span(covered, run.span_length, tolerance=1e-9)
     return (FIRST_SPAN, last) if last >= FIRST_SPAN else None
 
 

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .base import plugins
 from .base.errors import InputError
 from .base.settings import suggest
 from .control.context import Context
-
-POLICIES = "panto_env.policies"
-"""Entry-point group: a name and a callable that makes a policy, with keyword parameters."""
-LOADERS = "panto_env.policy_loaders"
-"""Entry-point group: a file suffix without its dot and a callable that loads a policy from a path."""
 
 
 class Policy(Protocol):
@@ -43,41 +37,30 @@ def find_policy(source: Any) -> Policy:
             f"A policy must have the methods reset and act, or be a name; {source!r} is neither."
         )
     name, _, parameters = str(source).partition(":")
-    known = {point.name: point for point in entry_points(group=POLICIES)}
+    known = plugins.installed(plugins.POLICIES)
     if name in known:
-        maker = _load(known[name])
+        maker = plugins.load(known[name])
         try:
             policy: Policy = maker(**_parameters(str(source), parameters))
         except (TypeError, ValueError) as error:
             raise InputError(f"Policy '{source}' cannot be made: {error}.") from error
         return policy
     path = Path(source)
-    loaders = {point.name: point for point in entry_points(group=LOADERS)}
+    loaders = plugins.installed(plugins.LOADERS)
     if path.suffix[1:] in loaders:
         if not path.is_file():
             raise InputError(f"The model file {path} does not exist; check the path.")
-        loaded: Policy = _load(loaders[path.suffix[1:]])(path)
+        loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
         return loaded
     raise InputError(
-        f"Unknown policy '{source}': {suggest(name, sorted(known))}; or give the path of a model file "
-        f"(.{', .'.join(sorted(loaders))})."
+        f"Unknown policy '{source}': {suggest(name, list(known))}; or give the path of a model file "
+        f"(.{', .'.join(loaders)})."
     )
 
 
 def policy_names() -> list[str]:
     """Names of all installed policies."""
-    return sorted(point.name for point in entry_points(group=POLICIES))
-
-
-def _load(point: EntryPoint) -> Callable[..., Any]:
-    try:
-        loaded: Callable[..., Any] = point.load()
-        return loaded
-    except ImportError as error:
-        raise InputError(
-            f"'{point.name}' needs a package that is not installed ({error}); "
-            "install panto-env with the extra 'agents'."
-        ) from error
+    return list(plugins.installed(plugins.POLICIES))
 
 
 def _parameters(source: str, text: str) -> dict[str, Any]:

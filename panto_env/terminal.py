@@ -7,10 +7,12 @@ import math
 import sys
 from typing import Annotated, Any
 
+import rich.table
 import typer
 from rich.console import Console
 
 from .base.files import finite
+from .base.table import Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 Plot = Annotated[str | None, typer.Option(help="Write a picture to this file (.png, .svg, .pdf).")]
@@ -23,6 +25,16 @@ def print_json(value: Any) -> None:
     """Print JSON to standard output; figures that are not numbers become null."""
     json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=False)
     sys.stdout.write("\n")
+
+
+def print_table(table: Table) -> None:
+    """Print a table to standard output; cells may hold markup of Rich."""
+    shown = rich.table.Table(title=table.title)
+    for column, heading in enumerate(table.headings):
+        shown.add_column(heading, justify="left" if column < table.text_columns else "right")
+    for row, cells in enumerate(table.cells):
+        shown.add_row(*cells, end_section=row in table.section_ends)
+    console.print(shown)
 
 
 def number(value: float, digits: int = 1) -> str:

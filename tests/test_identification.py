@@ -7,11 +7,11 @@ from panto_env.catalog import load_pantograph
 from panto_env.identification import (
     EXPERIMENTS,
     FILTERED,
+    FREQUENCY_SWEEP,
     IDENTIFIED,
     MEASURED,
     OUTPUT_ERROR,
     PRINTED,
-    SWEEP,
     Record,
     add_noise,
     clean_record,
@@ -24,7 +24,6 @@ from panto_env.identification import (
     low_pass,
     matches,
     parameters_of,
-    pool,
     run_trials,
     three_points,
 )
@@ -35,7 +34,7 @@ from panto_env.plant.pantograph import build as pantograph
 TRUTH = parameters_of(load_pantograph("identified-2dof"))
 KNOWN = {name: TRUTH[name] for name in MEASURED}
 TRUE = np.array([TRUTH[name] for name in IDENTIFIED])
-ALL = [*EXPERIMENTS, SWEEP]
+ALL = [*EXPERIMENTS, FREQUENCY_SWEEP]
 
 
 def name_of(excitation):
@@ -60,7 +59,7 @@ def test_three_points_are_eq_7():
 
 
 def test_equations_hold_for_the_true_parameters():
-    record = clean_record(SWEEP, TRUTH, time_step=1e-4, duration=2.0)
+    record = clean_record(FREQUENCY_SWEEP, TRUTH, time_step=1e-4, duration=2.0)
     a, y = equations(record, KNOWN)
     np.testing.assert_allclose(a @ TRUE, y, atol=2e-4 * np.abs(y).max())
     wrong = a @ (TRUE * [1, 1, 1.05, 1, 1])
@@ -104,7 +103,7 @@ def test_error_of_three_points_falls_with_the_square_of_the_step():
 
 
 def test_noise_ruins_the_printed_equations_and_the_low_pass_mends_them():
-    record = add_noise(clean_record(SWEEP, TRUTH), np.random.default_rng(0))
+    record = add_noise(clean_record(FREQUENCY_SWEEP, TRUTH), np.random.default_rng(0))
     found = identify(record, KNOWN, free_offset=True)
     m3, k3 = IDENTIFIED.index("m3"), IDENTIFIED.index("k3")
     assert found.fits[PRINTED].values[m3] < 0.2 * TRUTH["m3"]  # attenuation by noise in the derivatives
@@ -115,7 +114,7 @@ def test_noise_ruins_the_printed_equations_and_the_low_pass_mends_them():
 
 
 def test_output_error_goes_to_the_truth_as_noise_goes_to_zero():
-    clean = clean_record(SWEEP, TRUTH)
+    clean = clean_record(FREQUENCY_SWEEP, TRUTH)
     errors = []
     for level in (1e-6, 1e-8, 1e-10):
         record = add_noise(clean, np.random.default_rng(1), displacement=level)
@@ -174,7 +173,7 @@ def test_band_that_does_not_fit_is_refused(band, message):
 
 
 def test_fitting_performance_is_100_for_the_truth_and_less_for_others():
-    record = clean_record(SWEEP, TRUTH)
+    record = clean_record(FREQUENCY_SWEEP, TRUTH)
     for match in matches(record, TRUTH):
         assert match.performance > 99.99, (match.channel, match.driven_by)
     soft = force_matches(record, TRUTH | {"k3": 500.0})
@@ -210,10 +209,9 @@ def test_missing_measured_value_is_named():
 
 @pytest.mark.slow
 def test_true_parameters_lie_inside_their_intervals_in_90_per_cent_of_200_records():
-    tasks = [(each, False) for each in EXPERIMENTS] + [(SWEEP, True)]
-    with pool() as executor:
-        found = run_trials(tasks, TRUTH, 200, executor)
-    for (excitation, _), methods in zip(tasks, found, strict=True):
+    experiments = [(each, False) for each in EXPERIMENTS] + [(FREQUENCY_SWEEP, True)]
+    found = run_trials(experiments, TRUTH, 200)
+    for (excitation, _), methods in zip(experiments, found, strict=True):
         assert (methods[OUTPUT_ERROR].coverage >= 90).all(), excitation.name
         # The paper's estimator is biased by noise: this is the finding, not a wish.
         assert methods[PRINTED].coverage.min() == 0

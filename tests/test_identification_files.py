@@ -11,7 +11,7 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
 from panto_env.identification import (
     EXPERIMENTS,
-    SWEEP,
+    FREQUENCY_SWEEP,
     add_noise,
     clean_record,
     parameters_of,
@@ -32,7 +32,7 @@ def panto(*arguments, cwd=None):
 @pytest.fixture(scope="module")
 def sweep(tmp_path_factory):
     path = tmp_path_factory.mktemp("rig") / "sweep.csv"
-    write_record(add_noise(clean_record(SWEEP, TRUTH), np.random.default_rng(0)), path)
+    write_record(add_noise(clean_record(FREQUENCY_SWEEP, TRUTH), np.random.default_rng(0)), path)
     return path
 
 

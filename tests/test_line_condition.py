@@ -10,22 +10,22 @@ from scipy.sparse.linalg import splu
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
-from panto_env.plant.catenary.flexible import build as flexible
+from panto_env.control.settings import run_settings
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.parts import rise_by_defects
 from panto_env.plant.catenary.flexible.schema import Rayleigh
-from panto_env.plant.line_condition import LineCondition, draw
+from panto_env.plant.catenary.flexible.wires import rise_by_defects
+from panto_env.plant.line_condition import DrawnLine, LineCondition, draw
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 
-from .judge import finite_element
-from .judge.system import build
+from .finite_element import simulation as finite_element
+from .finite_element.system import build
 from .test_flexible import WHOLE, travel
 
 EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
 
 
-def judged(system, line, condition, load=None, scatter=0.0):
+def static_by_finite_elements(system, line, condition, load=None, scatter=0.0):
     """Static state by finite elements and NNLS on the tensions: all unknowns (m), tensions (N)."""
     each = len(line.droppers.positions)
     stiffness, k, static = system.stiffness, system.dropper_stiffness, system.dropper_tension
@@ -70,7 +70,7 @@ def test_static_state_agrees_with_finite_elements(name):
         condition = LineCondition(**keywords)
         line = DefectiveLine(data, 6, condition)
         state = line.solve()
-        change, tension = judged(system, data, condition)
+        change, tension = static_by_finite_elements(system, data, condition)
         contact = change.reshape(-1, 4)[:, 2]
         np.testing.assert_allclose(state.tension, tension, atol=0.05)
         np.testing.assert_allclose(rise(line, state, system.nodes), contact, atol=1e-5)
@@ -84,7 +84,7 @@ def test_many_slack_droppers_agree_with_finite_elements(name):
     for seed in range(5):
         scatter = draw([condition], np.random.default_rng(seed), 54).scatter
         state = line.solve(scatter)
-        change, tension = judged(system, data, condition, scatter=scatter)
+        change, tension = static_by_finite_elements(system, data, condition, scatter=scatter)
         np.testing.assert_allclose(state.tension, tension, atol=0.5)
         np.testing.assert_allclose(rise(line, state, system.nodes), change.reshape(-1, 4)[:, 2], atol=1e-4)
         assert 1 < (tension == 0).sum() == (state.tension == 0).sum() == (state.gap > 0).sum()
@@ -139,12 +139,12 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     for force in (0.0, -10.0, -200.0):
         load = np.zeros(system.free.size)
         load[4 * node + 2] = force
-        change, tension = judged(system, data, condition, load)
-        flexible.settle(plant.line, plant.wire, 0, 0.0)
-        travel(plant.line, plant.wire, at, 0.0, force, heights)
+        change, tension = static_by_finite_elements(system, data, condition, load)
+        plant.model.settle(0, DrawnLine(condition), 0.0)
+        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights)
         static = float(system.static[node, 0] + change[4 * node + 2])
         assert heights[-1] == pytest.approx(static, abs=2e-4)
-        ours = plant.line.dropper_static[0] + plant.wire.change[0]
+        ours = plant.model.line.link_static[0] + plant.model.wire.change[0]
         np.testing.assert_allclose(ours, tension, atol=1.5)
         slack.append(ours[2 * 9 + 3] == 0)
     assert slack == [True, True, False]
@@ -158,13 +158,13 @@ def test_dropper_far_too_long_is_as_good_as_broken():
     assert (broken.dropper_force[:, 3 * 9 + 4] == 0).all()
 
 
-def test_contact_force_over_a_broken_dropper_agrees_with_the_judge(monkeypatch):
+def test_contact_force_over_a_broken_dropper_agrees_with_finite_elements(monkeypatch):
     """Its finite elements, less the dropper, about their own static state without it."""
     data, condition = load_catenary(EN50318), LineCondition(broken_droppers=[(4, 5)])
 
     def broken(*arguments):
         system = build(*arguments)
-        change, tension = judged(system, data, condition)
+        change, tension = static_by_finite_elements(system, data, condition)
         gone = 3 * 9 + 4
         cut, kept = system.extension[[gone]], np.delete(np.arange(len(tension)), gone)
         spring = system.dropper_stiffness[gone] * (cut.T @ cut)
@@ -180,14 +180,14 @@ def test_contact_force_over_a_broken_dropper_agrees_with_the_judge(monkeypatch):
         )
 
     monkeypatch.setattr(finite_element, "build", broken)
-    judge = finite_element.simulate(
+    other = finite_element.simulate(
         data, load_pantograph(EN50318), 300.0, element=0.5, time_step=5e-4, distance=301.0
     )
     fine = {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE
     near = np.linspace(3.2 * 60, 300, 2000)
     runs = [simulate(line_condition=c, distance=301.0, spans=10, **fine) for c in (condition, "new")]
     ours, intact = (np.interp(near, run.position, run.contact_force) for run in runs)
-    theirs = np.interp(near, judge.position, judge.contact_force)
+    theirs = np.interp(near, other.position, other.contact_force)
     assert (ours - theirs).std() < 3.0
     assert (intact - theirs).std() > 10.0
 
@@ -245,10 +245,10 @@ def test_untouched_line_runs_exactly_as_an_intact_one(condition, window):
 
 def test_lanes_with_droppers_of_their_own_equal_single_runs_bit_for_bit():
     settings = {"line_condition": {"irregularity": 1.0, "dropper_scatter": 0.005}, "spans": 12}
-    batch = Task(lanes=2, record_droppers=True, **settings)
+    batch = Task(run_settings(settings), lanes=2, record_droppers=True)
     for lane in range(2):
         batch.reset(lane, np.random.default_rng(lane))
-    batch.coast()
+    batch.run_passively()
     alone = [simulate(seed=seed, **settings) for seed in range(2)]
     for lane in range(2):
         run = batch.trajectory(lane)
@@ -280,11 +280,11 @@ def test_scatter_is_drawn_after_the_phases():
 )
 def test_defects_that_the_line_cannot_have_are_refused(condition, message):
     with pytest.raises(InputError, match=message):
-        Task(line_condition=condition)
+        Task(run_settings({"line_condition": condition}))
 
 
 @pytest.mark.parametrize("line", ["ohl-three-span", "periodic-stiffness"])
 @pytest.mark.parametrize("condition", [{"broken_droppers": [(1, 1)]}, {"dropper_scatter": 1e-3}])
 def test_only_a_flexible_catenary_has_defects(line, condition):
     with pytest.raises(InputError, match="Only a flexible catenary"):
-        Task(catenary=line, line_condition=condition)
+        Task(run_settings({"catenary": line, "line_condition": condition}))

@@ -1,8 +1,14 @@
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from panto_env import InputError
-from panto_env.metrics import figures as metrics
+from panto_env.metrics import en50367
+from panto_env.metrics.figures import Figures, contact_loss, cost_function
+from panto_env.metrics.labels import LABELS
+from panto_env.metrics.low_pass import low_pass
+from panto_env.metrics.spans import last_whole_span, limits, within
 
 
 def test_low_pass_keeps_slow_and_stops_fast_waves():
@@ -10,19 +16,19 @@ def test_low_pass_keeps_slow_and_stops_fast_waves():
     slow, fast = np.sin(2 * np.pi * 2 * time), np.sin(2 * np.pi * 60 * time)
     edge = np.sin(2 * np.pi * 20 * time)
     steady = slice(2000, None)
-    assert metrics.low_pass(slow, 1e-3)[steady].std() == pytest.approx(slow.std(), rel=1e-3)
-    assert metrics.low_pass(fast, 1e-3)[steady].std() < 2e-3
+    assert low_pass(slow, 1e-3)[steady].std() == pytest.approx(slow.std(), rel=1e-3)
+    assert low_pass(fast, 1e-3)[steady].std() < 2e-3
     # -3 dB at the cut-off
-    assert metrics.low_pass(edge, 1e-3)[steady].std() == pytest.approx(edge.std() / 2**0.5, rel=1e-2)
+    assert low_pass(edge, 1e-3)[steady].std() == pytest.approx(edge.std() / 2**0.5, rel=1e-2)
 
 
 def test_low_pass_starts_settled():
-    assert metrics.low_pass(np.full(100, 120.0), 1e-3) == pytest.approx(120.0)
+    assert low_pass(np.full(100, 120.0), 1e-3) == pytest.approx(120.0)
 
 
 def test_low_pass_refuses_samples_too_far_apart():
     with pytest.raises(InputError, match="cannot be low-passed at 20 Hz"):
-        metrics.low_pass(np.ones(10), 0.025)
+        low_pass(np.ones(10), 0.025)
 
 
 def test_cost_function_is_eq_14_written_out():
@@ -30,17 +36,41 @@ def test_cost_function_is_eq_14_written_out():
     expected = sum(
         speed_kmh / 3.6 * step / 2 * (abs(force[i] - nominal) + abs(force[i + 1] - nominal)) for i in range(3)
     )
-    assert metrics.cost_function(force, nominal, speed_kmh / 3.6 * step) == pytest.approx(expected)
+    assert cost_function(force, nominal, speed_kmh / 3.6 * step) == pytest.approx(expected)
 
 
 def test_contact_loss_is_a_share_of_distance():
-    assert metrics.contact_loss(np.array([0.0, 1.0, 0.0, 5.0])) == 50.0
+    assert contact_loss(np.array([0.0, 1.0, 0.0, 5.0])) == 50.0
 
 
 def test_en50367_limits_at_both_sides_of_their_speeds():
-    figures = metrics.Figures(100, 31, 0, 0, 320, 0, 0, 0.15, 0, 0, 0, 100)
-    slow = metrics.en50367_checks(figures, 190 / 3.6)
-    fast = metrics.en50367_checks(figures, 280 / 3.6)
+    figures = Figures(100, 31, 0, 0, 320, 0, 0, 0.15, 0, 0, 0, 100)
+    slow = en50367.checks(figures, 190 / 3.6)
+    fast = en50367.checks(figures, 280 / 3.6)
     assert (slow["max"], slow["contact_loss"]) == (False, False)
     assert (fast["max"], fast["contact_loss"]) == (True, True)
     assert not fast["std"]
+
+
+def test_limit_of_the_maximum_changes_above_200_kmh():
+    assert [en50367.maximum_limit(speed / 3.6) for speed in (190, 200, 205, 300)] == [300, 300, 350, 350]
+
+
+def test_every_figure_has_its_label():
+    assert list(LABELS) == [field.name for field in fields(Figures)]
+    assert LABELS["max_uplift"].heading == "maximum uplift at the supports (mm)"
+    assert LABELS["contact_loss"].column == "CL\n(%)"
+
+
+def test_spans_begin_at_a_support_and_end_before_the_next():
+    position = np.array([0.0, 49.9, 50.0, 99.9, 100.0, 149.9, 150.0])
+    assert limits((2, 3), 50.0) == (50.0, 150.0)
+    assert within(position, (2, 3), 50.0).tolist() == [False, False, True, True, True, True, False]
+    assert within(position, (1, 1), 50.0).sum() == 2
+
+
+def test_last_whole_span_takes_nearly_whole_ones_only_where_asked():
+    assert last_whole_span(539.9, 60.0) == 8
+    assert last_whole_span(540.0, 60.0) == 9
+    nearly = 540.0 * (1 - 1e-12)
+    assert (last_whole_span(nearly, 60.0), last_whole_span(nearly, 60.0, tolerance=1e-9)) == (8, 9)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.control.settings import run_settings
 from panto_env.control.task import Task
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
@@ -31,7 +32,7 @@ from panto_env.studies.paper1_control.cases import (
     sampled,
 )
 from panto_env.studies.paper1_control.linear import amplification
-from panto_env.studies.paper1_control.passes import band_rms, longest, pressed, records, run
+from panto_env.studies.paper1_control.passes import band_rms, longest, passive_at_mean, records, run
 
 # --- helpers -------------------------------------------------------------------------------------
 
@@ -42,7 +43,7 @@ def test_the_policy_is_named_with_the_parameters_that_are_meant() -> None:
     assert (policy.reading, policy.speed_unit) == ("printed", "m/s")  # type: ignore[attr-defined]
 
 
-def test_the_sweep_goes_once_round_and_meets_the_papers_angle() -> None:
+def test_the_angles_go_once_round_and_meet_the_papers() -> None:
     assert sorted(wrap(theta) for theta in THETAS) == pytest.approx(np.linspace(-11, 12, 24) * math.pi / 12)
     assert min(abs(theta - math.pi / 6) for theta in THETAS) < 1e-12
     assert wrap(1.5 * math.pi) == pytest.approx(-0.5 * math.pi)
@@ -111,8 +112,8 @@ def test_amplification_follows_the_papers_equations_of_motion(
     assert amplification(frequency, gain, damping) == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_pressed_pantograph_has_the_mean_asked_for_and_the_same_nominal_force() -> None:
-    result = pressed(400, 48.0)
+def test_the_passive_pantograph_has_the_mean_asked_for_and_the_same_nominal_force() -> None:
+    result = passive_at_mean(400, 48.0)
     assert result.figures.mean == pytest.approx(48.0, abs=0.1)
     assert result.mean_deviation > 54 - 48.0  # CF counts from 54 N, not from the larger static force
 
@@ -197,9 +198,9 @@ def test_half_of_the_loss_at_400_kmh_is_saved_by_pressing_harder_alone(outcome: 
     found = table(outcome, "Control and its parts")
     rows = {row[0]: row for row in found.rows if row[1] == "400"}
     loss, mean = found.headings.index("CL (%)"), found.headings.index("F_m (N)")
-    alike, active = rows["passive, pressed to that mean"], rows[f"FB+FF, gain {GAIN}"]
-    assert alike[mean] == active[mean]
-    assert float(alike[loss]) == pytest.approx(3.11, abs=0.3)
+    passive, active = rows["passive, pressed to that mean"], rows[f"FB+FF, gain {GAIN}"]
+    assert passive[mean] == active[mean]
+    assert float(passive[loss]) == pytest.approx(3.11, abs=0.3)
 
 
 @pytest.mark.slow

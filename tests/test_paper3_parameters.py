@@ -183,9 +183,9 @@ def test_landmarks_over_speed(outcome):
 
 
 def test_each_figure_shows_the_papers_way_and_its_numbers_are_kept(outcome, tmp_path):
-    assert [int(name[3:5]) for name in outcome.figures] == list(range(4, 14))
-    assert set(outcome.figures) == set(outcome.numbers["figures"])
-    for name, figure in outcome.figures.items():
+    assert [int(name[3:5]) for name in outcome.plots] == list(range(4, 14))
+    assert set(outcome.plots) == set(outcome.numbers["figures"])
+    for name, figure in outcome.plots.items():
         (axis,) = figure.axes
         assert axis.get_xlim() == (500, 600)
         solid = [line for line in axis.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2]

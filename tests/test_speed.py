@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 import panto_env
-import panto_env.studies.throughput.measure as measured
-from panto_env.analysis.plots import plot_speed
 from panto_env.base import machine
+from panto_env.base.errors import InputError
 from panto_env.cli import speed
-from panto_env.studies.throughput import tables as speed_tables
+from panto_env.studies.throughput import environments, study, tables
+from panto_env.studies.throughput.plots import plot_speed
 
 ROOT = Path(panto_env.__file__).parents[1]
 chooses_cores = pytest.mark.skipif(
@@ -51,7 +51,7 @@ def test_cost_is_measured_over_spans_modes_grid_and_cores(result):
     if machine.CAN_CHOOSE_CORES:
         counts = {row["cores"] for row in scaling["cores"]}
         assert {1, machine.cores()} <= counts
-        assert len(scaling["cores"]) == len(measured.SHARED) * len(counts)
+        assert len(scaling["cores"]) == len(environments.SHARED) * len(counts)
 
 
 @chooses_cores
@@ -79,28 +79,28 @@ def shape(text):
 @pytest.mark.parametrize(("document", "section"), [("README.md", 0), ("docs/speed.md", 1)])
 def test_documents_hold_what_the_command_prints(result, document, section):
     text = (ROOT / document).read_text(encoding="utf-8")
-    begin, end = speed_tables.BEGIN, speed_tables.END
+    begin, end = tables.BEGIN, tables.END
     assert text.count(begin) == 1
     block = begin + text.partition(begin)[2].partition(end)[0] + end
-    assert shape(block) == shape(speed_tables.markdown(result)[section])
+    assert shape(block) == shape(tables.markdown(result)[section])
 
 
 def test_markdown_is_printed_unbroken(result, monkeypatch, capsys):
-    monkeypatch.setattr(measured, "measure", lambda repeats, report: result)
+    monkeypatch.setattr(study, "run", lambda repeats, report: result)
     speed.speed(markdown=True)
-    assert capsys.readouterr().out == "\n".join(speed_tables.markdown(result))
+    assert capsys.readouterr().out == "\n".join(tables.markdown(result))
     speed.speed()
     assert "yardstick" in capsys.readouterr().out
 
 
 def test_where_cores_cannot_be_chosen_a_sentence_says_so(result, monkeypatch):
-    monkeypatch.setattr(measured, "CAN_CHOOSE_CORES", False)
-    assert measured._over_cores(1, lambda _: None) == []
+    monkeypatch.setattr(environments, "CAN_CHOOSE_CORES", False)
+    assert environments.by_cores(1, lambda _: None) == []
     without = result | {"scaling": result["scaling"] | {"cores": []}}
-    assert "does not let a process choose its cores" in speed_tables.markdown(without)[1]
+    assert "does not let a process choose its cores" in tables.markdown(without)[1]
     assert not plot_speed(without).axes[3].lines
 
 
 def test_two_forms_at_once_are_refused():
-    with pytest.raises(panto_env.errors.InputError, match="one of --json and --markdown"):
+    with pytest.raises(InputError, match="one of --json and --markdown"):
         speed.speed(json=True, markdown=True)

@@ -236,7 +236,7 @@ def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
 
 
 def test_plot_shows_what_varies():
-    from panto_env.analysis.plots import plot_sweep
+    from panto_env.analysis.sweep_plots import plot_sweep
 
     rows = sweep(
         {"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3, policies=[None, "p"]

@@ -5,29 +5,29 @@ import pytest
 from panto_env import simulate
 from panto_env.cli import validate
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318 import study as validation
+from panto_env.studies.en50318 import convergence, reference, wear
 
-from .judge import __main__ as judge
+from .finite_element import __main__ as comparison
 
 
 def test_numerics_in_use_are_those_that_a_run_takes():
-    used = validation.in_use(Numerics())
+    used = convergence.in_use(Numerics())
     assert (used.spacing, used.time_step) == (0.375, 2.5e-3)
     default, told = simulate(distance=120.0), simulate(distance=120.0, **used.model_dump())
     assert default.time_step == used.time_step
     assert (default.contact_force == told.contact_force).all()
     asked = Numerics(spacing=0.25, time_step=1e-3, window=9, precision="double")
-    assert validation.in_use(asked) == asked
+    assert convergence.in_use(asked) == asked
 
 
 @pytest.fixture
 def short(monkeypatch):
     """Tables of one row."""
-    monkeypatch.setattr(validation, "DISCRETISATIONS", (Numerics(),))
-    monkeypatch.setattr(validation, "CONVERGENCE_SPEEDS_KMH", (300.0,))
-    monkeypatch.setattr(validation, "WEAR", validation.WEAR[:1])
-    monkeypatch.setattr(validation, "WEAR_DISCRETISATIONS", (Numerics(),))
-    monkeypatch.setattr(validation, "WEAR_SEEDS", 2)
+    monkeypatch.setattr(convergence, "DISCRETISATIONS", (Numerics(),))
+    monkeypatch.setattr(convergence, "SPEEDS_KMH", (300.0,))
+    monkeypatch.setattr(wear, "CONDITIONS", wear.CONDITIONS[:1])
+    monkeypatch.setattr(wear, "DISCRETISATIONS", (Numerics(),))
+    monkeypatch.setattr(wear, "SEEDS", 2)
 
 
 def row_of(output, first):
@@ -49,24 +49,22 @@ def test_json_holds_the_same_tables(short, capsys):
     told = json.loads(capsys.readouterr().out)
     (converged,), (worn,) = told["convergence"], told["wear"]
     assert (converged["spacing"], converged["time_step"]) == (worn["spacing"], worn["time_step"])
-    assert converged["std"] == simulate().summary(validation.SPANS).std
+    assert converged["std"] == simulate().summary(reference.SPANS).std
     assert worn["std"][1] > 0
 
 
-def test_judge_prints_the_default_s_grid_and_step(monkeypatch, capsys):
-    monkeypatch.setattr(judge, "JUDGE", ())
-    monkeypatch.setattr(judge, "OURS", (Numerics(),))
+def test_finite_elements_are_compared_with_the_default_s_grid_and_step(monkeypatch, capsys):
+    monkeypatch.setattr(comparison, "FINITE_ELEMENTS", ())
+    monkeypatch.setattr(comparison, "OURS", (Numerics(),))
     monkeypatch.setenv("COLUMNS", "120")
-    judge.main()
+    comparison.main()
     assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.375", "2.5"]
 
 
 def test_a_long_step_keeps_low_passed_figures_on_a_worn_line_and_loses_contact_loss():
     """What docs/validation.md says of waves of 0.8 m, of the preset's depth and of 2 mm."""
-    fine, *_, default = validation.WEAR_DISCRETISATIONS
-    preset, deep, short = (
-        [validation.check_wear(each, n) for n in (fine, default)] for each in validation.WEAR
-    )
+    fine, *_, default = wear.DISCRETISATIONS
+    preset, deep, short = ([wear.check_wear(each, n) for n in (fine, default)] for each in wear.CONDITIONS)
     for true, ours in (preset, deep, short):
         assert ours.std[0] == pytest.approx(true.std[0], rel=0.005)
         assert ours.max[0] == pytest.approx(true.max[0], abs=1.0)

@@ -48,7 +48,7 @@ def benchmark(
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    from panto_env.analysis.plots import check_picture, save
+    from panto_env.analysis.plots import check_plot, save
 
     from .plot import plot as draw
     from .report import WIDTH, tables
@@ -66,7 +66,7 @@ def benchmark(
     if output is not None:
         check_format(output)
     if plot is not None:
-        check_picture(plot)
+        check_plot(plot)
     columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(
         *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
-from panto_env.metrics.figures import low_pass
+from panto_env.metrics.labels import LABELS
+from panto_env.metrics.low_pass import low_pass
+from panto_env.metrics.spans import limits, within
 
 from .run import Benchmark
 from .settings import Line
@@ -44,12 +46,13 @@ def _cells_of(outcome: Benchmark, line: Line) -> list[Cell]:
 
 
 def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str]) -> None:
-    settings, line, (first, last) = outcome.settings, outcome.settings.lines[place], outcome.spans[place]
+    settings, line = outcome.settings, outcome.settings.lines[place]
     speed, seed = max(line.speeds_kmh), settings.seeds[0]
-    first = max(first, last - 1)
+    first, last = outcome.spans[place]
+    shown = max(first, last - 1), last
     for policy, colour in colours.items():
         run, _ = drive(settings, line, policy, speed, seed)
-        inside = (run.position >= (first - 1) * run.span_length) & (run.position <= last * run.span_length)
+        inside = within(run.position, shown, run.span_length)
         force = low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
@@ -58,7 +61,7 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         title=f"{line.pantograph} on {line.catenary} at {speed:g} km/h, seed {seed}",
         xlabel="position (m); grey lines: supports",
         ylabel="contact force, below 20 Hz (N)",
-        xlim=((first - 1) * run.span_length, last * run.span_length),
+        xlim=limits(shown, run.span_length),
     )
     axes.legend(ncols=len(colours) + 1, loc="upper center", fontsize="small", frameon=False)
     axes.set_ylim(top=axes.get_ylim()[1] + 0.12 * np.ptp(axes.get_ylim()))
@@ -78,7 +81,7 @@ def _sigmas(axes: Axes, line: Line, cells: list[Cell], colours: dict[str, str]) 
     axes.set(
         title=f"{line.pantograph} on {line.catenary}",
         xlabel="speed (km/h)",
-        ylabel="standard deviation σ (N)",
+        ylabel=LABELS["std"].heading,
         xticks=sorted(line.speeds_kmh),
     )
     axes.set_ylim(bottom=0)

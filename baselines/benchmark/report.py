@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
 from .run import Benchmark
@@ -16,17 +17,18 @@ from .statistics import Cell
 
 WIDTH = 120
 """Columns that a table needs; in a narrower terminal the policies' names are folded."""
-FIGURES = (  # heading, name, factor from SI, decimals
-    ("CF\n(N m)", "cost_function", 1, 0),
-    ("CL\n(%)", "contact_loss", 1, 2),
-    ("F_m\n(N)", "mean", 1, 1),
-    ("σ\n(N)", "std", 1, 2),
-    ("max\n(N)", "max", 1, 0),
-    ("min\n(N)", "min", 1, 0),
-    ("uplift\n(mm)", "max_uplift", 1e3, 0),
-    ("effort\n(N)", "effort", 1, 1),
-    ("rate\n(N/s)", "action_rate", 1, 0),
-)
+FIGURES = {  # and their decimals
+    "cost_function": 0,
+    "contact_loss": 2,
+    "mean": 1,
+    "std": 2,
+    "max": 0,
+    "min": 0,
+    "max_uplift": 0,
+    "effort": 1,
+    "action_rate": 0,
+}
+ACTION_RATE = Label("rate of the commanded force, rms", "rate", "N/s")
 SIGMA = "std"
 LEGEND = (
     "Interquartile means over the seeds; Δσ against passive, pass by pass, with its 95 % bootstrap "
@@ -52,16 +54,16 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     table.add_column("km/h", justify="right")
     table.add_column("policy", overflow="fold")
     table.add_column("rank", justify="right")
-    for heading, name, _, _ in FIGURES:
-        table.add_column(heading, justify="right")
+    for name in FIGURES:
+        table.add_column(_label(name).column, justify="right")
         if name == SIGMA:
             table.add_column("Δσ\n(N)", justify="right", no_wrap=True)
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
             values = []
-            for _, name, factor, decimals in FIGURES:
-                values.append(number(factor * cell.figures[name], decimals))
+            for name, decimals in FIGURES.items():
+                values.append(number(_label(name).scale * cell.figures[name], decimals))
                 if name == SIGMA:
                     values.append(_std_change(cell))
             rank = "–" if cell.rank is None else str(cell.rank)
@@ -72,6 +74,10 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
                 disqualifications.append(Text(sentence, style="red"))
         table.add_section()
     return [table, *disqualifications]
+
+
+def _label(name: str) -> Label:
+    return ACTION_RATE if name == "action_rate" else LABELS[name]
 
 
 def _std_change(cell: Cell) -> str:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from panto_env.analysis.pool import Progress, in_processes, one_by_one
 from panto_env.base.errors import InputError
-from panto_env.base.files import TABLES, write_rows, write_whole
+from panto_env.base.files import TABLES, finite, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.metrics.spans import last_whole_span
 from panto_env.policies import find_policy
 
 from .settings import BenchmarkSettings, Line
@@ -26,8 +24,6 @@ from .statistics import Cell, compare
 FIRST_SPAN = 4
 """First span that is evaluated by default: the three before it are the run-in from rest."""
 FORMATS = (".json", *TABLES)
-Progress = Callable[[int, int], None]
-Job = tuple[BenchmarkSettings, Line, tuple[int, int], str, float, int]
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ class Benchmark:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, ready for JSON: nan becomes None."""
-        table: dict[str, Any] = _plain(
+        table: dict[str, Any] = finite(
             {
                 "settings": self.settings.model_dump(mode="json"),
                 "spans": self.spans,
@@ -77,15 +73,18 @@ def run(
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy)
     spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
-    jobs: list[Job] = [
-        (settings, line, covered, policy, speed, seed)
+    jobs = [
+        partial(run_pass, settings, line, covered, policy, speed, seed)
         for line, covered in zip(settings.lines, spans, strict=True)
         for speed in line.speeds_kmh
         for policy in settings.policies_on(line)
         for seed in settings.seeds
     ]
-    rows = tuple(_passes(jobs, min(workers, len(jobs)), progress or (lambda done, total: None)))
-    return Benchmark(settings, spans, rows, compare(rows))
+    if workers == 1:
+        rows = one_by_one(jobs, progress=progress)
+    else:
+        rows = in_processes(jobs, workers=workers, progress=progress)
+    return Benchmark(settings, spans, tuple(rows), compare(rows))
 
 
 def check_format(path: str | Path) -> None:
@@ -110,7 +109,7 @@ def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]
             }
         )
     )
-    last = math.floor(task.distance / task.plant.catenary.span_length)
+    last = last_whole_span(task.distance, task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SPAN, last)
     where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
     if not 1 <= first <= last:
@@ -121,36 +120,3 @@ def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]
     if last * task.plant.catenary.span_length > task.distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
     return first, last
-
-
-def _passes(jobs: list[Job], workers: int, progress: Progress) -> list[Row]:
-    if workers == 1:
-        rows = []
-        for job in jobs:
-            rows.append(run_pass(*job))
-            progress(len(rows), len(jobs))
-        return rows
-    # Spawned, not forked: threads of Numba and torch do not survive a fork.
-    executor = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-    try:
-        futures = [executor.submit(run_pass, *job) for job in jobs]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            progress(done, len(jobs))
-        return [future.result() for future in futures]
-    except BrokenProcessPool as error:
-        raise InputError(
-            "A worker process died; run with one worker, or call benchmark.run under "
-            "`if __name__ == '__main__':`."
-        ) from error
-    finally:
-        executor.shutdown(cancel_futures=True)
-
-
-def _plain(value: Any) -> Any:
-    """Lists for tuples and None for nan."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and math.isnan(value) else value

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from panto_env import InputError, Trajectory, simulate
 from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
+from panto_env.metrics.spans import within
 from panto_env.policies import Policy, find_policy
 
 from .settings import BenchmarkSettings, Line
@@ -56,13 +57,12 @@ def run_pass(
     """
     run, force = drive(settings, line, policy, speed_kmh, seed)
     if run.terminated:
-        figures = Figures(*[float("nan")] * len(fields(Figures)))
+        figures = Figures.none()
         action_rate = float("nan")
     else:
         figures = run.summary(spans)
         position = np.arange(len(force)) * settings.control_interval * speed_kmh / 3.6
-        inside = (position >= (spans[0] - 1) * run.span_length) & (position < spans[1] * run.span_length)
-        changes = np.diff(force[inside], axis=0) / settings.control_interval
+        changes = np.diff(force[within(position, spans, run.span_length)], axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
     return Row(
         policy=policy,

@@ -34,7 +34,7 @@ def check_name(name: str, entry: Settings) -> None:
         return
     owner = getattr(entry, "name", None)
     # Of a list its first place stands for all: droppers alone would fill the line.
-    shown = [each for each in known if not each[-1].isdigit() or each.endswith(".0")]
+    shown = [name for name in known if not name[-1].isdigit() or name.endswith(".0")]
     raise InputError(
         f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint(name, known)}"
         f"known are {', '.join(shown)}"

@@ -1,31 +1,96 @@
-"""Processes for many small fits."""
+"""Many jobs on all cores: one call each for processes and for threads, results in the order of the jobs."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import TypeVar
 
+from ..base.errors import InputError
 from ..base.machine import cores
 
-THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+T = TypeVar("T")
+Job = Callable[[], T]
+"""Work without arguments; ``functools.partial`` of a function of a module goes to another process."""
+Progress = Callable[[int, int], None]
+"""Called with the number of jobs done and of all."""
+
+LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+def in_processes(
+    jobs: Sequence[Job[T]], *, workers: int | None = None, progress: Progress | None = None
+) -> list[T]:
+    """Results of jobs that run in fresh processes, one per core by default.
+
+    A script must call this under ``if __name__ == "__main__":``, because each process imports it anew.
+    Raises what a job raises, after cancelling those that have not begun, and InputError where a process
+    dies.
+    """
+    with _one_thread_of_linear_algebra():
+        # Spawned, not forked: threads of Numba and torch do not survive a fork.
+        executor = ProcessPoolExecutor(_workers(jobs, workers), mp_context=get_context("spawn"))
+        try:
+            return _collect(executor, jobs, progress)
+        except BrokenProcessPool as error:
+            raise InputError(
+                "A worker process died; in a script, make this call under `if __name__ == '__main__':`."
+            ) from error
+
+
+def in_threads(
+    jobs: Sequence[Job[T]], *, workers: int | None = None, progress: Progress | None = None
+) -> list[T]:
+    """Results of jobs that run in threads, one per core by default: for short jobs spent in kernels.
+
+    Kernels run without Python's lock. Raises what a job raises, after cancelling those not begun.
+    """
+    return _collect(ThreadPoolExecutor(_workers(jobs, workers), thread_name_prefix="panto"), jobs, progress)
+
+
+def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> list[T]:
+    """Results of jobs that run here, in the caller's own process and thread."""
+    results = []
+    for job in jobs:
+        results.append(job())
+        if progress is not None:
+            progress(len(results), len(jobs))
+    return results
+
+
+def _workers(jobs: Sequence[Job[T]], workers: int | None) -> int:
+    return max(1, min(cores() if workers is None else workers, len(jobs)))
+
+
+def _collect(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:
+    """Submit all jobs, report as each is done, and shut the executor down."""
+    try:
+        futures = [executor.submit(job) for job in jobs]
+        for done, future in enumerate(as_completed(futures), start=1):
+            future.result()
+            if progress is not None:
+                progress(done, len(jobs))
+        return [future.result() for future in futures]
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 @contextmanager
-def pool() -> Iterator[ProcessPoolExecutor]:
-    """One process a core, each with one thread of linear algebra.
+def _one_thread_of_linear_algebra() -> Iterator[None]:
+    """Processes that start within the body have one thread of linear algebra each.
 
     The matrices are small: threads would wait for one another, on a busy machine a hundred times longer
     than they compute. The libraries read their number of threads when they are loaded, so it is set in
     the environment that the processes start with, and put back at the end.
     """
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    before = {name: os.environ.get(name) for name in LINEAR_ALGEBRA_THREADS}
+    os.environ.update(dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1"))
     try:
-        with ProcessPoolExecutor(cores(), mp_context=multiprocessing.get_context("spawn")) as executor:
-            yield executor
+        yield
     finally:
         for name, value in before.items():
             if value is None:

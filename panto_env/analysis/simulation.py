@@ -72,9 +72,10 @@ def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | N
 
 def _explicit() -> inspect.Signature:
     """The signature of ``simulate`` with every setting by name."""
-    own = inspect.signature(simulate).parameters
-    first = [each for each in own.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-    return inspect.Signature([*first, *(each for each in parameters() if each.name not in own)])
+    named = inspect.signature(simulate).parameters
+    first = [argument for argument in named.values() if argument.kind is not inspect.Parameter.VAR_KEYWORD]
+    others = [argument for argument in parameters() if argument.name not in named]
+    return inspect.Signature([*first, *others])
 
 
 simulate.__signature__ = _explicit()  # type: ignore[attr-defined]

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.machine import cores
 from ..base.settings import Settings, hint
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings
 from ..metrics.figures import Figures
+from ..metrics.spans import Spans
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
+from .pool import Progress, in_threads
 from .simulation import simulate
 
 SPEED = "speed_kmh"
@@ -24,7 +25,6 @@ POLICY = "policy"
 """First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
 MOST_PARAMETERS = 2
 
-Progress = Callable[[int, int], None]
 Row = dict[str, Any]
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, as ``pantograph.masses.0``."""
@@ -43,7 +43,7 @@ def sweep(
     parameters: Mapping[str, Sequence[float]],
     *,
     policies: Sequence[str | Path | None] = (None,),
-    spans: tuple[int, int] | None = None,
+    spans: Spans | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -54,12 +54,11 @@ def sweep(
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1; the whole run by default. workers: threads, one a core by
+    figures cover, first and last from 1; the whole run by default. workers: threads, one per core by
     default; the outcome does not depend on it. progress: called with the passes done and of all.
-    seed, settings: as for
-    ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
+    seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
-    Returns one row a pass, in the order of values, then policies: the swept values, what was run, and
+    Returns one row per pass, in the order of values, then policies: the swept values, what was run, and
     every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
     unknown parameter, a value that its schema refuses, and whatever else ``simulate`` refuses; all
     values are checked before the first pass.
@@ -79,7 +78,10 @@ def sweep(
         for values in product(*parameters.values())
         for policy in policies
     ]
-    return _run(passes, spans, workers or cores(), progress or (lambda done, total: None))
+    # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
+    return in_threads(
+        [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
+    )
 
 
 def _check(
@@ -107,9 +109,9 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     if family in entries:
         check_name(name, entries[family])
         return
-    everything = [n for each, entry in entries.items() for n in parameter_names(entry, each)]
+    everything = [known for owner, entry in entries.items() for known in parameter_names(entry, owner)]
     near = hint(name, [SPEED, *everything])
-    families = ", ".join(f"'{each}.'" for each in (*entries, POLICY))
+    families = ", ".join(f"'{owner}.'" for owner in (*entries, POLICY))
     raise InputError(
         f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
         "(as pantograph.masses.0)."
@@ -123,53 +125,39 @@ def _prepare(
     settings: dict[str, Any],
 ) -> _Pass:
     changed, speed_kmh = dict(entries), settings.get(SPEED, default(SPEED))
-    own: list[str] = []
+    of_policy: list[str] = []
     for name, value in values.items():
         family, _, rest = name.partition(".")
         if name == SPEED:
             speed_kmh = value
         elif family == POLICY:
-            own.append(f"{rest}={value!r}")
+            of_policy.append(f"{rest}={value!r}")
         else:
             changed[family] = change(changed[family], name, value)
     source = None if policy is None else str(policy)
-    if own:
+    if of_policy:
         if source is None:
             raise InputError(f"The passive pantograph has no {' or '.join(values)}; name a policy.")
-        source = f"{source}{',' if ':' in source else ':'}{','.join(own)}"
+        source = f"{source}{',' if ':' in source else ':'}{','.join(of_policy)}"
     if source is not None:
         find_policy(source)
     label = "passive" if policy is None else str(policy)
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _run(passes: list[_Pass], spans: tuple[int, int] | None, workers: int, progress: Progress) -> list[Row]:
-    # Threads: kernels run without Python's lock, and a pass takes tens of milliseconds, less than a
-    # process takes to start.
-    executor = ThreadPoolExecutor(min(workers, len(passes)), thread_name_prefix="panto")
+def _row(one_pass: _Pass, spans: Spans | None) -> Row:
     try:
-        futures = [executor.submit(_row, each, spans) for each in passes]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            progress(done, len(passes))
-        return [future.result() for future in futures]
-    finally:
-        executor.shutdown(cancel_futures=True)
-
-
-def _row(each: _Pass, spans: tuple[int, int] | None) -> Row:
-    try:
-        run = simulate(**{"record_droppers": False} | each.arguments)
-        figures = Figures(*[float("nan")] * len(fields(Figures))) if run.terminated else run.summary(spans)
+        run = simulate(**{"record_droppers": False} | one_pass.arguments)
+        figures = Figures.none() if run.terminated else run.summary(spans)
     except InputError as error:
-        at = ", ".join(f"{name} = {value:g}" for name, value in each.values.items())
+        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
         raise InputError(f"At {at}: {error}") from error
     return {
-        **each.values,
-        "policy": each.policy,
+        **one_pass.values,
+        "policy": one_pass.policy,
         "catenary": run.catenary,
         "pantograph": run.pantograph,
-        "speed_kmh": each.arguments["speed_kmh"],
+        "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,

@@ -19,9 +19,9 @@ def cores() -> int:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
-    """Within the body the caller's thread, and threads that it starts there, have but ``count`` cores.
+    """Within the body the caller's thread, and threads that it starts there, run on ``count`` cores.
 
-    They are the first of those that the process may use, which must be so many, where cores can be chosen.
+    These are the first of those that it may use, which must be as many. For where CAN_CHOOSE_CORES is true.
     """
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(allowed)[:count])

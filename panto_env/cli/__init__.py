@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import entry_points
 
+from ..base import plugins
 from ..base.errors import InputError
-
-COMMANDS = "panto_env.commands"
-"""Entry-point group of sub-commands that other packages bring."""
 
 
 def main() -> None:
@@ -33,9 +30,9 @@ def main() -> None:
     app.command()(identify.identify)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
-    for point in sorted(entry_points(group=COMMANDS), key=lambda point: point.name):
-        app.command(point.name)(point.load())
     try:
+        for name, point in plugins.installed(plugins.COMMANDS).items():
+            app.command(name)(plugins.load(point))
         app()
     except InputError as error:
         print(f"panto: {error}", file=sys.stderr)

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
-from rich.table import Table
 
 from ..base.errors import InputError
-from ..terminal import Json, Plot, console, number, print_json, progress_console
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+
+if TYPE_CHECKING:
+    from ..base.arrays import Array
+    from ..identification import Identification, Match
+
+T = TypeVar("T")
 
 
 class Method(StrEnum):
@@ -52,42 +58,43 @@ def identify(
     json: Json = False,
 ) -> None:
     """Identify a two-mass pantograph from a record of a rig, as paper 1 does, and by output error."""
-    from .. import identification as ident
+    from .. import identification
 
-    names = dict(zip(Method, ident.METHODS, strict=True))
+    full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
     known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])])}
     if plot is not None:
-        from ..analysis.plots import check_picture
+        from ..analysis.plots import check_plot, save
 
-        check_picture(plot)
-    record = ident.read_record(file, dict(_pairs(unit or [])))
+        check_plot(plot)
+    record = identification.read_record(file, dict(_pairs(unit or [])))
     with progress_console.status("identifying"):
-        found = ident.identify(record, known, band=band, free_offset=free_offset)
-    chosen = found.fits.get(names[method])
-    if chosen is None and (output is not None or plot is not None or not found.fits):
-        raise InputError(f"{names[method].capitalize()}: {found.failures[names[method]]}")
-    checked: list[Any] = []
+        identified = identification.identify(record, known, band=band, free_offset=free_offset)
+    chosen = identified.fits.get(full_name)
+    if chosen is None and (output is not None or plot is not None or not identified.fits):
+        raise InputError(f"{full_name.capitalize()}: {identified.failures[full_name]}")
+    matches: list[Match] = []
     if chosen is not None:
         try:
-            checked = ident.matches(record, chosen.parameters)
+            matches = identification.matches(record, chosen.parameters)
         except InputError as error:
             if plot is not None:
                 raise
-            found.failures[f"the model by {chosen.method}"] = str(error)
+            identified.failures[f"the model by {chosen.method}"] = str(error)
     if output is not None and chosen is not None:
         force, source = _static_force(static_force, record.force, file)
-        ident.write_pantograph(chosen, output, record=file.name, static_force=force, force_source=source)
+        identification.write_pantograph(
+            chosen, output, record=file.name, static_force=force, force_source=source
+        )
     if plot is not None and chosen is not None:
-        from ..analysis.plots import save
         from ..identification.plots import plot_matches
 
-        time = record.time
         title = f"{file.name}, model by {chosen.method}"
-        save(plot_matches(time, checked, title, float(time[0]), float(time[-1])), plot)
+        first, last = float(record.time[0]), float(record.time[-1])
+        save(plot_matches(record.time, matches, title, first, last), plot)
     if json:
-        print_json(_told(found, checked, method))
+        print_json(_plain(identified, matches, method))
         return
-    _print(found, checked, names[method])
+    _print(identified, matches, full_name)
 
 
 def _pairs(texts: list[str]) -> list[tuple[str, str]]:
@@ -110,7 +117,8 @@ def _value(name: str, text: str) -> float:
         raise InputError(f"Measured parameter {name} must be a number, not '{text}'.") from error
 
 
-def _static_force(given: float | None, force: Any, file: Path) -> tuple[float, str]:
+def _static_force(given: float | None, force: Array | None, file: Path) -> tuple[float, str]:
+    """Lifting force (N) of the pantograph that is written, and where it is from."""
     if given is not None:
         return given, "own choice: --static-force"
     if force is None:
@@ -120,66 +128,39 @@ def _static_force(given: float | None, force: Any, file: Path) -> tuple[float, s
     return float(force.mean()), f"mean contact force of {file.name}"
 
 
-def _told(found: Any, checked: list[Any], method: Method) -> dict[str, Any]:
+def _plain(identified: Identification, matches: list[Match], method: Method) -> dict[str, Any]:
+    """Everything as plain data."""
+    fits, failures = _by_short_name(identified.fits), _by_short_name(identified.failures)
     return {
-        "band": found.band,
-        "fits": {short.value: fit.as_dict() for short, fit in _by_short_name(found.fits)},
-        "failures": {short.value: text for short, text in _by_short_name(found.failures)},
+        "band": identified.band,
+        "fits": {name: fit.as_dict() for name, fit in fits.items()},
+        "failures": failures,
         "method": method.value,
-        "matches": [
-            {
-                "channel": match.channel,
-                "driven_by": match.driven_by,
-                "performance": match.performance,
-                "mean_error": match.mean_error,
-                "squared_error": match.squared_error,
-            }
-            for match in checked
-        ],
+        "matches": [match.as_dict() for match in matches],
     }
 
 
-def _by_short_name(by_method: dict[str, Any]) -> list[tuple[Method, Any]]:
-    """What is kept by a method's full name, by its short one."""
+def _by_short_name(by_method: Mapping[str, T]) -> dict[str, T]:
+    """By the short name of a method what is given by its full one; other keys are left out."""
     from ..identification import METHODS
 
-    return [(short, by_method[m]) for short, m in zip(Method, METHODS, strict=True) if m in by_method]
+    return {
+        short.value: by_method[full] for short, full in zip(Method, METHODS, strict=True) if full in by_method
+    }
 
 
-def _print(found: Any, checked: list[Any], chosen: str) -> None:
-    from ..identification import UNITS
+def _print(identified: Identification, matches: list[Match], method: str) -> None:
+    from ..identification.tables import matches_table, parameters_table
 
-    table = Table(
-        title=f"Identified, ± 95 %, relative standard deviation; excitation up to {found.band:.4g} Hz"
-    )
-    table.add_column("")
-    for short, _ in _by_short_name(found.fits):
-        table.add_column(short.value, justify="right")
-    names = next(iter(found.fits.values())).names
-    for k, name in enumerate(names):
-        cells = []
-        for fit in found.fits.values():
-            half = (fit.interval[k, 1] - fit.interval[k, 0]) / 2
-            cells.append(f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %")
-        table.add_row(f"{name} ({UNITS[name]})", *cells)
-    table.add_row("condition number", *(f"{fit.condition:.5g}" for fit in found.fits.values()))
-    console.print(table)
-    for fit in found.fits.values():
+    print_table(parameters_table(_by_short_name(identified.fits), identified.band))
+    for fit in identified.fits.values():
         if fit.undetermined:
             console.print(
                 f"[bold red]Warning:[/] {fit.method}: {', '.join(fit.undetermined)} not determined, the "
                 f"95 % interval holds 0 (condition number {fit.condition:.4g}); excite more frequencies, "
                 "or record longer."
             )
-    for method, text in found.failures.items():
-        console.print(f"[bold red]Warning:[/] {method}: {text}")
-    if not checked:
-        return
-    table = Table(title=f"Model by {chosen} beside the record")
-    for heading in ("series", "driven by", "fitting performance (%)", "mean error"):
-        table.add_column(heading)
-    for match in checked:
-        force = match.channel == "force"
-        error = f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
-        table.add_row(match.channel, match.driven_by, number(match.performance), error)
-    console.print(table)
+    for name, reason in identified.failures.items():
+        console.print(f"[bold red]Warning:[/] {name}: {reason}")
+    if matches:
+        print_table(matches_table(matches, method))

@@ -10,7 +10,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from .. import studies
-from ..terminal import console, number, progress_console
+from ..terminal import console, number, print_table, progress_console
 
 
 def reproduce(
@@ -21,40 +21,39 @@ def reproduce(
 ) -> None:
     """Reproduce a paper's results: print ours beside the paper's, write figures and every number."""
     names = studies.STUDIES if name == "all" else (name,)
-    found = {each: studies.find_study(each) for each in names}
+    chosen = {name: studies.find_study(name) for name in names}
     with Progress(console=progress_console, transient=True) as progress:
-        for each, run in found.items():
-            bar = progress.add_task(each, total=1.0)
+        for study, run in chosen.items():
+            bar = progress.add_task(study, total=1.0)
             outcome = run(
-                lambda what, share, bar=bar, each=each: progress.update(  # type: ignore[misc]
-                    bar, completed=share, description=f"{each}: {what}"
+                lambda what, share, bar=bar, study=study: progress.update(  # type: ignore[misc]
+                    bar, completed=share, description=f"{study}: {what}"
                 )
             )
-            files = studies.write(outcome, output / each)
+            files = studies.write(outcome, output / study)
             progress.remove_task(bar)
             _print(outcome)
-            console.print(f"{len(files) - 1} figures and numbers.json are in {output / each}.\n")
+            console.print(f"{len(files) - 1} figures and numbers.json are in {output / study}.\n")
 
 
 def _print(outcome: studies.Outcome) -> None:
-    for told in outcome.tables:
-        table = Table(title=told.title)
-        for k, heading in enumerate(told.headings):
-            table.add_column(heading, justify="left" if k == 0 else "right")
-        for row in told.rows:
-            table.add_row(*(cell if isinstance(cell, str) else f"{cell:.4g}" for cell in row))
-        console.print(table)
+    for table in outcome.tables:
+        print_table(table)
+    console.print(_comparisons(outcome))
+
+
+def _comparisons(outcome: studies.Outcome) -> Table:
     table = Table(title=outcome.title)
     for heading in ("quantity", "unit", "ours", "paper", "agrees within", "note"):
         table.add_column(heading, justify="right" if heading in ("ours", "agrees within") else "left")
-    for item in outcome.comparisons:
-        ours = f"{item.ours:.4g}"
+    for comparison in outcome.comparisons:
+        ours = f"{comparison.ours:.4g}"
         table.add_row(
-            item.quantity,
-            item.unit,
-            ours if item.agrees else f"[bold red]{ours} differs[/]",
-            item.paper if isinstance(item.paper, str) else f"{item.paper:.4g}",
-            f"{number(item.low, 3)} to {number(item.high, 3)}",
-            item.note,
+            comparison.quantity,
+            comparison.unit,
+            ours if comparison.agrees else f"[bold red]{ours} differs[/]",
+            comparison.paper if isinstance(comparison.paper, str) else f"{comparison.paper:.4g}",
+            f"{number(comparison.low, 3)} to {number(comparison.high, 3)}",
+            comparison.note,
         )
-    console.print(table)
+    return table

@@ -8,7 +8,8 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from ..metrics.figures import en50367_checks
+from ..metrics import en50367
+from ..metrics.labels import LABELS
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 from .pass_options import (
@@ -22,21 +23,6 @@ from .pass_options import (
     SensorsName,
     Spans,
     parse_spans,
-)
-
-LINES = (
-    ("mean", "mean force F_m", "N", 1.0),
-    ("std", "standard deviation σ", "N", 1.0),
-    ("statistical_max", "F_m + 3σ", "N", 1.0),
-    ("statistical_min", "F_m − 3σ", "N", 1.0),
-    ("max", "maximum", "N", 1.0),
-    ("min", "minimum", "N", 1.0),
-    ("max_uplift", "maximum uplift at supports", "mm", 1e3),
-    ("contact_loss", "contact loss CL", "%", 1.0),
-    ("cost_function", "cost function CF", "N m", 1.0),
-    ("effort", "actuator force, rms", "N", 1.0),
-    ("effort_rate", "rate of actuator force, rms", "N/s", 1.0),
-    ("distance", "over a distance of", "m", 1.0),
 )
 
 
@@ -81,9 +67,9 @@ def simulate(
         settings["window"] = window
     chosen = parse_spans(spans)
     if plot is not None:
-        from ..analysis.plots import check_picture, plot_run, save
+        from ..analysis.plots import check_plot, plot_run, save
 
-        check_picture(plot)
+        check_plot(plot)
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
@@ -106,14 +92,14 @@ def simulate(
         print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
         return
     table = Table("figure", "value", "unit")
-    for key, label, unit, scale in LINES:
-        table.add_row(label, number(scale * getattr(figures, key), 2), unit)
+    for key, label in LABELS.items():
+        table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
     console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
     if trajectory.terminated:
         console.print("[bold red]The run ended early: it left the plant's valid range.")
     console.print(table)
-    kept = en50367_checks(figures, trajectory.speed_kmh / 3.6)
+    kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
     console.print(
         "EN 50367 (as recalled):",
         ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),

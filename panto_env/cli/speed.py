@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from ..base.errors import InputError
-from ..terminal import Json, Plot, console, print_json, progress_console
-
-if TYPE_CHECKING:
-    from ..studies.throughput.tables import Sheet
+from ..base.table import Table
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console
 
 
 def speed(
@@ -24,40 +22,38 @@ def speed(
         typer.Option("--markdown", help="Print what README.md, then what docs/speed.md holds of it."),
     ] = False,
 ) -> None:
-    """Measure times real time of each plant on one core, and environment steps a second.
+    """Measure times real time of each plant on one core, and environment steps per second.
 
     Beside them stand Gymnasium's own Pendulum and native CartPole, and the limits of the machine; then
     how the cost grows with spans, modes, grid, lanes and cores.
     """
     if json and markdown:
         raise InputError("Give one of --json and --markdown, not both.")
-    from ..studies.throughput import tables as speed_tables
-    from ..studies.throughput.measure import measure
+    from ..studies.throughput import study, tables
 
     if plot is not None:
-        from ..analysis.plots import check_picture
+        from ..analysis.plots import check_plot, save
+        from ..studies.throughput.plots import plot_speed
 
-        check_picture(plot)
+        check_plot(plot)
     with progress_console.status("measuring") as status:
-        result = measure(repeats, report=lambda what: status.update(f"measuring {what}"))
+        result = study.run(repeats, report=lambda what: status.update(f"measuring {what}"))
     if plot is not None:
-        from ..analysis.plots import plot_speed, save
-
         save(plot_speed(result), plot)
     if json:
         print_json(result)
     elif markdown:
-        sys.stdout.write("\n".join(speed_tables.markdown(result)))
+        sys.stdout.write("\n".join(tables.markdown(result)))
     else:
-        console.print(speed_tables.machine(result))
-        for part in (speed_tables.summary(result), *speed_tables.details(result)):
-            console.print(part if isinstance(part, str) else _table(part))
+        console.print(tables.machine(result))
+        for part in (tables.summary(result), *tables.details(result)):
+            if isinstance(part, str):
+                console.print(part)
+            else:
+                print_table(_plain(part))
 
 
-def _table(sheet: Sheet) -> Table:
-    table = Table(title=sheet.title)
-    for k, heading in enumerate(sheet.headings):
-        table.add_column(heading, justify="right" if k else "left")
-    for row in sheet.rows:
-        table.add_row(*(cell.replace("`", "") for cell in row))
-    return table
+def _plain(table: Table) -> Table:
+    """The same without the backticks of Markdown."""
+    rows = [tuple(cell.replace("`", "") for cell in row) for row in table.cells]
+    return replace(table, rows=rows)

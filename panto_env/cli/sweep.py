@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from ..base.errors import InputError
+from ..metrics.labels import LABELS
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 from .pass_options import (
     ActuatorName,
@@ -27,14 +28,8 @@ from .pass_options import (
     parse_spans,
 )
 
-COLUMNS = (
-    ("mean", "F_m\n(N)", 1.0),
-    ("std", "σ\n(N)", 1.0),
-    ("max", "max\n(N)", 1.0),
-    ("min", "min\n(N)", 1.0),
-    ("contact_loss", "CL\n(%)", 1.0),
-    ("max_uplift", "uplift\n(mm)", 1e3),
-)
+COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
+"""Figures that the table shows."""
 
 
 def sweep(
@@ -75,9 +70,10 @@ def sweep(
     if output is not None:
         files.check_table(output)
     if plot is not None:
-        from ..analysis.plots import check_picture, plot_sweep, save
+        from ..analysis.plots import check_plot, save
+        from ..analysis.sweep_plots import plot_sweep
 
-        check_picture(plot)
+        check_plot(plot)
     settings: dict[str, Any] = {"distance": distance, "bilateral": bilateral, "seed": seed}
     if speed is not None:
         if SPEED in values:
@@ -148,11 +144,11 @@ def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None)
     for name in (*parameters, "policy"):
         heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
         table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")
-    shown = [column for column in COLUMNS if any(isfinite(row[column[0]]) for row in rows)]
-    for _, heading, _ in shown:
-        table.add_column(heading, justify="right")
+    shown = [key for key in COLUMNS if any(isfinite(row[key]) for row in rows)]
+    for key in shown:
+        table.add_column(LABELS[key].column, justify="right")
     for row in rows:
-        cells = [number(scale * row[key], 2) for key, _, scale in shown]
+        cells = [number(LABELS[key].scale * row[key], 2) for key in shown]
         policy = f"{row['policy']}, ended early" if row["terminated"] else row["policy"]
         table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *cells)
     console.print(table)

@@ -1,7 +1,7 @@
 """Entries of an observation, each with the source that writes it: a new one is one function here.
 
 A writer gives the physical value of one lane. It may look at ``episode`` (``Episode``), ``block`` (rows of
-``Row``, column i) and ``readings`` (rows of ``Reading``, column i); ``lane`` is the lane's place among all,
+``Row``, column i) and ``task`` (rows of ``TaskRow``, column i); ``lane`` is the lane's place among all,
 ``number`` tells entries of the same kind apart.
 """
 
@@ -15,6 +15,7 @@ from ..backend import inlined
 from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
+from .state import TASK_ROW
 
 WRITERS: list[Callable[..., Any]] = []
 """Writers of all kinds of entries; a kernel knows an entry's writer by its place here."""
@@ -55,76 +56,70 @@ def entry_kind(name: str, scale: float, unit: str) -> Callable[[Callable[..., An
 
 
 @entry_kind("head displacement", 0.1, "m")
-def head_displacement(episode, block, readings, lane, number, i):
-    return readings[READING.HEAD_HEIGHT, i]
+def head_displacement(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.HEAD_HEIGHT, i]
 
 
 @entry_kind("frame displacement", 0.1, "m")
-def frame_displacement(episode, block, readings, lane, number, i):
-    return readings[READING.FRAME_HEIGHT, i]
+def frame_displacement(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.FRAME_HEIGHT, i]
 
 
 @entry_kind("head velocity", 1.0, "m/s")
-def head_velocity(episode, block, readings, lane, number, i):
-    return readings[READING.HEAD_VELOCITY, i]
+def head_velocity(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.HEAD_VELOCITY, i]
 
 
 @entry_kind("frame velocity", 1.0, "m/s")
-def frame_velocity(episode, block, readings, lane, number, i):
-    return readings[READING.FRAME_VELOCITY, i]
+def frame_velocity(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.FRAME_VELOCITY, i]
 
 
 @entry_kind("contact force", 100.0, "N")
-def contact_force(episode, block, readings, lane, number, i):
-    return readings[READING.CONTACT_FORCE, i]
-
-
-@inlined
-def span_turns(episode, block, i):
-    """Spans travelled since the start."""
-    return block[ROW.STRIDE, i] * block[ROW.STEP, i] * episode.spans_per_metre
+def contact_force(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.CONTACT_FORCE, i]
 
 
 @entry_kind("sine of span position", 1.0, "-")
-def span_sine(episode, block, readings, lane, number, i):
-    return sine_of_turns(span_turns(episode, block, i))
+def span_sine(episode, block, task, lane, number, i):
+    return sine_of_turns(task[TASK_ROW.SPANS, i])
 
 
 @entry_kind("cosine of span position", 1.0, "-")
-def span_cosine(episode, block, readings, lane, number, i):
-    return cosine_of_turns(span_turns(episode, block, i))
+def span_cosine(episode, block, task, lane, number, i):
+    return cosine_of_turns(task[TASK_ROW.SPANS, i])
 
 
 @entry_kind("speed", 100.0, "m/s")
-def speed(episode, block, readings, lane, number, i):
+def speed(episode, block, task, lane, number, i):
     return block[ROW.STRIDE, i] / episode.time_step
 
 
 @entry_kind("last action", 1.0, "-")
-def last_action(episode, block, readings, lane, number, i):
+def last_action(episode, block, task, lane, number, i):
     return episode.action[lane, number]
 
 
 @entry_kind("wire displacement", 0.1, "m")
-def wire_displacement(episode, block, readings, lane, number, i):
+def wire_displacement(episode, block, task, lane, number, i):
     return block[ROW.WIRE_HEIGHT, i]
 
 
 @entry_kind("frame force", 100.0, "N")
-def frame_force(episode, block, readings, lane, number, i):
+def frame_force(episode, block, task, lane, number, i):
     return block[ROW.FRAME_FORCE, i]
 
 
 @entry_kind("head force", 100.0, "N")
-def head_force(episode, block, readings, lane, number, i):
+def head_force(episode, block, task, lane, number, i):
     return block[ROW.HEAD_FORCE, i]
 
 
 @entry_kind("mass displacement", 0.1, "m")
-def mass_displacement(episode, block, readings, lane, number, i):
+def mass_displacement(episode, block, task, lane, number, i):
     return block[ROW.STATE + number, i]
 
 
 @entry_kind("mass velocity", 1.0, "m/s")
-def mass_velocity(episode, block, readings, lane, number, i):
+def mass_velocity(episode, block, task, lane, number, i):
     return block[ROW.STATE + episode.masses + number, i]

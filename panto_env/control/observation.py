@@ -13,6 +13,7 @@ from ..backend import inlined, subroutine
 from ..base.arrays import Array, Index
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
+from ..plant.state import ROW
 from . import entries as of
 from .entries import WRITERS, Entry
 from .state import MAX_ENTRIES, TASK_ROW
@@ -102,9 +103,9 @@ def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
     Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
     """
     names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
-    lines = ["def write(chosen, episode, block, readings, begin, number, per_unit, row, count):"]
+    lines = ["def write(chosen, episode, block, task, begin, number, per_unit, row, count):"]
     for place in range(len(writers)):
-        value = f"writer_{place}(episode, block, readings, (begin + i) & {NOT_NEGATIVE}, number, i)"
+        value = f"writer_{place}(episode, block, task, (begin + i) & {NOT_NEGATIVE}, number, i)"
         lines += [f"    if chosen == {place}:", "        for i in range(count):"]
         lines += [f"            row[i] = {value} * per_unit"]
     exec("\n".join(lines), names)
@@ -124,9 +125,11 @@ def observe(episode, sensors, block, task, begin, count):
             noise = sensors.noise[k, begin : begin + count]
             for i in range(count):
                 readings[k, i] += noise[i]
+    for i in range(count):
+        task[TASK_ROW.SPANS, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i] * episode.spans_per_metre
     for k in range(episode.writers.shape[0]):
         chosen, number = episode.writers[k, 0], episode.writers[k, 1]
-        _write(chosen, episode, block, readings, begin, number, episode.per_unit[k], entries[k], count)
+        _write(chosen, episode, block, task, begin, number, episode.per_unit[k], entries[k], count)
     for k in range(episode.writers.shape[0]):
         seen = episode.observation[begin : begin + count, k]
         for i in range(count):

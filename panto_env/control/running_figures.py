@@ -8,7 +8,8 @@ import numpy as np
 
 from ..backend import inlined, lane_table
 from ..base.arrays import Array
-from ..metrics.figures import Figures, low_pass_sections
+from ..metrics.figures import Figures
+from ..metrics.low_pass import low_pass_sections
 from ..plant.state import PLACE, ROW
 from .state import EPISODE_ROWS, FIGURE_ROWS, TASK_ROW, TERM, TaskRow
 

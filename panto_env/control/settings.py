@@ -145,8 +145,13 @@ def description(name: str) -> str:
     return RunSettings.model_fields[name].description or ""
 
 
-def run_settings(given: Mapping[str, Any], kind: type[R] = RunSettings) -> R:  # type: ignore[assignment]
-    """Settings from what is given by name. Raises InputError where a value is not valid."""
+def run_settings(given: Mapping[str, Any]) -> RunSettings:
+    """Settings of a run from what is given by name. Raises InputError where a value is not valid."""
+    return read_settings(given, RunSettings)
+
+
+def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
+    """As ``run_settings``, of a class of settings that has more."""
     try:
         return kind.model_validate(dict(given))
     except ValidationError as error:

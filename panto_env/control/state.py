@@ -50,7 +50,8 @@ class TaskRow(IntEnum):
     COST = FILTER_STATE + 18  # sum of deviations at both ends of each interval (N)
     LOSS_STEPS = FILTER_STATE + 19  # plant steps without contact in this control step
     FILTERED_FORCE = FILTER_STATE + 20  # contact force (N)
-    READING = FILTER_STATE + 21  # what the sensors read, one row per ``Reading``
+    SPANS = FILTER_STATE + 21  # travelled since the start (-)
+    READING = FILTER_STATE + 22  # what the sensors read, one row per ``Reading``
     ENTRY = READING + len(Reading)  # of the observation
 
 

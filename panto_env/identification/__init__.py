@@ -1,9 +1,8 @@
 """Identification of a pantograph from records of a rig (paper 1, sections 2 to 4), and beyond."""
 
-from ..analysis.pool import pool
 from .coverage import Trials, run_trials
 from .equation_error import FILTERED, PRINTED, equations, fit_equation_error, three_points
-from .experiments import EXPERIMENTS, SWEEP, Excitation, add_noise, clean_record
+from .experiments import EXPERIMENTS, FREQUENCY_SWEEP, Excitation, add_noise, clean_record
 from .fit import Fit
 from .low_pass import excited_band, low_pass
 from .methods import METHODS, Identification, identify
@@ -17,12 +16,12 @@ from .record_file import read_record, write_record
 __all__ = [
     "EXPERIMENTS",
     "FILTERED",
+    "FREQUENCY_SWEEP",
     "IDENTIFIED",
     "MEASURED",
     "METHODS",
     "OUTPUT_ERROR",
     "PRINTED",
-    "SWEEP",
     "UNITS",
     "Excitation",
     "Fit",
@@ -41,7 +40,6 @@ __all__ = [
     "low_pass",
     "matches",
     "parameters_of",
-    "pool",
     "read_record",
     "run_trials",
     "three_points",

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from ..analysis.pool import Progress, in_processes
 from ..base.arrays import Array
 from .experiments import Excitation, add_noise, clean_record
 from .methods import identify
 from .model import IDENTIFIED, MEASURED, Parameters
 
-CHUNK = 10
-"""Trials a task of one process."""
+TRIALS_PER_JOB = 10
+"""So many trials go to a process at a time."""
 
 
 @dataclass(frozen=True)
@@ -32,48 +33,50 @@ class Trials:
 
 
 def run_trials(
-    tasks: list[tuple[Excitation, bool]],
+    experiments: Sequence[tuple[Excitation, bool]],
     truth: Parameters,
     trials: int,
-    executor: Executor,
     *,
-    report: Callable[[float], None] = lambda share: None,
+    progress: Progress | None = None,
 ) -> list[dict[str, Trials]]:
-    """Trials of each excitation, with or without free offset, by method; seeds 0 to ``trials`` - 1.
+    """Trials of each excitation, with or without free offset, by method, on all cores.
 
-    The noise is that of ``add_noise``. executor: as ``workers.pool`` gives it. report: told the share done.
+    The noise is that of ``add_noise`` with seeds 0 to ``trials`` - 1.
     """
-    seeds = [range(first, min(first + CHUNK, trials)) for first in range(0, trials, CHUNK)]
-    found: dict[tuple[int, int], dict[str, list[Array]]] = {}
-    jobs = [(k, c) for k in range(len(tasks)) for c in range(len(seeds))]
-    futures = {executor.submit(_chunk, *tasks[k], dict(truth), seeds[c]): (k, c) for k, c in jobs}
-    for future in as_completed(futures):
-        found[futures[future]] = future.result()
-        report(len(found) / len(jobs))
+    seeds = [range(first, min(first + TRIALS_PER_JOB, trials)) for first in range(0, trials, TRIALS_PER_JOB)]
+    jobs = [
+        partial(_run_seeds, excitation, free_offset, dict(truth), some)
+        for excitation, free_offset in experiments
+        for some in seeds
+    ]
+    parts = in_processes(jobs, progress=progress)
     results = []
-    for k in range(len(tasks)):
-        methods = found[k, 0]
-        rows = {m: np.array([row for c in range(len(seeds)) for row in found[k, c][m]]) for m in methods}
-        results.append({m: Trials(*np.moveaxis(stack, 1, 0)) for m, stack in rows.items()})
+    for first in range(0, len(parts), len(seeds)):
+        of_experiment = parts[first : first + len(seeds)]
+        rows = {
+            method: np.array([row for part in of_experiment for row in part[method]])
+            for method in of_experiment[0]
+        }
+        results.append({method: Trials(*np.moveaxis(stack, 1, 0)) for method, stack in rows.items()})
     return results
 
 
-def _chunk(
+def _run_seeds(
     excitation: Excitation, free_offset: bool, truth: Parameters, seeds: range
 ) -> dict[str, list[Array]]:
-    """Values, standard deviations and whether inside, (3, 5) a trial, by method."""
+    """By method, per trial: values, standard deviations and whether inside, (3, 5)."""
     clean = clean_record(excitation, truth)
     known = {name: truth[name] for name in MEASURED}
     true = np.array([truth[name] for name in IDENTIFIED])
     rows: dict[str, list[Array]] = {}
     for seed in seeds:
         noisy = add_noise(clean, np.random.default_rng(seed))
-        found = identify(noisy, known, free_offset=free_offset)
-        for method, fit in found.fits.items():
+        identified = identify(noisy, known, free_offset=free_offset)
+        for method, fit in identified.fits.items():
             low, high = fit.interval.T
             inside = ((low <= true) & (true <= high)).astype(float)
             rows.setdefault(method, []).append(np.array([fit.values, fit.std, inside]))
-        for method in found.failures:
+        for method in identified.failures:
             nothing = np.array([np.full(5, np.nan), np.full(5, np.nan), np.zeros(5)])
             rows.setdefault(method, []).append(nothing)
     return rows

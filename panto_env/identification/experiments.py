@@ -1,4 +1,4 @@
-"""Synthetic records: paper 1's Experiments I-III by its Table 1, and a sweep, with sensor noise."""
+"""Synthetic records: paper 1's Experiments I-III by its Table 1, and a frequency sweep; sensor noise."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
-from .model import Parameters
+from .model import HEAD, SUPPORT, Parameters
 from .record import Record
 from .response import contact_force, rest_on_plate, under_plate
 
 SAMPLING = 1000.0
-"""Samples a second. Own choice: the paper doesn't say."""
+"""Samples per second. Own choice: the paper doesn't say."""
 
 DURATION = 20.0
 """Length of a record (s). Own choice."""
@@ -53,7 +53,7 @@ EXPERIMENTS = (
 )
 """y_p1 of paper 1's Table 1."""
 
-SWEEP = Excitation("sweep", 0.99e-3, 54.3e-3, 0.3, 4.0)
+FREQUENCY_SWEEP = Excitation("sweep", 0.99e-3, 54.3e-3, 0.3, 4.0)
 """Own choice: Experiment I's plate, swept from 0.3 to 4 Hz; the contact force stays above 0."""
 
 
@@ -71,7 +71,7 @@ def clean_record(
     plate = excitation.plate(time, duration)
     states = under_plate(parameters, plate, time_step, rest_on_plate(parameters, excitation.offset))
     force = contact_force(parameters, plate, states, time_step)
-    return Record(time_step, plate[before:], states[before:, 0], states[before:, 1], force[before:])
+    return Record(time_step, plate[before:], states[before:, HEAD], states[before:, SUPPORT], force[before:])
 
 
 def add_noise(

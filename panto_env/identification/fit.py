@@ -40,8 +40,8 @@ class Fit:
     @property
     def parameters(self) -> dict[str, float]:
         """All eight, known and identified."""
-        found = dict(zip(self.names, map(float, self.values), strict=True))
-        return {name: found.get(name, self.known.get(name, np.nan)) for name in UNITS}
+        identified = dict(zip(self.names, map(float, self.values), strict=True))
+        return {name: identified.get(name, self.known.get(name, np.nan)) for name in UNITS}
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -50,7 +50,7 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        told = {
+        parameters = {
             name: {"value": value, "rsd": rsd, "low": low, "high": high, "unit": UNITS[name]}
             for name, value, rsd, (low, high) in zip(
                 self.names, self.values, self.rsd, self.interval, strict=True
@@ -58,7 +58,7 @@ class Fit:
         }
         return {
             "method": self.method,
-            "parameters": told,
+            "parameters": parameters,
             "condition": self.condition,
             "dependence": self.dependence,
             "undetermined": list(self.undetermined),

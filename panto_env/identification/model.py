@@ -32,6 +32,10 @@ UNITS = {
 }
 
 
+HEAD, SUPPORT, HEAD_SPEED, SUPPORT_SPEED, PLATE = range(5)
+"""Places in the state: y_p2, y_p3, y_p2', y_p3', and y_p1 where the contact force drives the plate."""
+
+
 def check_known(known: Parameters) -> dict[str, float]:
     """Values known beforehand, all of MEASURED among them; any of IDENTIFIED may be fixed too.
 

@@ -21,10 +21,10 @@ from .response import polynomials, respond
 
 OUTPUT_ERROR = "output error"
 PASSES = 2  # the second weighs with the covariance that the first left
-SAMPLES_A_PERIOD = 200
+SAMPLES_PER_PERIOD = 200
 """Of the band, to simulate with: a spline through them is good to 1e-9 of the motion."""
 
-ROWS_A_PERIOD = 4
+ROWS_PER_PERIOD = 4
 """Of the model's fastest mode, to compare: its free motion stays apart from the slow one."""
 
 IDENTIFIABLE = 1e3
@@ -95,14 +95,14 @@ class Misfit:
         free_offset: bool,
     ):
         """A record low-passed to ``band`` (Hz), whose noise is independent every ``independent`` (s)."""
-        thin = max(1, int(1 / (SAMPLES_A_PERIOD * band * record.time_step)))
+        thin = max(1, int(1 / (SAMPLES_PER_PERIOD * band * record.time_step)))
         self.time_step = thin * record.time_step
         self.known, self.names = known, free_names(known)
         self.offsets = 2 if free_offset else 0
         self.inputs = polynomials(record.plate[::thin], self.time_step)
         # The model's own fast modes must not look slow in the rows that are compared.
         fastest = np.abs(np.linalg.eigvals(matrices({**known, **guess})[0])).max() / (2 * np.pi)
-        self.rows = slice(None, None, max(1, int(1 / (ROWS_A_PERIOD * fastest * self.time_step))))
+        self.rows = slice(None, None, max(1, int(1 / (ROWS_PER_PERIOD * fastest * self.time_step))))
         self.target = np.column_stack([record.head, record.support])[::thin][self.rows]
         # How many rows are worth one, their noise being of one piece.
         self.share = max(1.0, independent / (self.time_step * (self.rows.step or 1)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .model import Parameters, matrices
+from .model import HEAD, PLATE, SUPPORT, Parameters, matrices
 from .record import Record
 from .response import contact_force, fitted_response, force_matrices
 
@@ -21,6 +21,16 @@ class Match:
     driven_by: str  # "force" or "plate"
     recorded: Array  # (n,): m, or N for the force
     modelled: Array  # (n,): likewise
+
+    def as_dict(self) -> dict[str, str | float]:
+        """What was compared and how well it matches, without the series."""
+        return {
+            "channel": self.channel,
+            "driven_by": self.driven_by,
+            "performance": self.performance,
+            "mean_error": self.mean_error,
+            "squared_error": self.squared_error,
+        }
 
     @property
     def performance(self) -> float:
@@ -46,19 +56,19 @@ def matches(record: Record, parameters: Parameters) -> list[Match]:
     that matches best. Raises InputError where the model is not stable.
     """
     step = record.time_step
-    recorded = np.column_stack([record.head, record.support, record.plate])
-    states = fitted_response(*matrices(parameters), record.plate, step, [0, 1], recorded[:, :2])
-    found = [
-        Match("y_p2", "plate", record.head, states[:, 0]),
-        Match("y_p3", "plate", record.support, states[:, 1]),
+    recorded = np.column_stack([record.head, record.support])
+    states = fitted_response(*matrices(parameters), record.plate, step, [HEAD, SUPPORT], recorded)
+    under_plate = [
+        Match("y_p2", "plate", record.head, states[:, HEAD]),
+        Match("y_p3", "plate", record.support, states[:, SUPPORT]),
     ]
     if record.force is None:
-        return found
+        return under_plate
     force = contact_force(parameters, record.plate, states, step)
-    found.append(Match("force", "plate", record.force, force))
+    under_plate.append(Match("force", "plate", record.force, force))
     if parameters["c1T"] > 0:
-        found += force_matches(record, parameters)
-    return found
+        return under_plate + force_matches(record, parameters)
+    return under_plate
 
 
 def force_matches(record: Record, parameters: Parameters) -> list[Match]:
@@ -70,9 +80,9 @@ def force_matches(record: Record, parameters: Parameters) -> list[Match]:
         raise InputError("The record has no contact force to drive the model with.")
     recorded = np.column_stack([record.head, record.support, record.plate])
     a, b = force_matrices(parameters)
-    states = fitted_response(a, b, record.force, record.time_step, [0, 1, 4], recorded)
+    states = fitted_response(a, b, record.force, record.time_step, [HEAD, SUPPORT, PLATE], recorded)
     return [
-        Match("y_p1", "force", record.plate, states[:, 4]),
-        Match("y_p2", "force", record.head, states[:, 0]),
-        Match("y_p3", "force", record.support, states[:, 1]),
+        Match("y_p1", "force", record.plate, states[:, PLATE]),
+        Match("y_p2", "force", record.head, states[:, HEAD]),
+        Match("y_p3", "force", record.support, states[:, SUPPORT]),
     ]

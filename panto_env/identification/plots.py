@@ -1,12 +1,11 @@
-"""Pictures of records and of models beside them. Matplotlib is imported late: it is slow to import."""
+"""Plots of records and of models beside them. Matplotlib is imported late: it is slow to import."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from ..base.arrays import Array
 from .performance import Match
 from .record import Record
 
@@ -24,41 +23,35 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
     inside = record.time <= record.start + seconds
     step = max(1, int(inside.sum()) // SHOWN)
     time = record.time[inside][::step]
+    series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
+    if record.force is not None:
+        series = {"force": record.force} | series
     figure = Figure(figsize=(7, 6.2), layout="constrained")
-    series = [("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support)]
-    forces = [] if record.force is None else [("f_1", record.force)]
-    axes = figure.subplots(len(forces) + 3, 1, sharex=True)
-    for axis, (name, values) in zip(axes, forces + series, strict=True):
-        force = name.startswith("f")
-        axis.plot(time, (values if force else 1e3 * values)[inside][::step], color="tab:blue", linewidth=1)
-        axis.set(
-            ylabel=f"${name[:2] + '{' + name[2:] + '}' if not force else name}$ ({'N' if force else 'mm'})"
-        )
+    axes = figure.subplots(len(series), 1, sharex=True)
+    for axis, (name, values) in zip(axes, series.items(), strict=True):
+        symbol, unit, scale = _axis_of(name)
+        axis.plot(time, scale * values[inside][::step], color="tab:blue", linewidth=1)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
         axis.grid(color="0.9")
     axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
     figure.suptitle(title)
     return figure
 
 
-def plot_matches(time: np.ndarray, found: Sequence[Match], title: str, first: float, last: float) -> Figure:
+def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float, last: float) -> Figure:
     """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
     from matplotlib.figure import Figure
 
     inside = (time >= first) & (time <= last)
     step = max(1, int(inside.sum()) // SHOWN)
-    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(found)), layout="constrained")
-    axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, match in zip(axes, found, strict=True):
-        force = match.channel == "force"
-        scale, unit = (1.0, "N") if force else (1e3, "mm")
-        name = "f_1" if force else f"y_{{{match.channel[2:]}}}"
-        axis.plot(
-            time[inside][::step], scale * match.recorded[inside][::step], color="tab:orange", linewidth=3,
-        )  # fmt: skip
-        axis.plot(
-            time[inside][::step], scale * match.modelled[inside][::step], color="black", linewidth=0.8,
-        )  # fmt: skip
-        axis.set(ylabel=f"${name}$ ({unit})")
+    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(matches)), layout="constrained")
+    axes = figure.subplots(len(matches), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, match in zip(axes, matches, strict=True):
+        symbol, unit, scale = _axis_of(match.channel)
+        recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))
+        axis.plot(time[inside][::step], recorded, color="tab:orange", linewidth=3)
+        axis.plot(time[inside][::step], modelled, color="black", linewidth=0.8)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
         axis.set_title(
             f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
             f"mean error {scale * match.mean_error:.3g} {unit}",
@@ -72,3 +65,10 @@ def plot_matches(time: np.ndarray, found: Sequence[Match], title: str, first: fl
     axes[-1].set(xlabel="time (s)", xlim=(first, last))
     figure.suptitle(title, fontsize="medium")
     return figure
+
+
+def _axis_of(channel: str) -> tuple[str, str, float]:
+    """Symbol and unit of a record's channel, and the scale from SI to this unit."""
+    if channel == "force":
+        return "f_1", "N", 1.0
+    return f"y_{{{channel.removeprefix('y_')}}}", "mm", 1e3

@@ -7,7 +7,7 @@ import numpy as np
 from ..backend import kernel
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .model import Parameters, matrices
+from .model import HEAD, HEAD_SPEED, Parameters, matrices
 
 
 @kernel
@@ -50,7 +50,7 @@ def respond(a: Array, b: Array, inputs: Array, time_step: float, initial: Array)
 
 
 def rest_on_plate(parameters: Parameters, plate: float) -> Array:
-    """State, (4,), at rest on a plate held at ``plate`` (m)."""
+    """State, (4,), at rest on a plate that stands at ``plate`` (m)."""
     a, b = matrices(parameters)
     return np.asarray(np.linalg.solve(a, -b[:, 0] * plate))
 
@@ -66,7 +66,9 @@ def contact_force(parameters: Parameters, plate: Array, states: Array, time_step
     inputs = polynomials(plate, time_step)
     last = inputs[-1] @ np.array([0.0, 1.0, time_step, time_step**2 / 2])
     speed = np.append(inputs[:, 1], last)
-    return np.asarray(parameters["k1T"] * (plate - states[:, 0]) + parameters["c1T"] * (speed - states[:, 2]))
+    return np.asarray(
+        parameters["k1T"] * (plate - states[:, HEAD]) + parameters["c1T"] * (speed - states[:, HEAD_SPEED])
+    )
 
 
 def force_matrices(parameters: Parameters) -> tuple[Array, Array]:

@@ -1,1 +1,1 @@
-"""What is said of a run: its record and its figures."""
+"""What is said of a run: its record, its figures of merit, and their names and units."""

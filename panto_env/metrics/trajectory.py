@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.files import write_whole
-from . import figures as metrics
+from .figures import Figures, contact_loss, cost_function
+from .low_pass import low_pass
+from .spans import Spans, check_spans, limits, within
 
 FORMAT = 1
 SERIES = (
@@ -60,23 +62,23 @@ class Trajectory:
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
 
-    def summary(self, spans: tuple[int, int] | None = None) -> metrics.Figures:
+    def summary(self, spans: Spans | None = None) -> Figures:
         """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or the whole run.
 
         Uplift is that of the supports at the ends of these spans and between. Raises InputError
         where the run does not cover the spans.
         """
-        inside, lowest, highest = self._select(spans)
+        inside = self.inside(spans)
+        begin, end = (0.0, float(self.position[-1])) if spans is None else limits(spans, self.span_length)
         force = self.contact_force[inside]
-        filtered = metrics.low_pass(self.contact_force, self.time_step)[inside]
+        filtered = low_pass(self.contact_force, self.time_step)[inside]
         mean, std = float(filtered.mean()), float(filtered.std())
-        near = (self.support_position > lowest - 1e-6) & (self.support_position < highest + 1e-6)
+        near = (self.support_position > begin - 1e-6) & (self.support_position < end + 1e-6)
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
         frame, head = self.frame_force[inside], self.head_force[inside]
         frame_change, head_change = np.diff(frame), np.diff(head)
         changes = frame_change @ frame_change + head_change @ head_change
-        stride = self.speed_kmh / 3.6 * self.time_step
-        return metrics.Figures(
+        return Figures(
             mean=mean,
             std=std,
             statistical_max=mean + 3 * std,
@@ -84,35 +86,39 @@ class Trajectory:
             max=float(filtered.max()),
             min=float(filtered.min()),
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
-            contact_loss=metrics.contact_loss(force),
-            cost_function=metrics.cost_function(force, self.nominal_force, stride),
+            contact_loss=contact_loss(force),
+            cost_function=cost_function(force, self.nominal_force, self.stride),
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
             effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
-            distance=float(inside.sum() * stride),
+            distance=float(inside.sum() * self.stride),
         )
 
-    def _select(self, spans: tuple[int, int] | None) -> tuple[NDArray[np.bool_], float, float]:
+    @property
+    def stride(self) -> float:
+        """Distance from one sample to the next (m)."""
+        return self.speed_kmh / 3.6 * self.time_step
+
+    def inside(self, spans: Spans | None = None) -> NDArray[np.bool_]:
+        """Which samples lie inside the spans, (n,); all by default.
+
+        Raises InputError where the run does not cover the spans.
+        """
         if spans is None:
-            return np.ones(len(self.time), dtype=bool), 0.0, float(self.position[-1])
-        first, last = spans
-        if not (isinstance(first, int) and isinstance(last, int) and 1 <= first <= last):
+            return np.ones(len(self.time), dtype=bool)
+        check_spans(spans)
+        _, end = limits(spans, self.span_length)
+        if self.position[-1] + self.stride < end:
+            first, last = spans
             raise InputError(
-                f"spans must be two whole numbers, first and last, counted from 1, not {spans!r}."
-            )
-        lowest, highest = (first - 1) * self.span_length, last * self.span_length
-        stride = self.speed_kmh / 3.6 * self.time_step
-        if self.position[-1] + stride < highest:
-            raise InputError(
-                f"spans {first} to {last} end at {highest:g} m, but the run ends at "
+                f"spans {first} to {last} end at {end:g} m, but the run ends at "
                 f"{self.position[-1]:.1f} m; run further or choose earlier spans."
             )
-        inside = (self.position >= lowest) & (self.position < highest)
-        return inside, lowest, highest
+        return within(self.position, spans, self.span_length)
 
     def save(self, path: str | Path) -> None:
         """Write a Parquet file, whole or not at all.
 
-        One column a series; the arrays of supports and droppers one column each, by number.
+        One column per series, and one per support and per dropper, by number.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -149,10 +155,10 @@ class Trajectory:
                 ("uplift", "support_position"),
                 ("dropper_force", "dropper_position"),
             ):
-                held = [c for c in table.column_names if c.startswith(f"{name}_")]
-                columns = [table[f"{name}_{k}"].to_numpy() for k in range(len(held))]
+                count = sum(column.startswith(f"{name}_") for column in table.column_names)
+                columns = [table[f"{name}_{k}"].to_numpy() for k in range(count)]
                 series[name] = np.array(columns).T if columns else np.zeros((table.num_rows, 0))
-                if held and len(held) != len(facts[places]):
+                if count and count != len(facts[places]):
                     raise ValueError(f"columns of {name} are missing")
             return cls(**series, **facts)
         except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:

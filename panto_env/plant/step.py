@@ -34,14 +34,16 @@ def store(block, table, begin, count):
 
 
 @inlined
-def read_irregularity(waves, block, begin, count):
-    """Height of the contact wire's irregularity at the end of the step (m): a sum of cosines."""
+def move_along(waves, block, begin, count):
+    """Positions of the contact points, and the height of the wire's irregularity there: a sum of cosines."""
     for i in range(count):
+        block[ROW.POSITION_BEFORE, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i]
+        block[ROW.POSITION, i] = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
         block[ROW.IRREGULARITY, i] = 0.0
     for k in range(waves.shape[0]):
         wave = waves[k, :, begin : begin + count]
         for i in range(count):
-            turns = wave[1, i] * (block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)) + wave[2, i]
+            turns = wave[1, i] * block[ROW.POSITION, i] + wave[2, i]
             block[ROW.IRREGULARITY, i] += wave[0, i] * cosine_of_turns(turns)
 
 
@@ -53,7 +55,7 @@ def approach(pantographs, actuators, run, contact, block, begin, count):
     state, free_state = block[ROW.STATE :], block[ROW.FREE_STATE :]
     variant = pantographs.variant[begin]
     move_freely(pantographs, variant, state, free_state, block[ROW.NOMINAL_FORCE], force, count)
-    read_irregularity(run.waves, block, begin, count)
+    move_along(run.waves, block, begin, count)
 
 
 @inlined
@@ -63,8 +65,7 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
     contact_input = pantographs.contact_input[variant, 0]
     strip, damping = pantographs.strip_compliance[variant], pantographs.strip_damping[variant]
     for i in range(count):
-        x0 = block[ROW.STRIDE, i] * block[ROW.STEP, i]
-        x1 = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
+        x0, x1 = block[ROW.POSITION_BEFORE, i], block[ROW.POSITION, i]
         height, wire_yield, spring = look_at_contact(line, wire, begin + i, contact, x0, x1)
         height += block[ROW.IRREGULARITY, i]
         stiffness = 1.0 / (strip + spring)

@@ -1,4 +1,4 @@
-"""Papers reproduced: each study computes ours beside the paper's, with tables, figures and a JSON."""
+"""Papers reproduced: each study computes ours beside the paper's, with tables, plots and a JSON."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from importlib import import_module
 
 from ..base.errors import InputError
 from ..base.settings import suggest
-from .study import Comparison, Outcome, Report, Study, Table, write
+from ..base.table import Table
+from .study import Comparison, Outcome, Report, Study, write
 
 __all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..analysis.plots import save
 from ..base.files import finite, write_whole
+from ..base.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,23 +46,14 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table for people: rows of text or numbers under headings that name units."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str | float, ...], ...]
-
-
-@dataclass(frozen=True)
 class Outcome:
     """What a study found."""
 
     title: str
     comparisons: tuple[Comparison, ...]
     tables: tuple[Table, ...] = ()
-    figures: Mapping[str, Figure] = field(default_factory=dict)  # by file name, without suffix
-    numbers: Mapping[str, Any] = field(default_factory=dict)  # every number behind tables and figures
+    plots: Mapping[str, Figure] = field(default_factory=dict)  # by file name, without suffix
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # every number behind tables and plots
 
 
 class Study(Protocol):
@@ -72,18 +64,18 @@ class Study(Protocol):
 
 
 def write(outcome: Outcome, folder: str | Path) -> list[Path]:
-    """Write the numbers as JSON and the figures as PNG into a folder; the files written."""
+    """Write the numbers as JSON and the plots as PNG into a folder; the files written."""
     folder = Path(folder)
-    told = {
+    table = {
         "title": outcome.title,
-        "comparisons": [each.as_dict() for each in outcome.comparisons],
+        "comparisons": [comparison.as_dict() for comparison in outcome.comparisons],
         **outcome.numbers,
     }
     files = [folder / "numbers.json"]
     with write_whole(files[0]) as temporary:
-        text = json.dumps(finite(told), indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(finite(table), indent=1, ensure_ascii=False, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
-    for name, figure in outcome.figures.items():
+    for name, plot in outcome.plots.items():
         files.append(folder / f"{name}.png")
-        save(figure, files[-1])
+        save(plot, files[-1])
     return files

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from .cases import AMPLITUDE, THETA, THETAS, Case, control
 from .passes import Result
 
-ZERO = THETAS[len(THETAS) // 2 - 1]  # the sweep's own 0, so that its pass is not run twice
+ZERO = THETAS[len(THETAS) // 2 - 1]  # 0 as it stands in THETAS, so that its pass is not run twice
 
 
 @dataclass(frozen=True)
-class Sweep:
+class CostOverAngle:
     """Cost function over the phase angle at one speed."""
 
     cost: tuple[float, ...]  # CF at THETAS (N m)
@@ -25,15 +25,15 @@ class Sweep:
     cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
 
 
-def sweep(results: Mapping[Case, Result], speed: int, gain: float, reading: str) -> Sweep:
-    """The sweep at a speed (km/h)."""
+def cost_over_angle(results: Mapping[Case, Result], speed: int, gain: float, reading: str) -> CostOverAngle:
+    """At one speed (km/h)."""
 
     def cost(amplitude: float, theta: float) -> float:
         return _result(results, speed, gain, amplitude, theta, reading).figures.cost_function
 
     costs = tuple(cost(AMPLITUDE, theta) for theta in THETAS)
     least = min(costs)
-    return Sweep(
+    return CostOverAngle(
         cost=costs,
         best=THETAS[costs.index(least)],
         least=least,

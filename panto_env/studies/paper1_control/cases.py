@@ -18,7 +18,7 @@ RUN_SPANS = SPANS[1] + 2
 
 SPEEDS = tuple(range(100, 401, 25))
 """km/h, Figs 17 and 18: the paper's range; the step is an own choice."""
-SWEEP_SPEEDS = tuple(range(100, 401, 50))
+ANGLE_SPEEDS = tuple(range(100, 401, 50))
 """km/h, Fig. 13."""
 SHOWN_SPEEDS = (300, 350, 400)
 """km/h, Figs 14 to 16."""
@@ -109,14 +109,14 @@ ON_A_TRAIN = {
     **DAMPING,
 }
 """Controls that are tried with each actuator, sampled."""
-SWEEPS = ((GAIN, SPAN), (DEFAULT_GAIN, SPAN), (GAIN, KMH))
-"""Gains and readings under which the phase angle is swept."""
+ANGLE_CONTROLS = ((GAIN, SPAN), (DEFAULT_GAIN, SPAN), (GAIN, KMH))
+"""Gains and readings under which the phase angle is varied."""
 LOOPS = (("ideal", EVERY_STEP), ("ideal", SAMPLED), ("realistic", SAMPLED))
-"""Actuators and control intervals under which the gain is swept."""
+"""Actuators and control intervals under which the gain is varied."""
 
 
 def all_cases() -> list[Case]:
-    """Every pass of the study but the pressed ones, each once."""
+    """Every pass of the study, each once, but those with another static force."""
     return list(dict.fromkeys(_cases()))
 
 
@@ -125,7 +125,7 @@ def _cases() -> Iterator[Case]:
         yield Case(speed, policy)
     for speed, policy in product(SPEEDS, (control(REAL_GAIN), DAMPING[SHIPPED])):
         yield sampled(speed, policy, "realistic")
-    for (gain, reading), speed in product(SWEEPS, SWEEP_SPEEDS):  # Fig. 13
+    for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):  # Fig. 13
         yield Case(speed, control(gain, amplitude=0.0))
         for theta in THETAS:
             yield Case(speed, control(gain, theta=theta, reading=reading))

@@ -6,15 +6,15 @@ import math
 from collections.abc import Mapping
 
 from ..study import Comparison
-from .angles import sweep
+from .angles import cost_over_angle
 from .cases import (
+    ANGLE_SPEEDS,
     DEFAULT_GAIN,
     GAIN,
     GAINS,
     SHOWN_SPEEDS,
     SPAN,
     SPEEDS,
-    SWEEP_SPEEDS,
     THETA,
     THETA_STEP,
     Case,
@@ -44,18 +44,18 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
     def none(quantity: str, ours: float, note: str, paper: str = "0: eliminated") -> Comparison:
         return Comparison(quantity, "%", ours, paper, 0.0, 0.0, note)
 
-    told = [
+    found = [
         Comparison(
             "CL without control, 400 km/h", "%", loss(400, "passive"), "some, to eliminate", 0.1, 100.0
         )
     ]
     for gain, note in ((GAIN, CALIBRATED), (DEFAULT_GAIN, UNCALIBRATED)):
-        told += [
+        found += [
             none(f"CL with FB+FF, gain {gain:g}, {speed} km/h", loss(speed, control(gain)), note)
             for speed in SHOWN_SPEEDS
         ]
     most = max(loss(speed, control()) for speed in SPEEDS)
-    told.append(
+    found.append(
         none(f"largest CL with FB+FF, gain {GAIN}, 100-400 km/h", most, CALIBRATED + "; not at the others")
     )
     worst = {
@@ -65,17 +65,17 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
         for gain in GAINS
     }
     best = min(worst, key=worst.__getitem__)
-    for named, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
-        quantity = f"largest CL with FB+FF, {named}, 300-400 km/h, realistic actuator"
-        told.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
-    return told
+    for gains, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
+        quantity = f"largest CL with FB+FF, {gains}, 300-400 km/h, realistic actuator"
+        found.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
+    return found
 
 
 def _calm(results: Mapping[Case, Result]) -> list[Comparison]:
-    told = []
+    found = []
     for speed in SHOWN_SPEEDS:
         passive, active = results[Case(speed)], results[Case(speed, control())]
-        told.append(
+        found.append(
             Comparison(
                 f"raw σ with over without control, {speed} km/h",
                 "-",
@@ -93,11 +93,11 @@ def _calm(results: Mapping[Case, Result]) -> list[Comparison]:
     for speed in SHOWN_SPEEDS:
         note = STIFF if speed == 300 else ""
         quantity = f"CF with over without control, {speed} km/h"
-        told.append(Comparison(quantity, "-", ratio[speed], "below 1", 0.0, 1.0, note))
+        found.append(Comparison(quantity, "-", ratio[speed], "below 1", 0.0, 1.0, note))
     worst = max(ratio, key=ratio.__getitem__)
     quantity = "CF with over without control, largest of 100-400 km/h"
-    told.append(Comparison(quantity, "-", ratio[worst], "below 1", 0.0, 1.0, f"at {worst} km/h"))
-    return told
+    found.append(Comparison(quantity, "-", ratio[worst], "below 1", 0.0, 1.0, f"at {worst} km/h"))
+    return found
 
 
 def _angles(results: Mapping[Case, Result]) -> list[Comparison]:
@@ -106,11 +106,11 @@ def _angles(results: Mapping[Case, Result]) -> list[Comparison]:
         Comparison(
             f"θ of the least CF, {speed} km/h",
             "°",
-            math.degrees(sweep(results, speed, GAIN, SPAN).best),
+            math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best),
             math.degrees(THETA),
             low,
             high,
             ANGLE,
         )
-        for speed in SWEEP_SPEEDS
+        for speed in ANGLE_SPEEDS
     ]

@@ -1,22 +1,20 @@
-"""Passes along the line and what is kept of them; all on all cores."""
+"""Passes along the line and what is kept of them."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...analysis.pool import Progress, in_processes
 from ...base.arrays import Array
 from ...base.errors import InputError
-from ...base.machine import cores
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
 from ...control.settings import run_settings
@@ -26,7 +24,7 @@ from ...policies import find_policy
 from .cases import ACTUATORS, FINE, PANTOGRAPH, RUN_SPANS, SPANS, USUAL, Case
 
 BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
-"""Bands of frequency (Hz) by which the contact force is told apart; the mean belongs to none."""
+"""Bands of frequency (Hz) into which the contact force is split; the mean belongs to none."""
 LANES = 12
 """Passes made together in one process; from 16 on a task would take threads beside the processes."""
 
@@ -48,46 +46,35 @@ class Result:
         return self.figures.cost_function / self.figures.distance
 
 
-def run_all(cases: Sequence[Case], progress: Callable[[float], None]) -> dict[Case, Result]:
-    """Run cases on all cores; ``progress`` is told the share done. Raises InputError if a worker dies."""
-    results: dict[Case, Result] = {}
-    # Spawned, not forked: threads of Numba do not survive a fork.
-    pool = ProcessPoolExecutor(cores(), mp_context=get_context("spawn"))
-    try:
-        for future in as_completed([pool.submit(run, batch) for batch in _batches(cases)]):
-            results |= {result.case: result for result in future.result()}
-            progress(len(results) / len(cases))
-    except BrokenProcessPool as error:
-        raise InputError(
-            "A worker process died; in a script, call the study under `if __name__ == '__main__':`."
-        ) from error
-    finally:
-        pool.shutdown(cancel_futures=True)
+def run_all(cases: Sequence[Case], progress: Progress) -> dict[Case, Result]:
+    """Results of all cases, from all cores. Raises InputError if a worker process dies."""
+    batches = [partial(run, batch) for batch in _batches(cases)]
+    results = {result.case: result for batch in in_processes(batches, progress=progress) for result in batch}
     return {case: results[case] for case in cases}
 
 
 def run(cases: Sequence[Case]) -> list[Result]:
     """Run cases that differ in their policy alone."""
-    return [keep(case, record) for case, record in zip(cases, records(cases), strict=True)]
+    return [result_of(case, record) for case, record in zip(cases, records(cases), strict=True)]
 
 
 def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Trajectory]:
     """Whole records of cases that differ in their policy alone: lanes of one task."""
-    case = cases[0]
-    line = load_catenary(case.line)
+    first = cases[0]
+    line = load_catenary(first.line)
     settings = run_settings(
         {
             "catenary": line,
             "pantograph": pantograph,
-            "speed_kmh": case.speed_kmh,
-            "actuator": ACTUATORS[case.actuator],
-            "control_interval": case.control_interval,
+            "speed_kmh": first.speed_kmh,
+            "actuator": ACTUATORS[first.actuator],
+            "control_interval": first.control_interval,
             "distance": RUN_SPANS * line.span_length,
         }
-        | (FINE if case.fine else USUAL)
+        | (FINE if first.fine else USUAL)
     )
     task = Task(settings, lanes=len(cases))
-    policies = [find_policy(each.policy) for each in cases]
+    policies = [find_policy(case.policy) for case in cases]
     for lane, policy in enumerate(policies):
         task.reset(lane, np.random.default_rng(0))
         policy.reset(task.context(lane))
@@ -98,30 +85,30 @@ def records(cases: Sequence[Case], pantograph: Any = PANTOGRAPH) -> list[Traject
             action[lane] = policy.act(episode.observation[lane])
         task.step(action)
         if episode.terminated.any():
-            gone = cases[int(np.argmax(episode.terminated))]
-            raise InputError(f"The pass {gone} left the valid range of the simulation; leave it out.")
-    return [task.trajectory(lane, policy=each.policy) for lane, each in enumerate(cases)]
+            ended = cases[int(np.argmax(episode.terminated))]
+            raise InputError(f"The pass {ended} left the valid range of the simulation; leave it out.")
+    return [task.trajectory(lane, policy=case.policy) for lane, case in enumerate(cases)]
 
 
-def pressed(speed_kmh: int, mean: float) -> Result:
+def passive_at_mean(speed_kmh: int, mean: float) -> Result:
     """The passive pantograph under as much more static force as gives this mean force (N).
 
     CF still counts from the nominal force that the pantograph has as it is.
     """
-    case, as_it_is = Case(speed_kmh), load_pantograph(PANTOGRAPH)
+    case, pantograph = Case(speed_kmh), load_pantograph(PANTOGRAPH)
     (passive,) = records([case])
     passive_mean = _mean(passive)
     more = mean - passive_mean
     for _ in range(3):  # the mean is all but linear in the static force
-        heavier = as_it_is.model_copy(update={"static_force": as_it_is.static_force + more})
-        (record,) = records([case], heavier)
+        raised = pantograph.model_copy(update={"static_force": pantograph.static_force + more})
+        (record,) = records([case], raised)
         more *= (mean - passive_mean) / (_mean(record) - passive_mean)
-    return keep(case, dataclasses.replace(record, nominal_force=passive.nominal_force))
+    return result_of(case, dataclasses.replace(record, nominal_force=passive.nominal_force))
 
 
-def keep(case: Case, record: Trajectory) -> Result:
+def result_of(case: Case, record: Trajectory) -> Result:
     """What is kept of a record."""
-    inside = _inside(record)
+    inside = record.inside(SPANS)
     force, turns = record.contact_force[inside], record.position[inside] / record.span_length
     return Result(
         case,
@@ -152,18 +139,11 @@ def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
     def plant(case: Case) -> tuple[Any, ...]:
         return case.speed_kmh, case.line, case.actuator, case.control_interval, case.fine
 
-    for _, alike in groupby(sorted(cases, key=plant), key=plant):
-        together = list(alike)
-        for first in range(0, len(together), LANES):
-            yield tuple(together[first : first + LANES])
+    for _, group in groupby(sorted(cases, key=plant), key=plant):
+        same_plant = list(group)
+        for first in range(0, len(same_plant), LANES):
+            yield tuple(same_plant[first : first + LANES])
 
 
 def _mean(record: Trajectory) -> float:
-    return float(record.contact_force[_inside(record)].mean())
-
-
-def _inside(record: Trajectory) -> NDArray[np.bool_]:
-    first, last = SPANS
-    lowest, highest = (first - 1) * record.span_length, last * record.span_length
-    inside: NDArray[np.bool_] = (record.position >= lowest) & (record.position < highest)
-    return inside
+    return float(record.contact_force[record.inside(SPANS)].mean())

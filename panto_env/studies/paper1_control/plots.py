@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ...analysis.plots import mark_supports
-from .angles import sweep
+from ...metrics.labels import LABELS
+from ...metrics.spans import limits
+from .angles import cost_over_angle
 from .cases import (
+    ANGLE_SPEEDS,
     DAMPING,
     DEFAULT_GAIN,
     GAIN,
@@ -19,7 +22,6 @@ from .cases import (
     SPAN,
     SPANS,
     SPEEDS,
-    SWEEP_SPEEDS,
     THETA,
     THETAS,
     Case,
@@ -39,14 +41,14 @@ COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
 WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
 
 
-def figures(results: Results) -> dict[str, Figure]:
-    """All of them, by file name."""
+def all_plots(results: Results) -> dict[str, Figure]:
+    """Figs 13 to 18, by file name."""
     shown = {f"fig{14 + k}-{speed}kmh": passage(speed) for k, speed in enumerate(SHOWN_SPEEDS)}
     return {
         "fig13-phase-angle": phase_angle(results),
         **shown,
-        "fig17-contact-loss": over_speed(results, "contact_loss", "contact loss ratio CL (%)"),
-        "fig18-cost-function": over_speed(results, "cost_function", "cost function CF (N m)"),
+        "fig17-contact-loss": over_speed(results, 17, "contact_loss", "contact loss ratio"),
+        "fig18-cost-function": over_speed(results, 18, "cost_function", "cost function"),
     }
 
 
@@ -56,8 +58,8 @@ def phase_angle(results: Results) -> Figure:
 
     figure = Figure(figsize=(10, 5.2), layout="constrained")
     for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
-        for k, speed in enumerate(SWEEP_SPEEDS):
-            found = sweep(results, speed, GAIN, reading)
+        for k, speed in enumerate(ANGLE_SPEEDS):
+            found = cost_over_angle(results, speed, GAIN, reading)
             colour = f"C{k}"
             axis.plot(
                 [math.degrees(theta) for theta in THETAS], found.cost, color=colour, label=f"{speed} km/h"
@@ -88,13 +90,13 @@ def passage(speed: int) -> Figure:
     for axis in (upper, lower):
         mark_supports(axis, active)
         axis.legend(loc="upper right", ncols=3, fontsize="small")
-    lower.set_xlim((SHOWN_SPANS[0] - 1) * active.span_length, SHOWN_SPANS[1] * active.span_length)
+    lower.set_xlim(limits(SHOWN_SPANS, active.span_length))
     figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: simulation at {speed} km/h, gain {GAIN}")
     return figure
 
 
-def over_speed(results: Results, name: str, label: str) -> Figure:
-    """Figs 17 and 18: a figure of merit over speed."""
+def over_speed(results: Results, number: int, name: str, caption: str) -> Figure:
+    """Figs 17 and 18: a figure of merit over speed, by the name that the paper gives it."""
     from matplotlib.figure import Figure
 
     gentle, damped = control(REAL_GAIN), DAMPING[SHIPPED]
@@ -111,12 +113,12 @@ def over_speed(results: Results, name: str, label: str) -> Figure:
     }  # fmt: skip
     figure = Figure(figsize=(8, 4.8), layout="constrained")
     axis = figure.subplots()
-    for told, (cases, colour, style) in curves.items():
+    for label, (cases, colour, style) in curves.items():
         values = [getattr(results[case].figures, name) for case in cases]
-        axis.plot(SPEEDS, values, style, color=colour, label=told)
-    number, what = {"contact_loss": (17, "contact loss ratio"), "cost_function": (18, "cost function")}[name]
-    axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if number == 18 else None, None))
-    axis.set_title(f"Fig. {number}: {what}, {COVERED}")
+        axis.plot(SPEEDS, values, style, color=colour, label=label)
+    label = f"{caption} {LABELS[name].short_heading}"
+    axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if name == "cost_function" else None, None))
+    axis.set_title(f"Fig. {number}: {caption}, {COVERED}")
     axis.legend(fontsize="small")
     axis.grid(color="0.9")
     return figure

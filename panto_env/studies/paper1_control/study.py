@@ -8,25 +8,27 @@ from typing import Any
 from ..study import Outcome, Report
 from .cases import SHOWN_SPEEDS, Case, all_cases, control
 from .comparisons import comparisons
-from .passes import Result, pressed, run_all
-from .plots import figures
-from .tables import tables
+from .passes import Result, passive_at_mean, run_all
+from .plots import all_plots
+from .tables import all_tables
 
 
 def run(report: Report) -> Outcome:
     """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
-    results = run_all(all_cases(), lambda share: report("passes along the line", 0.9 * share))
-    report("passes pressed to the same mean force", 0.9)
-    alike = {speed: pressed(speed, results[Case(speed, control())].figures.mean) for speed in SHOWN_SPEEDS}
-    report("figures", 0.95)
+    results = run_all(all_cases(), lambda done, total: report("passes along the line", 0.9 * done / total))
+    report("passive passes at the same mean force", 0.9)
+    at_same_mean = {
+        speed: passive_at_mean(speed, results[Case(speed, control())].figures.mean) for speed in SHOWN_SPEEDS
+    }
+    report("plots", 0.95)
     return Outcome(
         title="Paper 1, active control (section 5, Figs 13 to 18)",
         comparisons=comparisons(results),
-        tables=tables(results, alike),
-        figures=figures(results),
+        tables=all_tables(results, at_same_mean),
+        plots=all_plots(results),
         numbers={
             "passes": [_plain(result) for result in results.values()],
-            "pressed to the controlled mean": [_plain(result) for result in alike.values()],
+            "pressed to the controlled mean": [_plain(result) for result in at_same_mean.values()],
         },
     )
 

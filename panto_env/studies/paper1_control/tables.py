@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 
-from ..study import Table
-from .angles import sweep
+from ...base.table import Table
+from ...metrics.labels import LABELS
+from .angles import cost_over_angle
 from .cases import (
     ACTUATORS,
+    ANGLE_CONTROLS,
+    ANGLE_SPEEDS,
     FINE,
     GAIN,
     GAINS,
@@ -20,8 +23,6 @@ from .cases import (
     SHOWN_SPEEDS,
     SPANS,
     SPEEDS,
-    SWEEP_SPEEDS,
-    SWEEPS,
     Case,
     control,
     sampled,
@@ -30,27 +31,37 @@ from .linear import amplification
 from .passes import BANDS, Result
 
 Results = Mapping[Case, Result]
-FIGURES = (
-    "F_m (N)", "σ (N)", "raw σ (N)", "max (N)", "min (N)", "CL (%)", "longest loss (ms)", "CF (N m)",
-    "mean |F − F_N| (N)", "uplift (mm)", "effort (N)", "effort rate (N/s)",
-)  # fmt: skip
+Column = tuple[str, Callable[[Result], str]]
+"""A heading, and the cell under it."""
 
 
-def figures(result: Result) -> tuple[str, ...]:
-    """The cells under ``FIGURES``."""
-    of = result.figures
+def _figure(name: str, decimals: int) -> Column:
+    """The column of one of ``Figures``."""
+    label = LABELS[name]
+    return label.short_heading, lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
+
+
+COLUMNS: tuple[Column, ...] = (
+    _figure("mean", 1),
+    _figure("std", 1),
+    ("raw σ (N)", lambda result: f"{result.raw_std:.1f}"),
+    _figure("max", 0),
+    _figure("min", 0),
+    _figure("contact_loss", 2),
+    ("longest loss (ms)", lambda result: f"{1e3 * result.longest_loss:.0f}"),
+    _figure("cost_function", 0),
+    ("mean |F − F_N| (N)", lambda result: f"{result.mean_deviation:.1f}"),
+    _figure("max_uplift", 0),
+    _figure("effort", 1),
+    _figure("effort_rate", 0),
+)
+HEADINGS = tuple(heading for heading, _ in COLUMNS)
+
+
+def all_tables(results: Results, at_same_mean: Mapping[int, Result]) -> tuple[Table, ...]:
+    """All of them. at_same_mean: the passive pantograph at the controlled one's mean force, by speed."""
     return (
-        f"{of.mean:.1f}", f"{of.std:.1f}", f"{result.raw_std:.1f}", f"{of.max:.0f}", f"{of.min:.0f}",
-        f"{of.contact_loss:.2f}", f"{1e3 * result.longest_loss:.0f}", f"{of.cost_function:.0f}",
-        f"{result.mean_deviation:.1f}", f"{1e3 * of.max_uplift:.0f}", f"{of.effort:.1f}",
-        f"{of.effort_rate:.0f}",
-    )  # fmt: skip
-
-
-def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]:
-    """All of them. pressed: the passive pantograph at the controlled one's mean force, by speed."""
-    return (
-        _parts(results, pressed),
+        _parts(results, at_same_mean),
         _gains(results),
         _actuators(results),
         _angles(results),
@@ -63,17 +74,17 @@ def tables(results: Results, pressed: Mapping[int, Result]) -> tuple[Table, ...]
 
 
 def _rows(named: Iterable[tuple[str, int, Result]]) -> tuple[tuple[str, ...], ...]:
-    return tuple((name, str(speed), *figures(result)) for name, speed, result in named)
+    return tuple((name, str(speed), *(cell(result) for _, cell in COLUMNS)) for name, speed, result in named)
 
 
-def _parts(results: Results, pressed: Mapping[int, Result]) -> Table:
+def _parts(results: Results, at_same_mean: Mapping[int, Result]) -> Table:
     rows = []
     for speed in SHOWN_SPEEDS:
         rows += [(name, speed, results[Case(speed, policy)]) for name, policy in PARTS.items()]
-        rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, pressed[speed]))
+        rows.insert(len(rows) - len(PARTS) + 1, ("passive, pressed to that mean", speed, at_same_mean[speed]))
     return Table(
         f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}",
-        ("control", "km/h", *FIGURES),
+        ("control", "km/h", *HEADINGS),
         _rows(rows),
     )
 
@@ -100,14 +111,14 @@ def _actuators(results: Results) -> Table:
         (f"{actuator}: {name}", speed, results[sampled(speed, policy, actuator)])
         for actuator, (name, policy), speed in product(ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
     ]
-    return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *FIGURES), _rows(rows))
+    return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *HEADINGS), _rows(rows))
 
 
 def _angles(results: Results) -> Table:
     rows = []
-    for (gain, reading), speed in product(SWEEPS, SWEEP_SPEEDS):
-        found = sweep(results, speed, gain, reading)
-        span = reading == SWEEPS[0][1]
+    for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
+        found = cost_over_angle(results, speed, gain, reading)
+        span = reading == ANGLE_CONTROLS[0][1]
         rows.append(
             (
                 f"{reading}, gain {gain:g}",
@@ -130,7 +141,7 @@ def _angles(results: Results) -> Table:
 def _bands(results: Results) -> Table:
     shown = {name: PARTS[name] for name in ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")}
     rows = []
-    for speed, (name, policy) in product(SWEEP_SPEEDS, shown.items()):
+    for speed, (name, policy) in product(ANGLE_SPEEDS, shown.items()):
         result = results[Case(speed, policy)]
         parts = (abs(result.once_per_span) / math.sqrt(2), *result.bands, result.raw_std)
         rows.append((name, str(speed), *(f"{part:.1f}" for part in parts)))
@@ -157,16 +168,16 @@ def _speeds(results: Results) -> Table:
     for speed in SPEEDS:
         passive, active = results[Case(speed)], results[Case(speed, control())]
         rows += [("passive", speed, passive), (f"FB+FF, gain {GAIN}", speed, active)]
-    return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *FIGURES), _rows(rows))
+    return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *HEADINGS), _rows(rows))
 
 
 def _fine(results: Results) -> Table:
-    told = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    numerics = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
     rows = [
-        (f"{name}, {told[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
-        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), told)
+        (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
+        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)
     ]
-    return Table("Time step and grid", ("control, time step, grid", "km/h", *FIGURES), _rows(rows))
+    return Table("Time step and grid", ("control, time step, grid", "km/h", *HEADINGS), _rows(rows))
 
 
 def _other_line(results: Results) -> Table:
@@ -174,4 +185,4 @@ def _other_line(results: Results) -> Table:
         (name, speed, results[Case(speed, policy, OTHER_LINE)])
         for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
     ]
-    return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *FIGURES), _rows(rows))
+    return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *HEADINGS), _rows(rows))

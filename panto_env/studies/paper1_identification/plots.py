@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.arrays import Array
-from ...identification import FILTERED, IDENTIFIED, METHODS, SWEEP, Identification, Match, Record
+from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.equation_error import equations
 from ...identification.plots import plot_matches, plot_record
 from .published import PUBLISHED
@@ -27,10 +27,10 @@ def record(shown: Record, name: str) -> Figure:
     return plot_record(shown, f"Experiment {name}: contact force and displacements (synthetic)", SECONDS)
 
 
-def match(shown: Record, found: Sequence[Match], name: str) -> Figure:
+def match(shown: Record, matches: Sequence[Match], name: str) -> Figure:
     """Figs 9 to 11."""
     title = f"Experiment {name}: synthetic record and model identified from it by output error"
-    return plot_matches(shown.time, found, title, 0.0, SECONDS)
+    return plot_matches(shown.time, matches, title, 0.0, SECONDS)
 
 
 def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[float]]) -> Figure:
@@ -48,18 +48,11 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
     left.legend(fontsize="small")
     place = np.arange(5)
     for k, printed in enumerate(PUBLISHED):
-        paper = [printed.rsd[i] for i in range(5)]
-        right.bar(
-            place + 0.13 * (k - 2.5), paper, 0.13, color=COLOURS[k], alpha=0.4, label=f"paper, {printed.name}"
-        )
+        label = f"paper, {printed.name}"
+        right.bar(place + 0.13 * (k - 2.5), printed.rsd, 0.13, color=COLOURS[k], alpha=0.4, label=label)
     for k, printed in enumerate(PUBLISHED):
-        right.bar(
-            place + 0.13 * (k + 0.5),
-            medians[printed.name],
-            0.13,
-            color=COLOURS[k],
-            label=f"ours, {printed.name}",
-        )
+        label = f"ours, {printed.name}"
+        right.bar(place + 0.13 * (k + 0.5), medians[printed.name], 0.13, color=COLOURS[k], label=label)
     right.axhline(100, color="0.3", linestyle=":", linewidth=1)
     right.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
     right.set(yscale="log", ylabel="RSD (%)", title="RSD; ours with free offset, low-passed, median of 100")
@@ -70,19 +63,23 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
 def stiffness(
     clean: Mapping[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
 ) -> Figure:
-    """Why k3 is unsure: its column beside m3's; and what a sweep does."""
+    """Why k3 is unsure: its column beside m3's; and what a frequency sweep does.
+
+    last: last frequencies of sweeps (Hz); sweeps: RSD of k3 (%) at these, by whether the offset is free.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
+    m3, k3 = IDENTIFIED.index("m3"), IDENTIFIED.index("k3")
     for (name, shown), colour, width in zip(
         list(clean.items())[::-1], ("tab:orange", "tab:blue"), (0.6, 2.5), strict=True
     ):
-        columns = equations(shown, known)[0][1]
-        label = "sweep 0.3 to 4 Hz" if name == SWEEP.name else f"Experiment {name}, 1.42 Hz"
-        displacement = 1e3 * (columns[:, 4] - columns[:, 4].mean())
-        left.plot(displacement[::4], columns[::4, 2], color=colour, linewidth=width, label=label)
+        (_, columns), _ = equations(shown, known)  # of the frame's equation
+        label = "sweep 0.3 to 4 Hz" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, 1.42 Hz"
+        displacement = 1e3 * (columns[:, k3] - columns[:, k3].mean())
+        left.plot(displacement[::4], columns[::4, m3], color=colour, linewidth=width, label=label)
     left.set(
         xlabel="column of $k_3$: $y_{p3}$ about its mean (mm)",
         ylabel="column of $m_3$: acceleration (m/s²)",
@@ -91,7 +88,7 @@ def stiffness(
     left.legend(fontsize="small")
     right.plot(last, sweeps[True], "o-", color="tab:blue", label="offset free: only motion counts")
     right.plot(last, sweeps[False], "s-", color="tab:green", label="offset kept, as printed")
-    right.axhline(PUBLISHED[0].rsd[-1], color="0.3", linestyle=":", label="paper, Experiment I: one sine")
+    right.axhline(PUBLISHED[0].rsd[k3], color="0.3", linestyle=":", label="paper, Experiment I: one sine")
     right.set(
         xscale="log", yscale="log",
         xlabel="last frequency of a sweep from 0.3 Hz (Hz)", ylabel="RSD of $k_3$ (%)",
@@ -119,9 +116,8 @@ def convergence(
     steps = 1e3 / np.array(rates)
     for name, errors in sampling.items():
         axes[0].loglog(steps, np.abs(errors).max(axis=1), "o-", label=f"{name}: c2, the worst")
-        axes[0].loglog(
-            steps, np.abs(errors[:, 2:]).max(axis=1), "--", color=axes[0].lines[-1].get_color(), linewidth=0.9
-        )
+        others = np.abs(errors[:, IDENTIFIED.index("m3") :]).max(axis=1)
+        axes[0].loglog(steps, others, "--", color=axes[0].lines[-1].get_color(), linewidth=0.9)
     axes[0].plot([], [], "--", color="0.5", label="worst of m3, c3, k3")
     axes[0].set(
         xlabel="sampling step (ms)", ylabel="error (%)",
@@ -130,7 +126,7 @@ def convergence(
     for axis, (name, methods) in zip(axes[1:], noise.items(), strict=True):
         for method, colour in zip(METHODS, COLOURS, strict=True):
             axis.loglog(1e6 * np.array(levels), methods[method], "o-", color=colour, label=method)
-        label = "sweep, offset free" if name == SWEEP.name else f"Experiment {name}, offset kept"
+        label = "sweep, offset free" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, offset kept"
         axis.set(xlabel="noise of the displacements, rms (µm)", ylabel="error of the worst parameter (%)")
         axis.set_title(f"{label}, 1 kHz")
         axis.set_ylim(top=1e9)  # room for the legend
@@ -141,19 +137,19 @@ def convergence(
     return figure
 
 
-def coverage(found: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
-    """Share of records whose 95 % intervals hold the truth."""
+def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
+    """Shares (%) of records whose 95 % intervals hold the truth, by record and method."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.8), layout="constrained")
-    axes = figure.subplots(1, len(found), sharey=True)
+    axes = figure.subplots(1, len(shares), sharey=True)
     place = np.arange(5)
-    for axis, (name, methods) in zip(axes, found.items(), strict=True):
+    for axis, (record_name, by_method) in zip(axes, shares.items(), strict=True):
         for k, (method, colour) in enumerate(zip(METHODS, COLOURS, strict=True)):
-            axis.bar(place + 0.27 * (k - 1), methods[method], 0.27, color=colour, label=method)
+            axis.bar(place + 0.27 * (k - 1), by_method[method], 0.27, color=colour, label=method)
         axis.axhline(90, color="0.3", linestyle=":", linewidth=1)
-        axis.set_xticks(place, [f"${_symbol(each)}$" for each in IDENTIFIED])
-        axis.set_title(name)
+        axis.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
+        axis.set_title(record_name)
     axes[0].set(ylabel=f"truth inside its 95 % interval\n(% of {trials} records)")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="small")

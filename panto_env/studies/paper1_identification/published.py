@@ -52,16 +52,40 @@ def per_plate(parameters: Parameters, frequency: float) -> tuple[complex, comple
     return complex((parameters["k1T"] + s * parameters["c1T"]) * (1 - head)), complex(head), complex(support)
 
 
-def expected(parameters: Parameters, printed: Published) -> list[tuple[str, float, float, float, float]]:
-    """Amplitude and offset of f_1, y_p2 and y_p3 under the printed y_p1, then the printed ones; N and mm."""
+@dataclass(frozen=True)
+class Motion:
+    """Of one series under the printed motion of the plate: the model's, then the printed one (N or mm)."""
+
+    name: str  # "f_1", "y_p2" or "y_p3"
+    amplitude: float
+    offset: float
+    printed_amplitude: float
+    printed_offset: float
+
+    @property
+    def unit(self) -> str:
+        """Of all four."""
+        return "N" if self.name == "f_1" else "mm"
+
+
+def expected(parameters: Parameters, printed: Published) -> tuple[Motion, Motion, Motion]:
+    """The contact force f_1, then y_p2 and y_p3."""
     moving, still = per_plate(parameters, printed.frequency), per_plate(parameters, 0.0)
-    rows = []
-    for k, name in enumerate(("f_1", "y_p2", "y_p3")):
-        scale = 1e-3 if k == 0 else 1.0
-        there = printed.force if k == 0 else (printed.amplitudes[k], printed.offsets[k])
-        amplitude = scale * abs(moving[k]) * printed.amplitudes[0]
-        rows.append((name, amplitude, scale * still[k].real * printed.offsets[0], *there))
-    return rows
+
+    def motion(name: str, series: int, scale: float, amplitude: float, offset: float) -> Motion:
+        return Motion(
+            name,
+            scale * abs(moving[series]) * printed.amplitudes[0],
+            scale * still[series].real * printed.offsets[0],
+            amplitude,
+            offset,
+        )
+
+    return (
+        motion("f_1", 0, 1e-3, *printed.force),
+        motion("y_p2", 1, 1.0, printed.amplitudes[1], printed.offsets[1]),
+        motion("y_p3", 2, 1.0, printed.amplitudes[2], printed.offsets[2]),
+    )
 
 
 def best_performance(parameters: Parameters, printed: Published) -> float:

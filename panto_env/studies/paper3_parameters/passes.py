@@ -12,7 +12,8 @@ from ...analysis.parameters import change
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...catalog import load_catenary, load_pantograph
-from ...metrics.figures import Figures, en50367_checks, en50367_mean_limit
+from ...metrics import en50367
+from ...metrics.figures import Figures, contact_loss
 
 CATENARY, PANTOGRAPH = "periodic-stiffness", "three-mass"
 SPEED_KMH = 300.0
@@ -25,7 +26,7 @@ TIME_STEP = 2e-3
 """s. Means over 500 to 600 m and places of maxima are taken from whole steps: the default, 5 ms, is 0.5 m
 of way at 350 km/h, which is too coarse for them."""
 FACTORS = (0.75, 1.0, 1.25)
-"""Own choice: the text does not give the other values of a parameter, so each is varied alike."""
+"""Own choice: the text does not give the other values of a parameter; all get the same factors."""
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,21 @@ class Pass:
         """Maximum less minimum of the head's displacement (m)."""
         return float(np.ptp(self.displacement))
 
+    @property
+    def within_en50367(self) -> dict[str, bool]:
+        """Whether each limit of EN 50367 is kept, by the name of its figure."""
+        return en50367.checks(self.figures, self.speed_kmh / 3.6)
+
     def numbers(self) -> dict[str, Any]:
         """Maximum, minimum, mean, σ of force (N) and displacement (mm), and EN 50367's limits."""
         return {
             "contact_force_n": _statistics(self.force),
             "displacement_mm": _statistics(1e3 * self.displacement),
             "nominal_force_n": self.nominal_force,
-            "contact_lost_percent": float(100 * np.mean(self.force <= 0)),
+            "contact_lost_percent": contact_loss(self.force),
             "low_passed": self.figures.as_dict(),
-            "en50367_mean_limit_n": en50367_mean_limit(self.speed_kmh / 3.6),
-            "en50367": en50367_checks(self.figures, self.speed_kmh / 3.6),
+            "en50367_mean_limit_n": en50367.mean_limit(self.speed_kmh / 3.6),
+            "en50367": self.within_en50367,
         }
 
 
@@ -116,8 +122,7 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     else:
         pantograph = change(pantograph, parameter, value)
     run = simulate(line, pantograph, speed_kmh, bilateral=bilateral, time_step=TIME_STEP)
-    first, last = (SPANS[0] - 1) * run.span_length, SPANS[1] * run.span_length
-    shown = (run.position >= first) & (run.position < last)
+    shown = run.inside(SPANS)
     return Pass(
         speed_kmh=speed_kmh,
         span_length=run.span_length,
@@ -129,18 +134,14 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     )
 
 
-def maximum_limit(speed_kmh: float) -> float:
-    """Largest contact force (N) by EN 50367, as the paper's conclusion has it."""
-    return 350.0 if speed_kmh > 200 else 300.0
-
-
-def largest_static_force(each: Pass) -> float:
+def largest_static_force(one_pass: Pass) -> float:
     """F_S (N) at which a pass' maximum would be at its limit.
 
     Every force scales with F(v) = F_S + alpha v^2, in either reading of the contact.
     """
-    aerodynamic = each.nominal_force - load_pantograph(PANTOGRAPH).static_force
-    return maximum_limit(each.speed_kmh) / float(each.force.max() / each.nominal_force) - aerodynamic
+    aerodynamic = one_pass.nominal_force - load_pantograph(PANTOGRAPH).static_force
+    limit = en50367.maximum_limit(one_pass.speed_kmh / 3.6)
+    return limit / float(one_pass.force.max() / one_pass.nominal_force) - aerodynamic
 
 
 def _statistics(values: Array) -> dict[str, float]:

@@ -12,25 +12,26 @@ from .passes import SPANS, SPEED_KMH, Influence, Pass, Passes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TELL_APART = 0.5
+DIFFERENT = 0.5
 """Contact force (N) by which the two readings must differ for both to be drawn."""
 
 
-def pictures(influences: Sequence[Influence], pulling: Passes, pushing: Passes) -> dict[str, Figure]:
-    """One figure a figure of the paper, by file name. Where contact is lost both readings are drawn.
+def all_plots(influences: Sequence[Influence], pulling: Passes, pushing: Passes) -> dict[str, Figure]:
+    """One plot per figure of the paper, by file name. Where contact is lost both readings are drawn.
 
     pulling, pushing: passes with a contact that may pull, as the paper's equations have it, and with
     one that can only push.
     """
-    found = {}
-    for influence in influences:
-        both = pulling[influence.key], pushing[influence.key]
-        for quantity in ("displacement", "force"):
-            found[figure_name(influence, quantity)] = _draw(influence, quantity, *both)
-    return found
+    return {
+        plot_name(influence, quantity): _draw(
+            influence, quantity, pulling[influence.key], pushing[influence.key]
+        )
+        for influence in influences
+        for quantity in ("displacement", "force")
+    }
 
 
-def figure_name(influence: Influence, quantity: str) -> str:
+def plot_name(influence: Influence, quantity: str) -> str:
     """File name, without suffix; quantity is "displacement" or "force"."""
     return f"fig{_number(influence, quantity):02d}-{influence.key}-{quantity}"
 
@@ -47,15 +48,15 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
     axis = figure.subplots()
     scale = 1e3 if quantity == "displacement" else 1.0
     handles = []
-    for k, (value, each, pushed) in enumerate(zip(influence.values, pulling, pushing, strict=True)):
-        axis.plot(each.position, scale * getattr(each, quantity), color=f"C{k}", linewidth=1.6)
+    for k, (value, pulled, pushed) in enumerate(zip(influence.values, pulling, pushing, strict=True)):
+        axis.plot(pulled.position, scale * getattr(pulled, quantity), color=f"C{k}", linewidth=1.6)
         label = f"${influence.symbol}$ = {value:g} {influence.unit}"
         handles.append(Line2D([], [], color=f"C{k}", label=label))
-        if np.abs(each.force - pushed.force).max() > TELL_APART:
+        if np.abs(pulled.force - pushed.force).max() > DIFFERENT:
             axis.plot(pushed.position, scale * getattr(pushed, quantity), ":", color=f"C{k}", linewidth=1.6)
             label = f"{value:g} {influence.unit}, contact can only push"
             handles.append(Line2D([], [], color=f"C{k}", linestyle=":", label=label))
-    if any(getattr(each, quantity).min() < 0 for each in pulling):
+    if any(getattr(one_pass, quantity).min() < 0 for one_pass in pulling):
         axis.axhline(0.0, color="0.5", linewidth=0.8)
     span = pulling[0].span_length
     masts = [span * k for k in range(SPANS[0] - 1, SPANS[1] + 1)]

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...metrics.figures import en50367_mean_limit
+from ...metrics import en50367
 from ..study import Comparison
-from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, Pass, Passes, largest_static_force, maximum_limit
+from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, Pass, Passes, largest_static_force
 from .sensitivity import Sensitivity
 
 MIDDLE = (0.25, 0.75)
@@ -34,7 +34,7 @@ def statements(
     passes: of every influence. ranking: sensitivities of every influence at one share. over_speed: rows
     of a sweep in small steps of speed.
     """
-    measured = {each.influence: each for each in ranking}
+    measured = {sensitivity.influence: sensitivity for sensitivity in ranking}
     return (
         *_speed(passes["speed"]),
         _small_steps(over_speed),
@@ -50,20 +50,20 @@ def statements(
 
 def _speed(passes: Sequence[Pass]) -> list[Comparison]:
     """Figs 4 and 5."""
-    said = "larger amplitudes at higher speed"
+    words = "larger amplitudes at higher speed"
     steps = f"least ratio from one speed to the next, {SPEEDS_KMH[0]:g} to {SPEEDS_KMH[-1]:g} km/h"
     swing = min(b.swing / a.swing for a, b in pairwise(passes))
     travel = min(b.travel / a.travel for a, b in pairwise(passes))
     found = [
-        Comparison("amplitude of F_C over speed", "", swing, said, 1.0, inf, steps),
-        Comparison("amplitude of z_1 over speed", "", travel, said, 1.0, inf, steps),
+        Comparison("amplitude of F_C over speed", "", swing, words, 1.0, inf, steps),
+        Comparison("amplitude of z_1 over speed", "", travel, words, 1.0, inf, steps),
     ]
-    for each in passes[-2:]:
-        for name, values in (("F_C", each.force), ("z_1", each.displacement)):
-            place = float(each.position[np.argmax(values)] / each.span_length % 1)
+    for one_pass in passes[-2:]:
+        for name, values in (("F_C", one_pass.force), ("z_1", one_pass.displacement)):
+            place = float(one_pass.position[np.argmax(values)] / one_pass.span_length % 1)
             found.append(
                 Comparison(
-                    f"place of the largest {name} in its span, {each.speed_kmh:g} km/h",
+                    f"place of the largest {name} in its span, {one_pass.speed_kmh:g} km/h",
                     "spans",
                     place,
                     "in the middle of the span",
@@ -75,12 +75,12 @@ def _speed(passes: Sequence[Pass]) -> list[Comparison]:
 
 def _small_steps(rows: Sequence[Mapping[str, Any]]) -> Comparison:
     """Figs 4 and 5, between the speeds that curves are drawn for."""
-    own = [row["std"] for row in rows if SPEEDS_KMH[0] <= row["speed_kmh"] <= SPEEDS_KMH[-1]]
+    sigmas = [row["std"] for row in rows if SPEEDS_KMH[0] <= row["speed_kmh"] <= SPEEDS_KMH[-1]]
     step = rows[1]["speed_kmh"] - rows[0]["speed_kmh"]
     return Comparison(
         f"σ of F_C over speed in steps of {step:g} km/h, least over the largest before",
         "",
-        min(value / max(own[: k + 1]) for k, value in enumerate(own)),
+        min(value / max(sigmas[: k + 1]) for k, value in enumerate(sigmas)),
         "larger amplitudes at higher speed",
         1.0,
         inf,
@@ -91,25 +91,30 @@ def _small_steps(rows: Sequence[Mapping[str, Any]]) -> Comparison:
 def _standard(passes: Passes) -> list[Comparison]:
     """The conclusion: "in accordance with EN 50367"; it names the limits of the maximum alone."""
     found = []
-    for each in passes["speed"]:
-        limit, largest = maximum_limit(each.speed_kmh), float(each.force.max())
-        bound = largest_static_force(each)
+    for one_pass in passes["speed"]:
+        limit, largest = en50367.maximum_limit(one_pass.speed_kmh / 3.6), float(one_pass.force.max())
+        bound = largest_static_force(one_pass)
         note = "" if largest <= limit else f"kept only with F_S up to {bound:.0f} N, which is not printed"
-        name = f"largest F_C, {each.speed_kmh:g} km/h"
+        name = f"largest F_C, {one_pass.speed_kmh:g} km/h"
         found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit, note))
-    others = [each for own in passes.values() for each in own if each.speed_kmh == SPEED_KMH]
-    largest, limit = max(float(each.force.max()) for each in others), maximum_limit(SPEED_KMH)
+    others = [
+        one_pass for varied in passes.values() for one_pass in varied if one_pass.speed_kmh == SPEED_KMH
+    ]
+    largest = max(float(one_pass.force.max()) for one_pass in others)
+    limit = en50367.maximum_limit(SPEED_KMH / 3.6)
     name = f"largest F_C of all variants, {SPEED_KMH:g} km/h"
     found.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit))
 
-    said = "in accordance with EN 50367"
-    mean = max(each.figures.mean / en50367_mean_limit(each.speed_kmh / 3.6) for each in passes["speed"])
+    words = "in accordance with EN 50367"
+    mean = max(
+        one_pass.figures.mean / en50367.mean_limit(one_pass.speed_kmh / 3.6) for one_pass in passes["speed"]
+    )
     note = "limit 0.00097 v² + 70 (recalled), not named in the paper; our F_S puts F(v) on it"
-    found.append(Comparison("F_m over its limit, any speed", "", mean, said, 0.0, 1.0, note))
-    for each in passes["speed"]:
-        ratio = each.figures.std / each.figures.mean
+    found.append(Comparison("F_m over its limit, any speed", "", mean, words, 0.0, 1.0, note))
+    for one_pass in passes["speed"]:
+        ratio = one_pass.figures.std / one_pass.figures.mean
         note = "limit 0.3 (recalled), not named in the paper; F_S drops out of it"
-        found.append(Comparison(f"σ / F_m, {each.speed_kmh:g} km/h", "", ratio, said, 0.0, 0.3, note))
+        found.append(Comparison(f"σ / F_m, {one_pass.speed_kmh:g} km/h", "", ratio, words, 0.0, 0.3, note))
     return found
 
 
@@ -137,7 +142,7 @@ def _along_the_span(passes: Sequence[Pass]) -> list[Comparison]:
     drop, relief = soft.displacement - stiff.displacement, soft.force - stiff.force
     focus = float(drop[middle].mean() / drop.mean())
     spread = [float(np.abs(values)[middle].mean() / np.abs(values).mean()) for values in (relief, drop)]
-    said = "reduction of force more uniform along the span"
+    words = "reduction of force more uniform along the span"
     return [
         Comparison(
             "k_m higher: reduction of z_1 in the middle half over that of all",
@@ -151,7 +156,7 @@ def _along_the_span(passes: Sequence[Pass]) -> list[Comparison]:
             "k_m higher: share of the way with less F_C minus that with less z_1",
             "",
             _share(relief) - _share(drop),
-            said,
+            words,
             0.0,
             1.0,
             "the mean of F_C is F(v), whatever k_m: it can't sink all along the span",
@@ -160,7 +165,7 @@ def _along_the_span(passes: Sequence[Pass]) -> list[Comparison]:
             "k_m higher: |change| in the middle half over that of all, F_C's over z_1's",
             "",
             spread[0] / spread[1],
-            said,
+            words,
             0.0,
             1.0,
             "another reading of the words, added after the one above was seen to fail",
@@ -174,13 +179,15 @@ def _share(values: Array) -> float:
 
 def _suspension(measured: Mapping[str, Sensitivity]) -> list[Comparison]:
     """Figs 12 and 13."""
-    own = measured["suspension"]
-    said = "higher k_1: some positive effect"
+    change = measured["suspension"]
+    words = "higher k_1: some positive effect"
     note = "change over ±25 %, as a share"
     return [
-        Comparison("k_1: change of the amplitude of F_C", "", own.swing, said, -inf, 0.0, note),
-        Comparison("k_1: change of the amplitude of z_1", "", own.travel, said, -inf, 0.0, note),
-        Comparison("k_1: change of σ of F_C", "", own.std, "not important", -UNIMPORTANT, UNIMPORTANT, note),
+        Comparison("k_1: change of the amplitude of F_C", "", change.swing, words, -inf, 0.0, note),
+        Comparison("k_1: change of the amplitude of z_1", "", change.travel, words, -inf, 0.0, note),
+        Comparison(
+            "k_1: change of σ of F_C", "", change.std, "not important", -UNIMPORTANT, UNIMPORTANT, note
+        ),
     ]
 
 
@@ -188,7 +195,7 @@ def _order(measured: Mapping[str, Sensitivity]) -> list[Comparison]:
     """The conclusion: speed first, then the catenary's stiffness, the pantograph last."""
     found = []
     for name, key in (("σ of F_C", "std"), ("amplitude of z_1", "travel")):
-        size = {influence: abs(getattr(each, key)) for influence, each in measured.items()}
+        size = {influence: abs(getattr(change, key)) for influence, change in measured.items()}
         line = [size["variation"], size["mean-stiffness"]]
         pantograph = [size["mass"], size["suspension"]]
         note = f"ratio of the changes of the {name} over ±25 %"

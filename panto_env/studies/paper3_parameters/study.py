@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...analysis.sweep import sweep
-from ..study import Outcome, Report
+from ...analysis.sweep import Row, sweep
+from ..study import Comparison, Outcome, Report
 from . import tables
 from .equations import Equations
 from .passes import (
@@ -17,103 +18,116 @@ from .passes import (
     SPEED_KMH,
     SPEEDS_KMH,
     TIME_STEP,
+    Influence,
     Passes,
     influences,
     run_pass,
 )
-from .plots import figure_name, pictures
-from .sensitivity import SHARE, SHARES, measure
+from .plots import all_plots, plot_name
+from .sensitivity import SHARE, SHARES, Sensitivity, measure
 from .statements import statements
 
 SWEPT_KMH = tuple(np.arange(150.0, 501.0, 5.0).tolist())
 """Speeds at which the plant's resonance is looked for."""
+READINGS = {True: "may_pull", False: "can_only_push"}
+"""Whether the contact is bilateral, and how the numbers name it."""
 
 
 def run(report: Report) -> Outcome:
-    """Figures, each number behind them, and the text's statements with a contact that may pull.
+    """Plots, each number behind them, and the text's statements with a contact that may pull.
 
     The same statements with a contact that can only push stand in a table and in the numbers.
     """
     varied = influences()
     passes: dict[bool, Passes] = {}
-    ranking = {}
+    ranking: dict[bool, list[Sensitivity]] = {}
     for share, bilateral in ((0.0, True), (0.3, False)):
         report("contact that may pull" if bilateral else "contact that can only push", share)
         passes[bilateral] = {
-            each.key: [run_pass(each.parameter, value, bilateral=bilateral) for value in each.values]
-            for each in varied
+            influence.key: [
+                run_pass(influence.parameter, value, bilateral=bilateral) for value in influence.values
+            ]
+            for influence in varied
         }
-        ranking[bilateral] = [measure(each, size, bilateral=bilateral) for each in varied for size in SHARES]
+        ranking[bilateral] = [
+            measure(influence, size, bilateral=bilateral) for influence in varied for size in SHARES
+        ]
     report("speeds", 0.6)
-    over_speed = {
-        bilateral: sweep(
-            {"speed_kmh": SWEPT_KMH},
-            catenary=CATENARY,
-            pantograph=PANTOGRAPH,
-            spans=SPANS,
-            bilateral=bilateral,
-            time_step=TIME_STEP,
-        )
-        for bilateral in (True, False)
-    }
-    said = {
+    over_speed = {bilateral: _sweep_speed(bilateral) for bilateral in READINGS}
+    comparisons = {
         bilateral: statements(
             passes[bilateral],
-            [each for each in ranking[bilateral] if each.share == SHARE],
+            [sensitivity for sensitivity in ranking[bilateral] if sensitivity.share == SHARE],
             over_speed[bilateral],
         )
-        for bilateral in (True, False)
+        for bilateral in READINGS
     }
     report("initial values", 0.8)
     beginnings = [tables.Beginning.of(Equations(speed), speed) for speed in SPEEDS_KMH]
-    report("figures", 0.9)
-    figures = pictures(varied, passes[True], passes[False])
     landmarks = tables.landmarks(over_speed[True], Equations(SPEED_KMH))
-    numbers: dict[str, Any] = {
-        "figures": {
-            figure_name(each, quantity): {
-                "parameter": each.parameter,
-                "unit": each.unit,
-                "passes": [
-                    {"value": value, "may_pull": pulls.numbers()[key], "can_only_push": pushes.numbers()[key]}
-                    for value, pulls, pushes in zip(
-                        each.values, passes[True][each.key], passes[False][each.key], strict=True
-                    )
-                ],
-            }
-            for each in varied
-            for quantity, key in (("displacement", "displacement_mm"), ("force", "contact_force_n"))
-        },
-        "standard": {
-            each.key: [
-                {"value": value} | one.numbers()
-                for value, one in zip(each.values, passes[True][each.key], strict=True)
-            ]
-            for each in varied
-        },
-        "sensitivity": {
-            _reading(bilateral): [vars(each) for each in ranking[bilateral]] for bilateral in (True, False)
-        },
-        "comparisons_can_only_push": [each.as_dict() for each in said[False]],
-        "initial_values": [vars(each) for each in beginnings],
-        "over_speed": {_reading(bilateral): rows for bilateral, rows in over_speed.items()},
-        "landmarks_kmh": landmarks,
-    }
+    report("plots", 0.9)
     return Outcome(
         title="Paper 3, Figs 4 to 13: its statements, contact that may pull",
-        comparisons=said[True],
+        comparisons=comparisons[True],
         tables=(
-            tables.figures(varied, passes[True]),
+            tables.extremes(varied, passes[True]),
             tables.ranking(ranking[True]),
-            tables.readings(varied, passes[True], passes[False], said[True], said[False]),
+            tables.readings(varied, passes[True], passes[False], comparisons[True], comparisons[False]),
             tables.static_force(passes[True]["speed"]),
             tables.beginnings(beginnings),
             tables.resonance(landmarks),
         ),
-        figures=figures,
-        numbers=numbers,
+        plots=all_plots(varied, passes[True], passes[False]),
+        numbers={
+            "figures": _behind_plots(varied, passes),
+            "standard": _standard(varied, passes[True]),
+            "sensitivity": {name: [vars(s) for s in ranking[key]] for key, name in READINGS.items()},
+            "comparisons_can_only_push": _plain(comparisons[False]),
+            "initial_values": [vars(beginning) for beginning in beginnings],
+            "over_speed": {name: over_speed[key] for key, name in READINGS.items()},
+            "landmarks_kmh": landmarks,
+        },
     )
 
 
-def _reading(bilateral: bool) -> str:
-    return "may_pull" if bilateral else "can_only_push"
+def _sweep_speed(bilateral: bool) -> list[Row]:
+    return sweep(
+        {"speed_kmh": SWEPT_KMH},
+        catenary=CATENARY,
+        pantograph=PANTOGRAPH,
+        spans=SPANS,
+        bilateral=bilateral,
+        time_step=TIME_STEP,
+    )
+
+
+def _behind_plots(varied: Sequence[Influence], passes: Mapping[bool, Passes]) -> dict[str, Any]:
+    """Extremes, mean and σ of every curve, by the name of its plot."""
+    found = {}
+    for influence in varied:
+        for quantity, key in (("displacement", "displacement_mm"), ("force", "contact_force_n")):
+            curves: list[dict[str, Any]] = [{"value": value} for value in influence.values]
+            for bilateral, name in READINGS.items():
+                for curve, one_pass in zip(curves, passes[bilateral][influence.key], strict=True):
+                    curve[name] = one_pass.numbers()[key]
+            found[plot_name(influence, quantity)] = {
+                "parameter": influence.parameter,
+                "unit": influence.unit,
+                "passes": curves,
+            }
+    return found
+
+
+def _standard(varied: Sequence[Influence], passes: Passes) -> dict[str, Any]:
+    """Every pass beside EN 50367, by the key of its influence."""
+    return {
+        influence.key: [
+            {"value": value} | one_pass.numbers()
+            for value, one_pass in zip(influence.values, passes[influence.key], strict=True)
+        ]
+        for influence in varied
+    }
+
+
+def _plain(comparisons: Sequence[Comparison]) -> list[dict[str, Any]]:
+    return [comparison.as_dict() for comparison in comparisons]

@@ -8,9 +8,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..study import Comparison, Table
+from ...base.table import Table
+from ...metrics import en50367
+from ...metrics.figures import contact_loss
+from ..study import Comparison
 from .equations import RUN_TIME, Equations
-from .passes import SPANS, Influence, Pass, Passes, largest_static_force, maximum_limit
+from .passes import SPANS, Influence, Pass, Passes, largest_static_force
 from .sensitivity import SHARES, Sensitivity
 
 
@@ -30,14 +33,13 @@ class Beginning:
         return cls(speed_kmh, equations.growth(), float(difference), SPANS[1] * equations.span_time)
 
 
-def figures(influences: Sequence[Influence], passes: Passes) -> Table:
+def extremes(influences: Sequence[Influence], passes: Passes) -> Table:
     """Extremes, mean and σ of every curve, with EN 50367's limits."""
     rows: list[tuple[str | float, ...]] = []
     for influence in influences:
-        for value, each in zip(influence.values, passes[influence.key], strict=True):
-            force, displacement = each.force, 1e3 * each.displacement
-            kept = each.numbers()["en50367"]
-            broken = ", ".join(name for name, ok in kept.items() if not ok)
+        for value, one_pass in zip(influence.values, passes[influence.key], strict=True):
+            force, displacement = one_pass.force, 1e3 * one_pass.displacement
+            broken = ", ".join(name for name, kept in one_pass.within_en50367.items() if not kept)
             rows.append(
                 (
                     f"{influence.symbol} = {value:g} {influence.unit}".rstrip(),
@@ -54,19 +56,19 @@ def figures(influences: Sequence[Influence], passes: Passes) -> Table:
 def ranking(sensitivities: Sequence[Sensitivity]) -> Table:
     """Changes of σ at every share, of the amplitudes at all; greatest change of σ at ±25 % first."""
     by_influence: dict[str, list[Sensitivity]] = {}
-    for each in sensitivities:
-        by_influence.setdefault(each.influence, []).append(each)
+    for sensitivity in sensitivities:
+        by_influence.setdefault(sensitivity.influence, []).append(sensitivity)
     middle = len(SHARES) // 2
-    ordered = sorted(by_influence.values(), key=lambda own: -abs(own[middle].std))
-    rows = tuple(
+    ordered = sorted(by_influence.values(), key=lambda over_shares: -abs(over_shares[middle].std))
+    rows = [
         (
-            own[0].symbol,
-            *(f"{100 * each.std:+.1f}" for each in own),
-            *(f"{100 * each.swing:+.1f}" for each in own),
-            *(f"{100 * each.travel:+.1f}" for each in own),
+            over_shares[0].symbol,
+            *(f"{100 * sensitivity.std:+.1f}" for sensitivity in over_shares),
+            *(f"{100 * sensitivity.swing:+.1f}" for sensitivity in over_shares),
+            *(f"{100 * sensitivity.travel:+.1f}" for sensitivity in over_shares),
         )
-        for own in ordered
-    )
+        for over_shares in ordered
+    ]
     headings = tuple(f"{what} ±{100 * share:g}%" for what in ("σ", "F", "z") for share in SHARES)
     title = (
         "Change (%) of σ and of the amplitudes of F_C and z_1 when a parameter goes from -x to +x, 300 km/h"
@@ -78,8 +80,8 @@ def readings(
     influences: Sequence[Influence],
     pulling: Passes,
     pushing: Passes,
-    said_pulling: Sequence[Comparison],
-    said_pushing: Sequence[Comparison],
+    comparisons_pulling: Sequence[Comparison],
+    comparisons_pushing: Sequence[Comparison],
 ) -> Table:
     """The passes in which contact is lost, in both readings, and how many statements hold in each."""
     rows: list[tuple[str | float, ...]] = []
@@ -87,28 +89,40 @@ def readings(
         both = zip(influence.values, pulling[influence.key], pushing[influence.key], strict=True)
         for value, pulls, pushes in both:
             if pulls.force.min() < 0:
-                cells = [f"{x:.1f}" for each in (pulls, pushes) for x in _extremes(each)]
+                cells = [f"{x:.1f}" for one_pass in (pulls, pushes) for x in _extremes(one_pass)]
                 rows.append((f"{influence.symbol} = {value:g} {influence.unit}".rstrip(), *cells))
-    counts = [sum(each.agrees for each in said) for said in (said_pulling, said_pushing)]
-    of = len(said_pulling)
-    rows.append(("statements that hold", f"{counts[0]} of {of}", "", "", f"{counts[1]} of {of}", "", ""))
+    rows.append(
+        (
+            "statements that hold",
+            _agreeing(comparisons_pulling),
+            "",
+            "",
+            _agreeing(comparisons_pushing),
+            "",
+            "",
+        )
+    )
     headings = tuple(
         f"{what}, {how}" for how in ("may pull", "can only push") for what in ("max", "min", "CL %")
     )
     return Table("Where the two readings of the contact differ: F_C (N)", ("pass", *headings), tuple(rows))
 
 
+def _agreeing(comparisons: Sequence[Comparison]) -> str:
+    return f"{sum(comparison.agrees for comparison in comparisons)} of {len(comparisons)}"
+
+
 def static_force(passes: Sequence[Pass]) -> Table:
     """What does not depend on F_S, and the largest F_S that keeps the maximum within EN 50367."""
     rows = tuple(
         (
-            f"{each.speed_kmh:g}",
-            f"{each.force.max() / each.nominal_force:.3f}",
-            f"{each.force.std() / each.nominal_force:.3f}",
-            f"{maximum_limit(each.speed_kmh):g}",
-            f"{largest_static_force(each):.0f}",
+            f"{one_pass.speed_kmh:g}",
+            f"{one_pass.force.max() / one_pass.nominal_force:.3f}",
+            f"{one_pass.force.std() / one_pass.nominal_force:.3f}",
+            f"{en50367.maximum_limit(one_pass.speed_kmh / 3.6):g}",
+            f"{largest_static_force(one_pass):.0f}",
         )
-        for each in passes
+        for one_pass in passes
     )
     headings = ("km/h", "max / F(v)", "σ / F(v)", "limit of max (N)", "largest F_S that keeps it (N)")
     return Table("F_S is not printed: all forces scale with F(v)", headings, rows)
@@ -118,13 +132,13 @@ def beginnings(found: Sequence[Beginning]) -> Table:
     """How long the start is felt."""
     rows = tuple(
         (
-            f"{each.speed_kmh:g}",
-            f"{each.growth:.3f}",
-            f"{each.growth ** (SPANS[0] - 1):.1e}",
-            f"{each.difference:.4f}",
-            f"{each.seconds:.1f}",
+            f"{beginning.speed_kmh:g}",
+            f"{beginning.growth:.3f}",
+            f"{beginning.growth ** (SPANS[0] - 1):.1e}",
+            f"{beginning.difference:.4f}",
+            f"{beginning.seconds:.1f}",
         )
-        for each in found
+        for beginning in found
     )
     headings = ("km/h", "left after a span", "after 10 spans", "F_C, flat less at rest (N)", "to 600 m (s)")
     return Table(f"Initial values are not printed; the paper runs {RUN_TIME:g} s", headings, rows)
@@ -146,7 +160,9 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     high = [row["speed_kmh"] > 200 for row in rows]
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),
-        "maximum above its limit from": first([row["max"] > maximum_limit(row["speed_kmh"]) for row in rows]),
+        "maximum above its limit from": first(
+            [row["max"] > en50367.maximum_limit(row["speed_kmh"] / 3.6) for row in rows]
+        ),
         "contact lost from": first([row["contact_loss"] > 0 for row in rows]),
         "sigma over F(v) greatest at": rows[int(np.argmax(shares))]["speed_kmh"],
         "a span takes a natural period at": resonant,
@@ -158,11 +174,11 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     }
 
 
-def resonance(found: Mapping[str, float]) -> Table:
+def resonance(speeds_kmh: Mapping[str, float]) -> Table:
     """The landmarks, in words."""
-    rows = tuple((name, f"{speed:.0f}") for name, speed in found.items())
+    rows = tuple((name, f"{speed:.0f}") for name, speed in speeds_kmh.items())
     return Table("Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N", ("what", "km/h"), rows)
 
 
-def _extremes(each: Pass) -> tuple[float, float, float]:
-    return float(each.force.max()), float(each.force.min()), float(100 * np.mean(each.force <= 0))
+def _extremes(one_pass: Pass) -> tuple[float, float, float]:
+    return float(one_pass.force.max()), float(one_pass.force.min()), contact_loss(one_pass.force)

@@ -9,12 +9,12 @@ import numpy as np
 
 from ...backend import kernel
 
-# Arithmetic of one step, counted in the source of flexible_parts: adds and multiplies.
-FLOPS_A_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
-FLOPS_A_DROPPER = 90  # two differences 2 x 11, tension 12, two shoves 2 x 20, and what surrounds them
-# Numbers that the sweep moves to or from the nearest cache for each node: u, d, q written; u, d, five q
-# read; u, d written.
-NUMBERS_A_NODE = 12
+# Adds and multiplies of one step, counted in panto_env/plant/catenary/flexible/wires.py and links.py.
+FLOPS_PER_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
+FLOPS_PER_DROPPER = 90  # two differences 2 x 11, tension 12, two forces on wires 2 x 20, what surrounds them
+# Numbers that the leapfrog moves to or from the nearest cache for each node: u, d, q written;
+# u, d, five q read; u, d written.
+NUMBERS_PER_NODE = 12
 CHAIN = 32
 
 
@@ -25,7 +25,7 @@ class Roofline:
     multiply_add: float  # measured peak of multiply and add in registers (GFLOP/s)
     cache: float  # measured traffic of a triad in the nearest cache (GB/s)
     arithmetic: float  # arithmetic of the kernel (GFLOP/s)
-    traffic: float  # traffic of its sweep (GB/s)
+    traffic: float  # traffic of its leapfrog along the wires (GB/s)
     bound: float  # times real time, were the kernel at the nearer of both limits
 
 
@@ -43,7 +43,7 @@ def multiply_add(sums, rounds):
 
 @kernel
 def triad(a, b, c, rounds):
-    """C = b + s a, over arrays that stay in the nearest cache: three numbers an entry."""
+    """C = b + s a, over arrays that stay in the nearest cache: three numbers per entry."""
     s = a[0]
     for _ in range(rounds):
         for i in range(a.size):
@@ -75,9 +75,9 @@ def measure(nodes: int, droppers: int, time_step: float, times_real_time: float,
     triad(a, b, c, 1)
     rounds = 20_000
     cache = 3 * a.nbytes * rounds / _fastest(lambda: triad(a, b, c, rounds), 5)
-    flops = FLOPS_A_NODE * nodes + FLOPS_A_DROPPER * droppers
-    moved = NUMBERS_A_NODE * nodes * a.itemsize
-    steps = times_real_time / time_step  # a second
+    flops = FLOPS_PER_NODE * nodes + FLOPS_PER_DROPPER * droppers
+    moved = NUMBERS_PER_NODE * nodes * a.itemsize
+    steps = times_real_time / time_step  # per second
     return Roofline(
         multiply_add=peak / 1e9,
         cache=cache / 1e9,

@@ -3,50 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from .measure import LINE_SPANS, SHARED, SINGLE_YARDSTICK, SPEED_KMH, VECTOR_YARDSTICK
+from ...base.table import Table
+from .environments import SHARED, SINGLE_YARDSTICK, VECTOR_YARDSTICK
+from .plants import COUNTED, LINE_SPANS, SPEED_KMH
 
 BEGIN, END = "<!-- panto speed --markdown -->", "<!-- end -->"
 """Between these a document holds what the command printed."""
 Row = dict[str, Any]
 
 
-class Sheet(NamedTuple):
-    """A table: its first column names, the others hold figures."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-
-
 def machine(result: Row) -> str:
     """Where and how it was measured."""
-    own = result["machine"]
-    return f"{own['processor']}, Python {own['python']}; medians of {result['repeats']}."
+    processor, python = result["machine"]["processor"], result["machine"]["python"]
+    return f"{processor}, Python {python}; medians of {result['repeats']}."
 
 
-def summary(result: Row) -> Sheet:
+def summary(result: Row) -> Table:
     """Plants and environments, each beside its yardstick."""
     rows = []
     for row in result["plants"]:
-        own, cells = row["times_real_time"], ("–", "–")
-        if row["id"] == "Pantograph-v0":  # the plant whose arithmetic is counted
+        speed, cells = row["times_real_time"], ("–", "–")
+        if row["id"] == COUNTED:
             bound = result["roofline"]["bound"]
-            cells = (f"limit of the core: {bound:,.0f}", _ratio(own, bound))
-        rows.append((f"plant of `{row['id']}`, one core", f"{own:,.0f} × real time", *cells))
+            cells = (f"limit of the core: {bound:,.0f}", _ratio(speed, bound))
+        rows.append((f"plant of `{row['id']}`, one core", f"{speed:,.0f} × real time", *cells))
     measured = {(row["id"], row["lanes"]): row for row in result["environments"]}
     singles = [(row["id"], None) for row in result["plants"]]
     for name, lanes in (*singles, *SHARED):
         row, yardstick = measured[name, lanes], SINGLE_YARDSTICK if lanes is None else VECTOR_YARDSTICK
-        own, other = (each["steps_per_second"] for each in (row, measured[yardstick, lanes]))
-        shown = _lanes(row) if lanes is None else f"{_lanes(row)}, {_count(row['cores'], 'core')}"
-        cells = (f"`{yardstick}`: {other:,.0f}", _ratio(own, other))
-        rows.append((f"`{name}`, {shown}", f"{own:,.0f} steps/s", *cells))
-    return Sheet("Beside yardsticks", ("", "speed", "yardstick", "ratio"), rows)
+        rate, reference = row["steps_per_second"], measured[yardstick, lanes]["steps_per_second"]
+        environment = _lanes(row) if lanes is None else f"{_lanes(row)}, {_count(row['cores'], 'core')}"
+        cells = (f"`{yardstick}`: {reference:,.0f}", _ratio(rate, reference))
+        rows.append((f"`{name}`, {environment}", f"{rate:,.0f} steps/s", *cells))
+    return Table("Beside yardsticks", ("", "speed", "yardstick", "ratio"), rows)
 
 
-def details(result: Row) -> list[Sheet | str]:
+def details(result: Row) -> list[Table | str]:
     """All else: plants and their settings, environments by lanes and by cores."""
     scaling = result["scaling"]
     plants = [(row["catenary"], row) for row in result["plants"]]
@@ -74,9 +68,9 @@ def details(result: Row) -> list[Sheet | str]:
 
 def markdown(result: Row) -> tuple[str, str]:
     """The table of README.md and those of docs/speed.md, each between its markers."""
-    first = _marked([machine(result), _table(summary(result))])
+    first = _marked([machine(result), summary(result).markdown])
     parts = [
-        part if isinstance(part, str) else f"**{part.title}**\n\n{_table(part)}" for part in details(result)
+        part if isinstance(part, str) else f"**{part.title}**\n\n{part.markdown}" for part in details(result)
     ]
     return first, _marked([machine(result), *parts])
 
@@ -85,34 +79,30 @@ def _marked(parts: Sequence[str]) -> str:
     return "\n\n".join((BEGIN, *parts, END)) + "\n"
 
 
-def _table(sheet: Sheet) -> str:
-    rule = ("---", *("---:" for _ in sheet.headings[1:]))
-    return "\n".join(f"| {' | '.join(row)} |" for row in (sheet.headings, rule, *sheet.rows))
-
-
-def _limits(found: Row) -> str:
+def _limits(roofline: Row) -> str:
     return (
-        f"Flexible plant: {found['arithmetic']:.1f} GFLOP/s of {found['multiply_add']:.0f} that one core "
-        f"multiplies and adds in registers, {found['traffic']:.0f} GB/s of {found['cache']:.0f} that it "
-        f"moves in the nearest cache; at the nearer limit it would run {found['bound']:,.0f} × real time."
+        f"Flexible plant: {roofline['arithmetic']:.1f} GFLOP/s of {roofline['multiply_add']:.0f} "
+        f"that one core multiplies and adds in registers, {roofline['traffic']:.0f} GB/s of "
+        f"{roofline['cache']:.0f} that it moves in the nearest cache; at the nearer limit it would run "
+        f"{roofline['bound']:,.0f} × real time."
     )
 
 
-def _plants(title: str, key: str, rows: Sequence[tuple[str, Row]]) -> Sheet:
+def _plants(title: str, key: str, rows: Sequence[tuple[str, Row]]) -> Table:
     headings = (key, "× real time", "slowest", "fastest", "first call (s)")
     cells = []
-    for name, row in rows:
-        factors = (f"{row[each]:,.0f}" for each in ("times_real_time", "slowest", "fastest"))
-        cells.append((name, *factors, f"{row['first_call']:.2f}"))
-    return Sheet(title, headings, cells)
+    for label, row in rows:
+        factors = (f"{row[name]:,.0f}" for name in ("times_real_time", "slowest", "fastest"))
+        cells.append((label, *factors, f"{row['first_call']:.2f}"))
+    return Table(title, headings, cells)
 
 
-def _environments(title: str, rows: Sequence[tuple[str, Row]]) -> Sheet:
+def _environments(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
     cells = []
-    for name, row in rows:
-        rates = (f"{row[each]:,.0f}" for each in ("steps_per_second", "slowest", "fastest"))
-        cells.append((name, *rates))
-    return Sheet(title, ("environment", "steps/s", "slowest", "fastest"), cells)
+    for label, row in rows:
+        rates = (f"{row[name]:,.0f}" for name in ("steps_per_second", "slowest", "fastest"))
+        cells.append((label, *rates))
+    return Table(title, ("environment", "steps/s", "slowest", "fastest"), cells)
 
 
 def _lanes(row: Row) -> str:
@@ -123,5 +113,5 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def _ratio(own: float, yardstick: float) -> str:
-    return f"{own / yardstick:.2g}"
+def _ratio(speed: float, yardstick: float) -> str:
+    return f"{speed / yardstick:.2g}"

@@ -1,4 +1,4 @@
-"""The flexible catenary, by default and converged, beside its judge: ``python -m tests.judge``."""
+"""The flexible catenary beside finite elements: ``python -m tests.finite_element``."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from rich.table import Table
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318.study import in_use
+from panto_env.studies.en50318.convergence import in_use
 
-from . import finite_element
+from . import simulation
+from .figures import figures as figures_of
 
 NAME = "en50318-2002"
 OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precision="double"))
-JUDGE = ((1.0, 1e-3), (0.5, 5e-4), (0.25, 2.5e-4))  # element (m), time step (s)
+FINITE_ELEMENTS = ((1.0, 1e-3), (0.5, 5e-4), (0.25, 2.5e-4))  # element (m), time step (s)
 
 
 def main() -> None:
-    """Print the figures of spans 5 and 6 at 250 and 300 km/h."""
+    """Print the figures of spans 5 and 6 at 250 and 300 km/h, by default and converged."""
     line, pantograph = load_catenary(NAME), load_pantograph(NAME)
     table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
     for speed in (250.0, 300.0):
@@ -33,12 +34,12 @@ def main() -> None:
                 f"{1e3 * numerics.time_step:g}",
                 *row,
             )
-        for element, step in JUDGE:
-            result = finite_element.simulate(
+        for element, step in FINITE_ELEMENTS:
+            result = simulation.simulate(
                 line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length
             )
-            judged = finite_element.figures(result, line.span_length)
-            values = (judged.mean, judged.std, judged.maximum, judged.minimum)
+            theirs = figures_of(result, line.span_length)
+            values = (theirs.mean, theirs.std, theirs.maximum, theirs.minimum)
             row = (f"{value:.2f}" for value in values)
             table.add_row(f"{speed:g}", "finite elements", f"{element:g}", f"{1e3 * step:g}", *row)
         table.add_section()

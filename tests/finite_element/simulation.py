@@ -1,4 +1,4 @@
-"""Independent judge: finite-element run of a lumped-mass pantograph along a flexible line.
+"""Finite-element run of a lumped-mass pantograph along a flexible line.
 
 Newmark's average acceleration; slack droppers and the unilateral contact are solved exactly in each
 step as one small linear complementarity problem over the factorised line.
@@ -109,7 +109,7 @@ class _Contact:
 
     def __init__(self, system: LineSystem, wires: Newmark, pantograph: PantographData, speed: float) -> None:
         if pantograph.contact_stiffness == "rigid":
-            raise NotImplementedError("the finite-element judge needs an elastic contact")
+            raise NotImplementedError("the finite-element model needs an elastic contact")
         self.system, self.wires, self.speed = system, wires, speed
         self.k, self.c = float(pantograph.contact_stiffness), pantograph.contact_damping
         bands = [np.append(np.zeros(d), wires.matrix.diagonal(d)) for d in range(BANDWIDTH, -1, -1)]

@@ -1,0 +1,29 @@
+"""A table for people, as data: a terminal prints it, a document holds it as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text or numbers under headings that name units. Numbers are shown to four digits."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str | float, ...]]
+    text_columns: int = 1  # so many columns from the left are aligned left, the others right
+    section_ends: tuple[int, ...] = ()  # rows, counted from 0, after which a line is drawn
+
+    @property
+    def cells(self) -> list[tuple[str, ...]]:
+        """The rows as text."""
+        return [tuple(cell if isinstance(cell, str) else f"{cell:.4g}" for cell in row) for row in self.rows]
+
+    @property
+    def markdown(self) -> str:
+        """Headings and rows as a table of Markdown, without the title."""
+        right = len(self.headings) - self.text_columns
+        rule = (*["---"] * self.text_columns, *["---:"] * right)
+        return "\n".join(f"| {' | '.join(row)} |" for row in (self.headings, rule, *self.cells))

@@ -1,0 +1,63 @@
+"""The reference model of EN 50318:2002 and the ranges that the standard accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...analysis.simulation import simulate
+from ...metrics.labels import LABELS
+from ...metrics.trajectory import Trajectory
+
+REFERENCE_MODEL = "en50318-2002"
+SPANS = (5, 6)
+SPEEDS_KMH = (250.0, 300.0)
+ACCEPTED: dict[str, tuple[tuple[float, float], ...]] = {
+    "mean": ((110, 120), (110, 120)),
+    "std": ((26, 31), (32, 40)),
+    "statistical_max": ((190, 210), (210, 230)),
+    "statistical_min": ((20, 40), (-5, 20)),
+    "max": ((175, 210), (190, 225)),
+    "min": ((50, 75), (30, 55)),
+    "max_uplift": ((48, 55), (55, 65)),
+    "contact_loss": ((0, 0), (0, 0)),
+}
+"""Accepted ranges (seen in a journal table) of each figure, in its label's unit, at each of SPEEDS_KMH."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One figure beside its accepted range, in ``unit``."""
+
+    figure: str
+    unit: str
+    speed_kmh: float
+    value: float
+    lowest: float
+    highest: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the value is accepted."""
+        return self.lowest <= self.value <= self.highest
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return vars(self) | {"inside": self.inside}
+
+
+def reference_runs(speeds_kmh: Sequence[float] = SPEEDS_KMH, **numerics: Any) -> list[Trajectory]:
+    """The reference model's run at each speed; numerics: keys of ``Numerics``."""
+    return [simulate(REFERENCE_MODEL, REFERENCE_MODEL, speed, **numerics) for speed in speeds_kmh]
+
+
+def check(runs: list[Trajectory]) -> list[Check]:
+    """Every figure of the standard's table for the runs of ``reference_runs``."""
+    checks = []
+    for place, run in enumerate(runs):
+        figures = run.summary(SPANS).as_dict()
+        for name, ranges in ACCEPTED.items():
+            label, (low, high) = LABELS[name], ranges[place]
+            checks.append(Check(name, label.unit, run.speed_kmh, label.scale * figures[name], low, high))
+    return checks

@@ -1,0 +1,126 @@
+"""Tables of the validation, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ...base.table import Table
+from ...metrics.labels import LABELS
+from ...terminal import number
+from . import convergence, reference, wear, window
+
+Row = tuple[str, ...]
+
+
+def checks_table(checks: Sequence[reference.Check]) -> Table:
+    """The standard's table."""
+    headings = ["figure"]
+    for speed in reference.SPEEDS_KMH:
+        headings += [f"{speed:g} km/h", "accepted"]
+    rows: list[Row] = []
+    for name in reference.ACCEPTED:
+        cells = [LABELS[name].heading]
+        for check in (check for check in checks if check.figure == name):
+            value = number(check.value, 2)
+            low, high = number(check.lowest, 0), number(check.highest, 0)
+            cells += [
+                value if check.inside else f"[bold red]{value} outside[/]",
+                low if low == high else f"{low} to {high}",
+            ]
+        rows.append(tuple(cells))
+    title = "EN 50318:2002 reference model, spans 5 and 6, low-passed at 20 Hz"
+    return Table(title, tuple(headings), rows)
+
+
+def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
+    """Figures of the reference model over grid, time step, window and precision."""
+    rows: list[Row] = []
+    section_ends = []
+    for speed in convergence.SPEEDS_KMH:
+        at_speed = [row for row in runs if row["speed_kmh"] == speed]
+        converged = at_speed[0]["std"]
+        for row in at_speed:
+            discretisation = (
+                f"{row['spacing']:.3g}",
+                f"{1e3 * row['time_step']:g}",
+                str(row["window"] or "all"),
+                row["precision"],
+            )
+            change = 100 * (row["std"] / converged - 1)
+            figures = (row["mean"], row["std"], change, row["max"], row["min"], _scaled(row, "max_uplift"))
+            rows.append((f"{speed:g}", *discretisation, *(number(value, 2) for value in figures)))
+        section_ends.append(len(rows) - 1)
+    headings = (
+        *("km/h", "grid\n(m)", "step\n(ms)", "window\n(spans)", "precision"),
+        *(LABELS[name].column for name in ("mean", "std")),
+        _in_percent("std"),
+        *(LABELS[name].column for name in ("max", "min", "max_uplift")),
+    )
+    title = "Convergence; σ relative to the first row of its speed"
+    return Table(title, headings, rows, text_columns=0, section_ends=tuple(section_ends))
+
+
+def windows_table(checks: Sequence[window.WindowCheck]) -> Table:
+    """Travelling windows beside the whole line."""
+    rows = []
+    for check in checks:
+        changes = (f"{change:+.2f}" for change in (check.std, check.max, check.min, check.uplift))
+        case = (check.catenary, f"{check.speed_kmh:g}", str(check.window))
+        rows.append((*case, *changes, number(check.rms)))
+    first, last = window.COMPARED
+    return Table(
+        f"Travelling windows beside a whole line of {window.LINE_SPANS} spans, spans {first} to {last}",
+        (
+            *("line", "km/h", "window\n(spans)"),
+            *(_in_percent(name) for name in ("std", "max")),
+            f"{LABELS['min'].short}\n(% of {LABELS['mean'].short})",
+            _in_percent("max_uplift"),
+            "force, rms\ndifference (N)",
+        ),
+        rows,
+        section_ends=tuple(k for k, check in enumerate(checks) if check.window == window.WINDOWS[-1]),
+    )
+
+
+def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
+    """Figures on worn lines over grid and time step."""
+    rows = []
+    for check in checks:
+        numerics = (
+            f"{check.wavelength:g}",
+            f"{1e3 * check.depth:g}",
+            f"{check.spacing:.3g}",
+            f"{1e3 * check.time_step:g}",
+            f"{check.steps:.1f}",
+        )
+        forces = (_spread(values, 1) for values in (check.std, check.max, check.min, check.raw_max))
+        rows.append((*numerics, *forces, _spread(check.contact_loss, 2)))
+    first, last = wear.SPANS
+    return Table(
+        f"Worn line of EN 50318:2002 at {wear.SPEED_KMH:g} km/h, spans {first} to {last}; "
+        f"mean ± standard deviation over {wear.SEEDS} seeds",
+        (
+            *("wave\n(m)", "depth\n(mm)", "grid\n(m)", "step\n(ms)", "steps\na wave"),
+            *(LABELS[name].column for name in ("std", "max", "min")),
+            f"raw {LABELS['max'].column}",
+            LABELS["contact_loss"].column,
+        ),
+        rows,
+        text_columns=0,
+    )
+
+
+def _scaled(row: dict[str, Any], name: str) -> float:
+    """A figure in its label's unit."""
+    value: float = LABELS[name].scale * row[name]
+    return value
+
+
+def _in_percent(name: str) -> str:
+    return f"{LABELS[name].short}\n(%)"
+
+
+def _spread(values: wear.Spread, digits: int) -> str:
+    mean, deviation = values
+    return f"{mean:.{digits}f} ± {deviation:.{digits}f}"

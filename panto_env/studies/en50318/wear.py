@@ -1,0 +1,76 @@
+"""What grid and time step do to the figures of a worn line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...analysis.simulation import simulate
+from ...plant.line_condition import LINE_CONDITIONS, LineCondition
+from ...plant.numerics import Numerics
+from .convergence import in_use
+from .reference import REFERENCE_MODEL
+
+WORN = LINE_CONDITIONS["worn"]
+CONDITIONS = (
+    WORN,
+    WORN.model_copy(update={"wear_depth": 2e-3}),
+    WORN.model_copy(update={"wear_wavelength": 0.4, "wear_depth": 1e-3}),
+)
+"""The preset, deep waves, and the shortest of the published range."""
+DISCRETISATIONS = (
+    Numerics(spacing=0.125, time_step=2.5e-4),
+    Numerics(spacing=0.375, time_step=5e-4),
+    Numerics(spacing=0.375, time_step=1.25e-3),
+    Numerics(),
+)
+SPEED_KMH = 300.0
+SEEDS = 10
+SPANS = (4, 9)
+"""As the benchmark: after the run-in, up to the end of a run."""
+
+Spread = tuple[float, float]
+"""Mean and standard deviation over SEEDS."""
+
+
+@dataclass(frozen=True)
+class WearCheck:
+    """Figures on a worn line with one grid and step."""
+
+    wavelength: float  # of the wear waves (m)
+    depth: float  # of the wear waves (m)
+    spacing: float | None  # grid (m)
+    time_step: float  # s
+    steps: float  # per wear wave
+    std: Spread  # N; this, max and min low-passed at 20 Hz
+    max: Spread  # N
+    min: Spread  # N
+    raw_max: Spread  # N
+    contact_loss: Spread  # %
+
+
+def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
+    """Runs of the reference model over SPANS at SPEED_KMH, one line per seed."""
+    used, rows = in_use(numerics), []
+    for seed in range(SEEDS):
+        run = simulate(
+            REFERENCE_MODEL,
+            REFERENCE_MODEL,
+            SPEED_KMH,
+            seed=seed,
+            line_condition=condition,
+            record_droppers=False,
+            **used.model_dump(),
+        )
+        figures, raw = run.summary(SPANS), run.contact_force[run.inside(SPANS)]
+        rows.append((figures.std, figures.max, figures.min, raw.max(), figures.contact_loss))
+    means, deviations = np.mean(rows, axis=0).tolist(), np.std(rows, axis=0, ddof=1).tolist()
+    return WearCheck(
+        condition.wear_wavelength,
+        condition.wear_depth,
+        used.spacing,
+        run.time_step,
+        condition.wear_wavelength / (SPEED_KMH / 3.6 * run.time_step),
+        *zip(means, deviations, strict=True),
+    )

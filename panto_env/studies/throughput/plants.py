@@ -1,0 +1,106 @@
+"""How fast the plants are on one core: whole passes without a policy, over their settings."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ...catalog import load_catenary
+from ...control import Task
+from ...control.settings import run_settings
+from ...envs import IDS
+
+COUNTED = "Pantograph-v0"
+"""The environment whose plant has its arithmetic counted, so that the machine's limit for it is known."""
+SPEED_KMH = 300.0
+LINE_SPANS = 12
+"""Spans of the flexible line whose settings are compared, so that the widest window has room."""
+WINDOWS = (3, 5, 7, 11, 0)
+"""Spans computed about the train; 0: the whole line."""
+MODES = (10, 20, 40, 80)
+DISCRETISATIONS: tuple[dict[str, Any], ...] = (
+    {},
+    {"precision": "double"},
+    {"spacing": 0.25, "time_step": 1e-3},
+    {"spacing": 0.25, "time_step": 1e-3, "precision": "double"},
+    {"spacing": 0.5},
+)
+"""Settings of the flexible plant whose cost is compared; what is not named is at its default."""
+
+Report = Callable[[str], None]
+"""Called with what is being measured."""
+
+
+@dataclass(frozen=True)
+class PlantSpeed:
+    """One plant on one core."""
+
+    catenary: str
+    pantograph: str
+    times_real_time: float  # median
+    slowest: float  # of the repeats
+    fastest: float
+    first_call: float  # loading or compiling the kernel, and the first run (s)
+
+
+def plant_speed(settings: dict[str, Any], repeats: int) -> tuple[PlantSpeed, Task]:
+    """Times real time of whole passes at 300 km/h without a policy, on one core; and the task."""
+    task = Task(run_settings(settings | {"speed_kmh": SPEED_KMH}))
+    travelled = 0.0
+
+    def run() -> float:
+        nonlocal travelled
+        task.reset(0, np.random.default_rng(0))
+        start = time.perf_counter()
+        task.run_passively()
+        travelled = float(task.end(0) * task.plant.time_step)
+        return time.perf_counter() - start
+
+    first = run()
+    factors = [travelled / run() for _ in range(repeats)]
+    speed = PlantSpeed(
+        catenary=task.plant.catenary.name,
+        pantograph=task.plant.pantograph.name,
+        times_real_time=statistics.median(factors),
+        slowest=min(factors),
+        fastest=max(factors),
+        first_call=first,
+    )
+    return speed, task
+
+
+def cost_of_settings(repeats: int, report: Report) -> dict[str, list[dict[str, Any]]]:
+    """Speeds of the flexible plant over spans and discretisation, of the three-span plant over modes."""
+
+    def measured(settings: dict[str, Any], what: str) -> tuple[dict[str, Any], Task]:
+        report(what)
+        speed, task = plant_speed(settings, repeats)
+        return asdict(speed), task
+
+    flexible = {"spans": LINE_SPANS}
+    three_span = dict(IDS["PantographThreeSpan-v0"])
+    line = load_catenary(three_span["catenary"])
+    spans, modes, discretisations = [], [], []
+    for window in WINDOWS:
+        speed, _ = measured(flexible | {"window": window}, f"{window or LINE_SPANS} spans computed")
+        spans.append({"spans": window or LINE_SPANS, "whole_line": window == 0} | speed)
+    for count in MODES:
+        entry = line.model_copy(update={"modes": count})
+        speed, _ = measured(three_span | {"catenary": entry}, f"{count} modes of the three-span catenary")
+        modes.append({"modes": count} | speed)
+    for settings in DISCRETISATIONS:
+        what = ", ".join(f"{key} {value}" for key, value in settings.items())
+        speed, task = measured(flexible | settings, f"the flexible plant, {what or 'defaults'}")
+        grid = {"spacing": task.plant.model.line.spacing, "time_step": task.plant.time_step}
+        discretisations.append(grid | {"precision": "single" if in_single(task) else "double"} | speed)
+    return {"spans": spans, "modes": modes, "discretisation": discretisations}
+
+
+def in_single(task: Task) -> bool:
+    """Whether the wires of a flexible plant are computed in single precision."""
+    return bool(task.plant.model.line.stencil.itemsize == 4)
