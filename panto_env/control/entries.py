@@ -1,125 +1,149 @@
-"""Entries of an observation, each with the source that writes it: a new one is one function here.
+"""Entries of an observation, each in one piece: name, scale, unit, where it belongs, and its writer.
 
+A new entry is one decorated function here; its place in an observation is that among these functions.
 A writer gives the physical value of one lane. It may look at ``episode`` (``Episode``), ``block`` (rows of
 ``Row``, column i) and ``task`` (rows of ``TaskRow``, column i); ``lane`` is the lane's place among all,
-``number`` tells entries of the same kind apart.
+``number`` tells entries apart that share a writer.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..backend import inlined
+from ..plant.actuators import ActuatorSettings
+from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .state import TASK_ROW
 
-WRITERS: list[Callable[..., Any]] = []
-"""Writers of all kinds of entries; a kernel knows an entry's writer by its place here."""
+MEASURED, FULL = "measured", "full"
+"""Kinds of observation: what a train can measure; that and more, free of noise and delay."""
 
 
 class Entry(NamedTuple):
-    """One entry of the observation: physical value = entry * scale."""
+    """One entry of an observation: physical value = entry * scale."""
 
     name: str
     scale: float
     unit: str
     writer: int  # place in WRITERS
-    number: int = 0  # tells entries of the same kind apart
+    number: int = 0
 
 
-@dataclass(frozen=True)
-class EntryKind:
-    """A kind of entry: of each name there may be one, or several by number."""
-
-    name: str
-    scale: float
-    unit: str
-    writer: int
-
-    def entry(self, name: str | None = None, scale: float | None = None, number: int = 0) -> Entry:
-        """An entry of this kind, under a name and a scale of its own if given."""
-        return Entry(name or self.name, scale or self.scale, self.unit, self.writer, number)
+Writer = Callable[..., Any]
+Listing = Callable[[ActuatorSettings, PantographData], list[tuple[str, float, str, int]]]
+"""Name, scale, unit and number of all entries that share a writer."""
+WRITERS: list[Writer] = []
+"""Writers of all entries; a kernel knows an entry's writer by its place here."""
+_LISTINGS: list[tuple[str, Listing]] = []
 
 
-def entry_kind(name: str, scale: float, unit: str) -> Callable[[Callable[..., Any]], EntryKind]:
-    """Decorator that makes a writer a kind of entry."""
+def entry(
+    kind: str, name: str, scale: float, unit: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorator of the writer of one entry; kind: MEASURED, or FULL for the full observation alone."""
+    return entries(kind, lambda actuator, pantograph: [(name, scale, unit, 0)])
 
-    def register(writer: Callable[..., Any]) -> EntryKind:
+
+def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
+    """Decorator of a writer of several entries, or of entries that depend on actuator or pantograph."""
+
+    def register(writer: Writer) -> Writer:
         WRITERS.append(inlined(writer))
-        return EntryKind(name, scale, unit, len(WRITERS) - 1)
+        _LISTINGS.append((kind, listing))
+        return writer
 
     return register
 
 
-@entry_kind("head displacement", 0.1, "m")
-def head_displacement(episode, block, task, lane, number, i):
+def entries_of(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
+    """All entries of an observation, in order."""
+    return [
+        Entry(name, scale, unit, writer, number)
+        for writer, (belongs_to, listing) in enumerate(_LISTINGS)
+        if kind == FULL or belongs_to == MEASURED
+        for name, scale, unit, number in listing(actuator, pantograph)
+    ]
+
+
+@entry(MEASURED, "head displacement", 0.1, "m")
+def _head_displacement(episode, block, task, lane, number, i):
     return task[TASK_ROW.READING + READING.HEAD_HEIGHT, i]
 
 
-@entry_kind("frame displacement", 0.1, "m")
-def frame_displacement(episode, block, task, lane, number, i):
+@entry(MEASURED, "frame displacement", 0.1, "m")
+def _frame_displacement(episode, block, task, lane, number, i):
     return task[TASK_ROW.READING + READING.FRAME_HEIGHT, i]
 
 
-@entry_kind("head velocity", 1.0, "m/s")
-def head_velocity(episode, block, task, lane, number, i):
+@entry(MEASURED, "head velocity", 1.0, "m/s")
+def _head_velocity(episode, block, task, lane, number, i):
     return task[TASK_ROW.READING + READING.HEAD_VELOCITY, i]
 
 
-@entry_kind("frame velocity", 1.0, "m/s")
-def frame_velocity(episode, block, task, lane, number, i):
+@entry(MEASURED, "frame velocity", 1.0, "m/s")
+def _frame_velocity(episode, block, task, lane, number, i):
     return task[TASK_ROW.READING + READING.FRAME_VELOCITY, i]
 
 
-@entry_kind("contact force", 100.0, "N")
-def contact_force(episode, block, task, lane, number, i):
+@entry(MEASURED, "contact force", 100.0, "N")
+def _contact_force(episode, block, task, lane, number, i):
     return task[TASK_ROW.READING + READING.CONTACT_FORCE, i]
 
 
-@entry_kind("sine of span position", 1.0, "-")
-def span_sine(episode, block, task, lane, number, i):
+@entry(MEASURED, "sine of span position", 1.0, "-")
+def _span_sine(episode, block, task, lane, number, i):
     return sine_of_turns(task[TASK_ROW.SPANS, i])
 
 
-@entry_kind("cosine of span position", 1.0, "-")
-def span_cosine(episode, block, task, lane, number, i):
+@entry(MEASURED, "cosine of span position", 1.0, "-")
+def _span_cosine(episode, block, task, lane, number, i):
     return cosine_of_turns(task[TASK_ROW.SPANS, i])
 
 
-@entry_kind("speed", 100.0, "m/s")
-def speed(episode, block, task, lane, number, i):
+@entry(MEASURED, "speed", 100.0, "m/s")
+def _speed(episode, block, task, lane, number, i):
     return block[ROW.STRIDE, i] / episode.time_step
 
 
-@entry_kind("last action", 1.0, "-")
-def last_action(episode, block, task, lane, number, i):
+def _actions(actuator: ActuatorSettings, _: PantographData) -> list[tuple[str, float, str, int]]:
+    return [(f"last {place.name.lower()} action", 1.0, "-", k) for k, place in enumerate(actuator.places)]
+
+
+@entries(MEASURED, _actions)
+def _last_action(episode, block, task, lane, number, i):
     return episode.action[lane, number]
 
 
-@entry_kind("wire displacement", 0.1, "m")
-def wire_displacement(episode, block, task, lane, number, i):
+@entry(FULL, "wire displacement", 0.1, "m")
+def _wire_displacement(episode, block, task, lane, number, i):
     return block[ROW.WIRE_HEIGHT, i]
 
 
-@entry_kind("frame force", 100.0, "N")
-def frame_force(episode, block, task, lane, number, i):
+@entries(FULL, lambda actuator, _: [("frame force", actuator.force_limit, "N", 0)])
+def _frame_force(episode, block, task, lane, number, i):
     return block[ROW.FRAME_FORCE, i]
 
 
-@entry_kind("head force", 100.0, "N")
-def head_force(episode, block, task, lane, number, i):
+@entries(FULL, lambda actuator, _: [("head force", actuator.force_limit, "N", 0)])
+def _head_force(episode, block, task, lane, number, i):
     return block[ROW.HEAD_FORCE, i]
 
 
-@entry_kind("mass displacement", 0.1, "m")
-def mass_displacement(episode, block, task, lane, number, i):
+def _inner_masses(_: ActuatorSettings, pantograph: PantographData) -> list[tuple[str, float, str, int]]:
+    """Displacement and velocity of each mass between head and frame."""
+    count = len(pantograph.masses)
+    places = [(k, f"mass {k + 1}") for k in range(1, count - 1)]
+    pairs = [
+        ((f"{mass} displacement", 0.1, "m", k), (f"{mass} velocity", 1.0, "m/s", count + k))
+        for k, mass in places
+    ]
+    return [listed for pair in pairs for listed in pair]
+
+
+@entries(FULL, _inner_masses)
+def _pantograph_state(episode, block, task, lane, number, i):
     return block[ROW.STATE + number, i]
-
-
-@entry_kind("mass velocity", 1.0, "m/s")
-def mass_velocity(episode, block, task, lane, number, i):
-    return block[ROW.STATE + episode.masses + number, i]

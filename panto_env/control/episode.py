@@ -29,7 +29,6 @@ class Episode(NamedTuple):
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
     spans_per_metre: float  # 1/m
     time_step: float  # s
-    masses: int  # of a pantograph
     control_steps: int  # plant steps in a control step
     loss_limit: int  # plant steps without contact that end an episode
     head_range: float  # height of the head (m), either way, that ends an episode

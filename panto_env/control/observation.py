@@ -14,8 +14,7 @@ from ..base.arrays import Array, Index
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
 from ..plant.state import ROW
-from . import entries as of
-from .entries import WRITERS, Entry
+from .entries import FULL, MEASURED, WRITERS, Entry, entries_of
 from .state import MAX_ENTRIES, TASK_ROW
 
 BOUND = 10.0
@@ -51,47 +50,13 @@ class Layout:
         return float(observation[place]) * self.entries[place].scale
 
 
-def measured(actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
-    """What a train can measure."""
-    kinds = (
-        of.head_displacement,
-        of.frame_displacement,
-        of.head_velocity,
-        of.frame_velocity,
-        of.contact_force,
-        of.span_sine,
-        of.span_cosine,
-        of.speed,
-    )
-    actions = enumerate(place.name.lower() for place in actuator.places)
-    return [kind.entry() for kind in kinds] + [
-        of.last_action.entry(f"last {place} action", number=k) for k, place in actions
-    ]
-
-
-def full(actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
-    """Beside it the wire above the head, the actuators and all masses, free of noise and delay."""
-    entries = measured(actuator, pantograph)
-    entries += [of.wire_displacement.entry()]
-    entries += [kind.entry(scale=actuator.force_limit) for kind in (of.frame_force, of.head_force)]
-    for k in range(1, len(pantograph.masses) - 1):  # those between head and frame
-        entries += [
-            of.mass_displacement.entry(f"mass {k + 1} displacement", number=k),
-            of.mass_velocity.entry(f"mass {k + 1} velocity", number=k),
-        ]
-    return entries
-
-
-OBSERVATIONS: dict[str, Callable[[ActuatorSettings, PantographData], list[Entry]]] = {
-    "measured": measured,
-    "full": full,
-}
-"""Kinds of observation by name."""
+OBSERVATIONS = (MEASURED, FULL)
+"""Kinds of observation."""
 
 
 def layout(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> Layout:
     """Entries of the observation ``kind``, one of OBSERVATIONS."""
-    entries = tuple(OBSERVATIONS[kind](actuator, pantograph))
+    entries = tuple(entries_of(kind, actuator, pantograph))
     if len(entries) > MAX_ENTRIES:
         raise ValueError(f"the observation '{kind}' has {len(entries)} entries; at most are {MAX_ENTRIES}")
     return Layout(kind, entries)

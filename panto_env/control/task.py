@@ -107,7 +107,6 @@ class Task:
             per_unit=1 / self.layout.scale,
             spans_per_metre=1.0 / float(self.plant.catenary.span_length),
             time_step=time_step,
-            masses=len(self.plant.pantograph.masses),
             control_steps=self.control_steps,
             loss_limit=round(LOSS_TIME / time_step),
             head_range=HEAD_RANGE,

@@ -23,6 +23,8 @@ from .install import Version, installed
 from .stopwatch import ROWS, Row
 
 CHUNKS = 12  # of each version in a round
+# Set-up uses NumPy's linear algebra, whose threads wait by spinning: on a busy machine that is all noise.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 CLOCK = 0  # column of the seconds by the clock; the other one is of the processor
 Seconds = NDArray[np.float64]
 """(2, 2): of the older and the newer version, by the clock and of the processor."""
@@ -36,7 +38,7 @@ def one_round(name: str, versions: tuple[Version, Version], later_first: bool) -
             clock = stack.enter_context(
                 subprocess.Popen(
                     version.command("stopwatch.py", name),
-                    env=version.environment(),
+                    env=version.environment() | ONE_THREAD,
                     cwd=version.empty,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
@@ -71,10 +73,11 @@ def _hear(clock: subprocess.Popen[str]) -> str:
 
 def _cells(row: Row, rounds: list[Seconds]) -> list[str]:
     seconds = np.array(rounds)
-    speeds = [f"{row.amount / each:,.0f}" for each in np.median(seconds[:, :, CLOCK], axis=0)]
+    speeds = row.amount / np.median(seconds[:, :, CLOCK], axis=0)
     ratio, ratio_of_processor = (seconds[:, 0] / seconds[:, 1]).T
     shown = (np.median(ratio), ratio.min(), ratio.max(), np.median(ratio_of_processor))
-    return [*speeds, row.unit, *(f"{each:.3f}" for each in shown)]
+    told = [f"{speed:,.0f}" if speed >= 100 else f"{speed:.3g}" for speed in speeds]
+    return [*told, row.unit, *(f"{each:.3f}" for each in shown)]
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
 """Time one row of ``speed.py`` with whatever version of the project is on PYTHONPATH.
 
 ``python stopwatch.py ROW`` warms up, prints "ready", and for each line that it is sent runs one chunk of work
-and prints the seconds it took, by the clock and of the processor. So two versions can be timed in turns, while the other one waits.
+and prints the seconds it took, by the clock and of the processor. So two versions can be timed in turns,
+while the other one waits.
 """
 
 from __future__ import annotations

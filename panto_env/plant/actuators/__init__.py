@@ -1,10 +1,12 @@
 """Actuators on the pantograph: one kind per file, found by ``kind`` in its table.
 
-A new kind is a file with its settings, its arrays and its source of ``drive``, and a line in ``ACTUATORS``.
+A new kind is a module here, with its settings, its arrays, its source of ``drive`` and a ``KIND``; and its
+name in ``KINDS``.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 from ...base.settings import parse_kind
@@ -14,16 +16,22 @@ from .lagged import LaggedActuator
 __all__ = [
     "ACTUATORS",
     "ACTUATOR_PRESETS",
+    "KINDS",
     "ActuatorArrays",
     "ActuatorSettings",
     "actuator_settings",
     "drive",
 ]
 
+KINDS = [
+    "lagged",
+]
+"""Words that a table of an actuator may have under ``kind``: the names of the modules. Where a table
+has none, the first is meant."""
 ACTUATORS: dict[str, type[ActuatorSettings]] = {
-    "lagged": LaggedActuator,
+    name: import_module(f".{name}", __name__).KIND for name in KINDS
 }
-"""Kinds by name; the first is meant where a table names none."""
+"""Kinds by name."""
 
 ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": LaggedActuator(),

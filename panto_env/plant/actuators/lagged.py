@@ -35,6 +35,9 @@ class LaggedActuator(ActuatorSettings):
         )
 
 
+KIND = LaggedActuator
+
+
 class LaggedArrays(NamedTuple):
     """Actuators of all lanes; all have a row per place."""
 

@@ -1,22 +1,23 @@
 """The catenaries: one folder per kind, with what it is made of, how it is built, and its step.
 
-A new kind is a module with a schema, a ``CatenaryModel`` and its sources of the operations of ``protocol``,
-and a line in ``CATENARIES``.
+A new kind is a module or folder here, with a schema, a ``CatenaryModel``, its sources of the operations of
+``protocol`` and a ``KIND``; and its name in ``KINDS``.
 """
 
 from __future__ import annotations
 
-from .flexible import FlexibleCatenary, FlexibleCatenaryData
-from .periodic_stiffness import PeriodicStiffness, PeriodicStiffnessData
+from importlib import import_module
+
 from .protocol import CatenaryKind, CatenaryModel
 from .schema import CatenaryData
-from .three_span import ThreeSpan, ThreeSpanData
 
-__all__ = ["CATENARIES", "CatenaryData", "CatenaryKind", "CatenaryModel"]
+__all__ = ["CATENARIES", "KINDS", "CatenaryData", "CatenaryKind", "CatenaryModel"]
 
-CATENARIES: dict[str, CatenaryKind] = {
-    "flexible": CatenaryKind(FlexibleCatenaryData, FlexibleCatenary),
-    "three_span": CatenaryKind(ThreeSpanData, ThreeSpan),
-    "periodic_stiffness": CatenaryKind(PeriodicStiffnessData, PeriodicStiffness),
-}
-"""Kinds by the word that a line's TOML file has under ``kind``."""
+KINDS = [
+    "flexible",
+    "three_span",
+    "periodic_stiffness",
+]
+"""Words that a line's TOML file may have under ``kind``: the names of the modules."""
+CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
+"""Kinds by name."""

@@ -1,11 +1,12 @@
 """Sensors of a train: one kind per file, found by ``kind`` in its table.
 
-A new kind is a file with its settings, its arrays and its sources of the operations, and a line in
-``SENSORS``.
+A new kind is a module here, with its settings, its arrays, its sources of the operations and a ``KIND``; and
+its name in ``KINDS``.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 from ...base.settings import parse_kind
@@ -14,6 +15,7 @@ from .delayed import DelayedSensors
 from .noise import Noise
 
 __all__ = [
+    "KINDS",
     "READING",
     "SENSORS",
     "SENSOR_PRESETS",
@@ -26,10 +28,13 @@ __all__ = [
     "take_readings",
 ]
 
-SENSORS: dict[str, type[SensorSettings]] = {
-    "delayed": DelayedSensors,
-}
-"""Kinds by name; the first is meant where a table names none."""
+KINDS = [
+    "delayed",
+]
+"""Words that a table of sensors may have under ``kind``: the names of the modules. Where a table has
+none, the first is meant."""
+SENSORS: dict[str, type[SensorSettings]] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
+"""Kinds by name."""
 
 SENSOR_PRESETS: dict[str, SensorSettings] = {
     "ideal": DelayedSensors(),

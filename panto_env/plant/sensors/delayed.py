@@ -44,6 +44,9 @@ class DelayedSensors(SensorSettings):
         )
 
 
+KIND = DelayedSensors
+
+
 class DelayedArrays(NamedTuple):
     """Sensors of all lanes."""
 

@@ -11,8 +11,11 @@ The grid covers a window that travels with the train a span at a time, as paper 
 are anchors where the line ends and absorb waves elsewhere. A window of all spans is the whole line.
 """
 
+from ..protocol import CatenaryKind
 from . import step as step
 from .model import FlexibleCatenary
 from .schema import FlexibleCatenaryData
 
-__all__ = ["FlexibleCatenary", "FlexibleCatenaryData"]
+__all__ = ["KIND", "FlexibleCatenary", "FlexibleCatenaryData"]
+
+KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary)

@@ -6,8 +6,11 @@ second and third span is moved to the first and second, the third starts at rest
 coordinates follow by least squares.
 """
 
+from ..protocol import CatenaryKind
 from . import step as step
 from .build import ThreeSpan
 from .schema import ThreeSpanData
 
-__all__ = ["ThreeSpan", "ThreeSpanData"]
+__all__ = ["KIND", "ThreeSpan", "ThreeSpanData"]
+
+KIND = CatenaryKind(ThreeSpanData, ThreeSpan)
