@@ -52,6 +52,14 @@ def test_en50367_limits_at_both_sides_of_their_speeds():
     assert not fast["std"]
 
 
+def test_limit_of_the_mean_is_a_parabola_of_speed_in_kmh():
+    """0.00097 v^2 + 70, v in km/h."""
+    assert en50367.mean_limit(300 / 3.6) == pytest.approx(157.3)
+    at_limit, above = (Figures(mean, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 100) for mean in (157.2, 157.4))
+    assert en50367.checks(at_limit, 300 / 3.6)["mean"]
+    assert not en50367.checks(above, 300 / 3.6)["mean"]
+
+
 def test_limit_of_the_maximum_changes_above_200_kmh():
     assert [en50367.maximum_limit(speed / 3.6) for speed in (190, 200, 205, 300)] == [300, 300, 350, 350]
 
