@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs oldest rllib clean
+.PHONY: demo test lint proofs mutants oldest rllib clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -37,6 +37,10 @@ test: $(READY) lint
 # Slow proofs: more lines against finite elements, longer trainings.
 proofs: $(READY)
 	$(BIN)/pytest -n auto -m slow
+
+# The source is broken on purpose, place by place: a test must notice (an hour on two cores).
+mutants: $(READY)
+	$(BIN)/python -m tests.mutants
 
 # The oldest Gymnasium that is supported, without the extra 'agents'.
 OLDEST := .venv-oldest

@@ -17,7 +17,7 @@ Weights = NDArray[np.float32]
 class Actor:
     """Deterministic policy: a multilayer perceptron from an observation to an action.
 
-    It is a policy itself (``panto_env.policies.Policy``), for any context of the right shape.
+    It is a policy (``panto_env.policies.Policy``) for every context of the right shape.
     """
 
     weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)
@@ -26,11 +26,11 @@ class Actor:
     squashed: bool = False  # whether the last layer goes through tanh; it is clipped otherwise
 
     def squash(self) -> Actor:
-        """The same with tanh at its end."""
+        """The same actor with tanh after its last layer."""
         return replace(self, squashed=True)
 
     def reset(self, context: Context) -> None:
-        """Nothing: it remembers nothing."""
+        """Do nothing: the actor has no memory."""
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""

@@ -1,4 +1,4 @@
-"""What every algorithm has in common: its hyperparameters, which know how to make the learner."""
+"""What every algorithm has in common: hyperparameters that can make the learner."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Algorithm(Settings, ABC):
     """Hyperparameters, named as in Stable-Baselines3; a subclass is an algorithm."""
 
     learning_rate: Positive | tuple[Positive, Positive] = Field(
-        3e-4, description="step of the optimiser; two numbers: from the first to the last, linearly"
+        3e-4, description="step of the optimiser; two numbers: linearly from the first to the second"
     )
     batch_size: Count = Field(256, description="transitions in a minibatch")
     gamma: Share = Field(0.97, description="discount of a reward one control step later")
@@ -27,38 +27,38 @@ class Algorithm(Settings, ABC):
     activation: Literal["tanh", "relu"] = Field("tanh", description="of the hidden layers")
 
     @abstractmethod
-    def make(self, lanes: Any, seed: int) -> Any:
-        """Learner (a ``BaseAlgorithm``) for a ``VecEnv``."""
+    def make_learner(self, lanes: Any, seed: int) -> Any:
+        """Learner (a Stable-Baselines3 ``BaseAlgorithm``) for a ``VecEnv``."""
 
     @abstractmethod
     def actor(self, model: Any) -> Actor:
         """The learner's deterministic policy."""
 
     def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where the hyperparameters don't fit so many lanes and steps."""
+        """Raise InputError where the hyperparameters do not fit this number of lanes and steps."""
 
-    def schedule(self) -> Any:
-        """Learning rate as Stable-Baselines3 takes it."""
+    def learning_rate_schedule(self) -> Any:
+        """Learning rate in the form that Stable-Baselines3 expects."""
         from stable_baselines3.common.utils import LinearSchedule
 
         if isinstance(self.learning_rate, tuple):
             return LinearSchedule(*self.learning_rate, end_fraction=1.0)
         return self.learning_rate
 
-    def network(self) -> dict[str, Any]:
-        """``policy_kwargs`` of the networks."""
+    def policy_kwargs(self) -> dict[str, Any]:
+        """Arguments that shape the networks, named as in Stable-Baselines3."""
         from torch import nn
 
         activation = {"tanh": nn.Tanh, "relu": nn.ReLU}[self.activation]
         return {"net_arch": list(self.net_arch), "activation_fn": activation}
 
-    def layers(self, *modules: Any) -> Actor:
-        """Actor of the linear layers in ``modules`` (torch), in their order."""
+    def actor_from_layers(self, *modules: Any) -> Actor:
+        """Actor made of the linear layers in ``modules`` (torch), in their order."""
         from torch import nn
 
-        linear = [part for module in modules for part in module.modules() if isinstance(part, nn.Linear)]
+        layers = [part for module in modules for part in module.modules() if isinstance(part, nn.Linear)]
         return Actor(
-            weights=tuple(part.weight.detach().cpu().numpy().copy() for part in linear),
-            biases=tuple(part.bias.detach().cpu().numpy().copy() for part in linear),
+            weights=tuple(layer.weight.detach().cpu().numpy().copy() for layer in layers),
+            biases=tuple(layer.bias.detach().cpu().numpy().copy() for layer in layers),
             activation=self.activation,
         )

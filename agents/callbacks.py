@@ -1,4 +1,4 @@
-"""What happens beside the learning: regular acts, the episodes' log, the progress bar."""
+"""What happens beside the learning: calls every so many steps, the log of episodes, the progress bar."""
 
 from __future__ import annotations
 
@@ -13,60 +13,60 @@ from panto_env.terminal import progress_console
 
 from .evaluation import Pair, in_words
 
-REFRESH = 0.2  # s, of the progress bar
+REFRESH = 0.2  # s between two updates of the progress bar
 
 
-class Regular(BaseCallback):  # type: ignore[misc]
-    """Does ``act`` whenever another ``interval`` of training steps is full, and at the end.
+class EveryNSteps(BaseCallback):  # type: ignore[misc]
+    """Calls ``function`` each time that ``interval`` more training steps are done, and at the end.
 
-    Only between two rollouts, where the learner's state is whole.
+    It waits until a rollout ends: between two rollouts the learner's state is complete.
     """
 
-    def __init__(self, interval: int, act: Callable[[], None]) -> None:
+    def __init__(self, interval: int, function: Callable[[], None]) -> None:
         super().__init__()
-        self._interval, self._act, self._last = interval, act, 0
+        self._interval, self._function, self._last_step = interval, function, 0
 
     def _on_training_start(self) -> None:
-        self._last = self.num_timesteps
+        self._last_step = self.num_timesteps
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps // self._interval > self._last // self._interval:
-            self._run()
+        if self.num_timesteps // self._interval > self._last_step // self._interval:
+            self._call()
 
     def _on_training_end(self) -> None:
-        if self.num_timesteps > self._last:
-            self._run()
+        if self.num_timesteps > self._last_step:
+            self._call()
 
-    def _run(self) -> None:
-        self._last = self.num_timesteps
-        self._act()
+    def _call(self) -> None:
+        self._last_step = self.num_timesteps
+        self._function()
 
     def _on_step(self) -> bool:
         return True
 
 
 class EpisodeLog(BaseCallback):  # type: ignore[misc]
-    """Logs figures of the episodes that end."""
+    """Logs figures of each episode when it ends."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, figure_names: Sequence[str]) -> None:
         super().__init__()
-        self._names = names
+        self._figure_names = figure_names
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
             if "figures" in info:
-                for name in self._names:
+                for name in self._figure_names:
                     self.logger.record_mean(f"episode/{name}", info["figures"][name])
         return True
 
 
-class Bar(BaseCallback):  # type: ignore[misc]
+class ProgressBar(BaseCallback):  # type: ignore[misc]
     """A progress bar on stderr, and a line for each evaluation."""
 
-    def __init__(self, total: int, evaluation: Callable[[], list[Pair]]) -> None:
-        """evaluation: gives the pairs of the last evaluation."""
+    def __init__(self, total_steps: int, latest_evaluation: Callable[[], list[Pair]]) -> None:
+        """latest_evaluation: returns the pairs of the last evaluation so far."""
         super().__init__()
-        self._evaluation = evaluation
+        self._latest_evaluation = latest_evaluation
         self._progress = Progress(
             TextColumn("{task.completed:.0f}/{task.total:.0f} steps"),
             BarColumn(),
@@ -74,11 +74,11 @@ class Bar(BaseCallback):  # type: ignore[misc]
             TextColumn("{task.fields[note]}"),
             console=progress_console,
         )
-        self._task = self._progress.add_task("", total=total, note="")
-        self._began, self._first, self._shown = 0.0, 0, 0.0
-        self._pairs: list[Pair] = []
+        self._task = self._progress.add_task("", total=total_steps, note="")
+        self._start_time, self._start_step, self._time_shown = 0.0, 0, 0.0
+        self._pairs_shown: list[Pair] = []
 
-    def __enter__(self) -> Bar:
+    def __enter__(self) -> ProgressBar:
         self._progress.start()
         return self
 
@@ -86,31 +86,32 @@ class Bar(BaseCallback):  # type: ignore[misc]
         self._progress.stop()
 
     def _on_training_start(self) -> None:
-        self._began, self._first = time.monotonic(), self.num_timesteps
+        self._start_time, self._start_step = time.monotonic(), self.num_timesteps
 
     def _on_step(self) -> bool:
-        if time.monotonic() - self._shown > REFRESH:
+        if time.monotonic() - self._time_shown > REFRESH:
             self._show()
         return True
 
     def _on_rollout_start(self) -> None:
-        if self._evaluation() != self._pairs:
+        if self._latest_evaluation() != self._pairs_shown:
             self._show()
 
     def _on_training_end(self) -> None:
         self._show()
 
     def _show(self) -> None:
-        self._shown = time.monotonic()
-        if self._evaluation() != self._pairs:
-            self._pairs = self._evaluation()
-            self._progress.console.print(f"step {self.num_timesteps}: {in_words(self._pairs)}")
-        rate = (self.num_timesteps - self._first) / max(self._shown - self._began, 1e-9)
-        inside = self.model.get_env().unwrapped.seconds / max(self._shown - self._began, 1e-9)
-        parts = [f"{rate:.0f} steps/s, {100 * inside:.0f} % in the environment"]
+        self._time_shown = time.monotonic()
+        if self._latest_evaluation() != self._pairs_shown:
+            self._pairs_shown = self._latest_evaluation()
+            self._progress.console.print(f"step {self.num_timesteps}: {in_words(self._pairs_shown)}")
+        elapsed = max(self._time_shown - self._start_time, 1e-9)
+        steps_per_second = (self.num_timesteps - self._start_step) / elapsed
+        share_in_environment = self.model.get_env().unwrapped.seconds / elapsed
+        notes = [f"{steps_per_second:.0f} steps/s, {100 * share_in_environment:.0f} % in the environment"]
         if self.model.ep_info_buffer:
             rewards = [episode["r"] for episode in self.model.ep_info_buffer]
-            parts.append(f"reward {np.mean(rewards):.1f}")
-        if self._pairs:
-            parts.append(in_words(self._pairs))
-        self._progress.update(self._task, completed=self.num_timesteps, note=", ".join(parts))
+            notes.append(f"reward {np.mean(rewards):.1f}")
+        if self._pairs_shown:
+            notes.append(in_words(self._pairs_shown))
+        self._progress.update(self._task, completed=self.num_timesteps, note=", ".join(notes))

@@ -15,12 +15,15 @@ from panto_env import Trajectory, simulate
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.spans import last_whole_span
 
-DROPPED = ("speed_kmh", "reward")  # arguments of an environment that a pass has not, or its own
+NOT_OF_A_PASS = ("speed_kmh", "reward")
+"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One pass under a policy and the same without; figures leave out the run-in, if that can be."""
+    """One pass under a policy and the same pass without; figures leave out the run-in where a run is long
+    enough.
+    """
 
     speed_kmh: float
     seed: int
@@ -31,18 +34,18 @@ class Pair:
 
     @property
     def ratio(self) -> float:
-        """Sigma over the passive pantograph's; infinite where the pass ended early."""
+        """Sigma divided by that of the passive pantograph; infinite where the pass ended early."""
         return math.inf if self.terminated else self.policy.std / self.passive.std
 
     @property
     def mean_range(self) -> tuple[float, float]:
         """Lowest and highest mean force (N) that qualifies."""
-        allowed: tuple[float, float] = mean_range(self.passive.mean, self.nominal_force)
-        return allowed
+        qualifying: tuple[float, float] = mean_range(self.passive.mean, self.nominal_force)
+        return qualifying
 
     @property
     def qualified(self) -> bool:
-        """Whether the pass was whole and its mean force within the range."""
+        """Whether the pass reached its end with a mean force within the range."""
         low, high = self.mean_range
         return not self.terminated and low <= self.policy.mean <= high
 
@@ -62,7 +65,7 @@ class Pair:
 
 @dataclass
 class Comparison:
-    """Passes along one line, given by the environment's arguments; passive ones are made once."""
+    """Passes along one line, given by the environment's arguments; passive passes are run only once."""
 
     arguments: Mapping[str, Any]
     speeds_kmh: Sequence[float]
@@ -70,25 +73,25 @@ class Comparison:
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
 
     def run(self, policy: Any) -> list[Pair]:
-        """Pairs at every speed and seed. Raises InputError where the policy does not fit."""
+        """Pairs at every speed and seed. Raises InputError where the policy does not fit the task."""
         return [
             pair(*self.passes(policy, speed, seed)) for speed in self.speeds_kmh for seed in range(self.seeds)
         ]
 
     def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
-        """Records of one pass under the policy and of one without."""
-        given = {key: value for key, value in self.arguments.items() if key not in DROPPED}
-        given |= {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
+        """Records of one pass under the policy and of the same pass without."""
+        arguments = {key: value for key, value in self.arguments.items() if key not in NOT_OF_A_PASS}
+        arguments |= {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
         if (speed_kmh, seed) not in self._passive:
-            self._passive[speed_kmh, seed] = simulate(**given)
-        return simulate(**given, policy=policy), self._passive[speed_kmh, seed]
+            self._passive[speed_kmh, seed] = simulate(**arguments)
+        return simulate(**arguments, policy=policy), self._passive[speed_kmh, seed]
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
-    """Figures of two passes over the spans that the benchmark takes too."""
+    """Figures of two passes over the spans that the benchmark evaluates too."""
     spans = None if active.terminated else evaluated_spans(passive)
     return Pair(
-        speed_kmh=round(active.speed_kmh, 6),  # went through m/s
+        speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
         policy=active.summary(spans),
         passive=passive.summary(spans),
@@ -98,14 +101,14 @@ def pair(active: Trajectory, passive: Trajectory) -> Pair:
 
 
 def evaluated_spans(run: Trajectory) -> tuple[int, int] | None:
-    """First and last span behind the run-in, counted from 1; None (all) where a run has none."""
+    """First and last span after the run-in, counted from 1; None (all spans) where the run is too short."""
     covered = float(run.position[-1] + run.position[0])  # positions are those of the steps' middles
     last = last_whole_span(covered, run.span_length, tolerance=1e-9)
     return (FIRST_SPAN, last) if last >= FIRST_SPAN else None
 
 
 def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
-    """Mean ratio of sigma, and whether every pass qualified."""
+    """Mean of the ratios of sigma, and whether every pass qualified."""
     return float(np.mean([pair.ratio for pair in pairs])), all(pair.qualified for pair in pairs)
 
 

@@ -1,4 +1,4 @@
-"""Where the environments of a training are made."""
+"""The environments of a training."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .vec_env import PantographVecEnv
 
 
 def make_lanes(training: Training) -> Any:
-    """``VecEnv`` of the training's lanes; lane i is seeded with seed + i by the learner.
+    """``VecEnv`` of the training's lanes; the learner seeds lane i with seed + i.
 
     Raises InputError where the environment's arguments are not valid.
     """
-    given = {key: value for key, value in training.environment.items() if key != "id"}
+    arguments = {key: value for key, value in training.environment.items() if key != "id"}
     native = gymnasium.make_vec(
-        training.environment["id"], num_envs=training.lanes, autoreset_mode="SameStep", **given
+        training.environment["id"], num_envs=training.lanes, autoreset_mode="SameStep", **arguments
     )
-    assert isinstance(native, PantographVectorEnv)  # the only ids that a training takes
+    assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
     return VecMonitor(PantographVecEnv(native))

@@ -1,4 +1,4 @@
-"""The model file: a Stable-Baselines3 zip with what a policy and a resumed training need besides.
+"""The model file: a Stable-Baselines3 zip with what a policy and a resumed training need in addition.
 
 ``panto.json`` holds the facts below, ``actor.npz`` the deterministic policy, and ``replay.npz``, in a
 checkpoint of SAC, the replay buffer. A policy is read from the first two alone, so that running a
@@ -26,13 +26,13 @@ from panto_env.control.context import Context
 from .actor import Actor
 
 FACTS, ACTOR, REPLAY = "panto.json", "actor.npz", "replay.npz"
-REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-BROKEN = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, ValueError)
-# What reading a damaged zip, JSON or array can raise (pydantic's and JSON's errors are ValueErrors).
+REPLAY_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+READ_ERRORS = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, ValueError)
+"""What reading a damaged zip, JSON or array can raise (errors of pydantic and JSON are ValueErrors)."""
 
 
 class Needs(Settings):
-    """What a policy was trained with and must find again."""
+    """What a policy was trained with and needs in every task that it runs in."""
 
     observation: str  # kind of the layout
     entries: tuple[tuple[str, float], ...]  # name and scale of each observation
@@ -42,7 +42,7 @@ class Needs(Settings):
 
     @classmethod
     def of(cls, context: Context) -> Needs:
-        """What an episode offers."""
+        """What an episode offers a policy."""
         return cls(
             observation=context.layout.kind,
             entries=tuple((entry.name, entry.scale) for entry in context.layout.entries),
@@ -53,40 +53,41 @@ class Needs(Settings):
 
 
 class Facts(Settings):
-    """What a model file says of itself."""
+    """What a model file says about itself."""
 
     format: Literal[1] = 1
     version: str = __version__  # of panto_env
     algorithm: str
     seed: int
-    steps: int  # environment steps it has learnt from
+    steps: int  # environment steps that it has learnt from
     updates: int  # of the networks, as Stable-Baselines3 counts them
-    environment: dict[str, Any]  # of its training: id and arguments
+    environment: dict[str, Any]  # that it was trained in: id and arguments
     needs: Needs
-    ratio: float | None = None  # at its evaluation: sigma over the passive pantograph's, mean
-    qualified: bool = False  # at its evaluation: whether the mean force kept its range
+    ratio: float | None = None  # when last evaluated: mean of sigma over that of the passive pantograph
+    qualified: bool = False  # when last evaluated: whether the mean force kept within its range
     activation: Literal["tanh", "relu"]
     squashed: bool
 
 
 def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
-    """Write a model file, whole or not at all; with the replay buffer if asked."""
+    """Write a model file, whole or not at all. replay: with the replay buffer."""
     with write_whole(path) as temporary:
         model.save(temporary)
         with zipfile.ZipFile(temporary, "a") as archive:
             archive.writestr(FACTS, facts.model_dump_json(indent=1))
-            _store(archive, ACTOR, _flat(actor))
+            _write_arrays(archive, ACTOR, _arrays_of(actor))
             if replay:
                 buffer = model.replay_buffer
-                used = buffer.buffer_size if buffer.full else buffer.pos
-                arrays = {name: getattr(buffer, name)[:used] for name in REPLAYED}
-                _store(archive, REPLAY, arrays | {"position": np.array([buffer.pos, buffer.full])})
+                filled = buffer.buffer_size if buffer.full else buffer.pos
+                arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY_ARRAYS}
+                arrays["position"] = np.array([buffer.pos, buffer.full])
+                _write_arrays(archive, REPLAY, arrays)
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:
-    """What a policy needs of a model file.
+    """The parts of a model file that a policy needs.
 
-    Raises InputError, naming the file, where it is broken or none of ours.
+    Raises InputError, naming the file, where it is damaged or `panto train` did not write it.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -96,7 +97,7 @@ def read_model(path: Path) -> tuple[Facts, Actor]:
             if FACTS not in archive.namelist():
                 raise ValueError(f"it holds no {FACTS}, so `panto train` has not written it")
             facts = Facts.model_validate(json.loads(archive.read(FACTS)))
-            arrays = _load(archive, ACTOR)
+            arrays = _read_arrays(archive, ACTOR)
         layers = range(len(arrays) // 2)
         shape = (len(facts.needs.channels), len(facts.needs.entries))
         if (arrays[f"bias_{layers[-1]}"].shape[0], arrays["weight_0"].shape[1]) != shape:
@@ -109,7 +110,7 @@ def read_model(path: Path) -> tuple[Facts, Actor]:
         )
     except FileNotFoundError as error:
         raise InputError(f"The model file {path} does not exist; check the path.") from error
-    except BROKEN as error:
+    except READ_ERRORS as error:
         reason = f"its {FACTS} is not valid" if isinstance(error, ValidationError) else str(error)
         raise InputError(
             f"{path} is not a whole model file ({reason}); take another, such as an earlier "
@@ -121,7 +122,7 @@ def read_model(path: Path) -> tuple[Facts, Actor]:
 def restore(path: Path, model: Any) -> Facts:
     """Put a checkpoint's networks, optimisers, counts and replay buffer into a new learner.
 
-    Raises InputError where the file is broken or of another algorithm or shape.
+    Raises InputError where the file is damaged or of another algorithm or shape.
     """
     from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
 
@@ -136,24 +137,24 @@ def restore(path: Path, model: Any) -> Facts:
     model.num_timesteps, model._n_updates = facts.steps, facts.updates
     with zipfile.ZipFile(path) as archive:
         if REPLAY in archive.namelist():
-            arrays = _load(archive, REPLAY)
+            arrays = _read_arrays(archive, REPLAY)
             buffer = model.replay_buffer
-            for name in REPLAYED:
+            for name in REPLAY_ARRAYS:
                 getattr(buffer, name)[: len(arrays[name])] = arrays[name]
             buffer.pos, buffer.full = int(arrays["position"][0]), bool(arrays["position"][1])
     return facts
 
 
-def _flat(actor: Actor) -> dict[str, Any]:
+def _arrays_of(actor: Actor) -> dict[str, Any]:
     weights = {f"weight_{k}": weight for k, weight in enumerate(actor.weights)}
     return weights | {f"bias_{k}": bias for k, bias in enumerate(actor.biases)}
 
 
-def _store(archive: zipfile.ZipFile, name: str, arrays: dict[str, Any]) -> None:
+def _write_arrays(archive: zipfile.ZipFile, name: str, arrays: dict[str, Any]) -> None:
     with archive.open(name, "w", force_zip64=True) as member:
         np.savez(member, **arrays)
 
 
-def _load(archive: zipfile.ZipFile, name: str) -> dict[str, Any]:
+def _read_arrays(archive: zipfile.ZipFile, name: str) -> dict[str, Any]:
     with np.load(io.BytesIO(archive.read(name)), allow_pickle=False) as arrays:
         return dict(arrays)

@@ -14,21 +14,23 @@ from .actor import Actor
 from .model_file import Facts, Needs, read_model
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
+"""Place of the actuator, by what its actions drive."""
 
 
 class TrainedPolicy:
-    """Deterministic policy of a model file; it runs only where it finds what it was trained with."""
+    """Deterministic policy of a model file; it runs only in tasks that offer what it was trained with."""
 
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
-        """path: named in errors."""
+        """path: of the model file, for messages of errors."""
         self.path, self.facts, self._actor = path, facts, actor
 
     def reset(self, context: Context) -> None:
-        """Raises InputError where the episode's observation, actuator or interval is another."""
+        """Raises InputError where the episode's observation, actuator or control interval differs."""
         needs, offered = self.facts.needs, Needs.of(context)
         if offered == needs:
             return
-        raise InputError(f"The model {self.path} does not fit this task: {_difference(needs, offered)}.")
+        difference = _first_difference(needs, offered)
+        raise InputError(f"The model {self.path} does not fit this task: {difference}.")
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
@@ -40,17 +42,18 @@ def load(path: str | Path) -> TrainedPolicy:
     return TrainedPolicy(Path(path), *read_model(Path(path)))
 
 
-def _difference(needs: Needs, offered: Needs) -> str:
-    """The first thing that differs, and what to do."""
+def _first_difference(needs: Needs, offered: Needs) -> str:
+    """The first property that differs, and what to do about it."""
     if needs.observation != offered.observation:
         return (
             f"it was trained with observation='{needs.observation}', this is "
             f"'{offered.observation}'; set it so"
         )
     if needs.channels != offered.channels:
+        needed, here = PLACES[needs.channels], PLACES[offered.channels]
         return (
-            f"it was trained with an actuator on place '{PLACES[needs.channels]}', this is on "
-            f"'{PLACES[offered.channels]}'; set actuator={{'place': '{PLACES[needs.channels]}'}}"
+            f"it was trained with an actuator on place '{needed}', this is on '{here}'; "
+            f"set actuator={{'place': '{needed}'}}"
         )
     if needs.force_limit != offered.force_limit:
         return (
@@ -63,11 +66,11 @@ def _difference(needs: Needs, offered: Needs) -> str:
             f"{offered.control_interval:g} s; set it so"
         )
     return (
-        f"it was trained with other observations ({len(needs.entries)}: {_names(needs)}) than this "
-        f"task has ({len(offered.entries)}: {_names(offered)}); take the pantograph of its training "
+        f"it was trained with other observations ({len(needs.entries)}: {_entries(needs)}) than this "
+        f"task has ({len(offered.entries)}: {_entries(offered)}); take the pantograph of its training "
         "or train it anew"
     )
 
 
-def _names(needs: Needs) -> str:
+def _entries(needs: Needs) -> str:
     return ", ".join(f"{name} / {scale:g}" for name, scale in needs.entries)

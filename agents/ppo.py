@@ -27,21 +27,21 @@ class PPO(Algorithm):
     log_std_init: float = Field(-1.0, description="log of the action's first standard deviation")
 
     def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where minibatches don't fill the steps of an update exactly."""
+        """Raise InputError where minibatches do not divide the steps of an update evenly."""
         if lanes * self.n_steps % self.batch_size or lanes * self.n_steps == 1:
             raise InputError(
                 f"lanes x n_steps = {lanes * self.n_steps} must be a multiple of batch_size = "
                 f"{self.batch_size}, and more than 1"
             )
 
-    def make(self, lanes: Any, seed: int) -> Any:
+    def make_learner(self, lanes: Any, seed: int) -> Any:
         """Learner for a ``VecEnv``."""
         import stable_baselines3
 
         return stable_baselines3.PPO(
             "MlpPolicy",
             lanes,
-            learning_rate=self.schedule(),
+            learning_rate=self.learning_rate_schedule(),
             n_steps=self.n_steps,
             batch_size=self.batch_size,
             n_epochs=self.n_epochs,
@@ -52,11 +52,11 @@ class PPO(Algorithm):
             vf_coef=self.vf_coef,
             max_grad_norm=self.max_grad_norm,
             target_kl=self.target_kl,
-            policy_kwargs=self.network() | {"log_std_init": self.log_std_init},
+            policy_kwargs=self.policy_kwargs() | {"log_std_init": self.log_std_init},
             seed=seed,
             device="cpu",
         )
 
     def actor(self, model: Any) -> Actor:
-        """The mean of the action, which is clipped."""
-        return self.layers(model.policy.mlp_extractor.policy_net, model.policy.action_net)
+        """Deterministic policy: the mean of the action, clipped."""
+        return self.actor_from_layers(model.policy.mlp_extractor.policy_net, model.policy.action_net)

@@ -1,4 +1,4 @@
-"""The folder of a training run: what lies where, and what a resumed run finds."""
+"""The folder of a training run: its files, and the checks before a run is resumed."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from .evaluation import Pair
 from .model_file import read_model
 from .settings import Training, parse_training
 
-KEPT = 3  # checkpoints; older ones are removed, since those of SAC carry the replay buffer
-EXTENDABLE = "total_steps"  # the one setting that a resumed run may change, upwards
+CHECKPOINTS_KEPT = 3
+"""Older ones are removed: a checkpoint of SAC carries the replay buffer."""
+EXTENDABLE = "total_steps"
+"""The only setting that a resumed run may change, and only upwards."""
 
 
 class RunFolder:
-    """Paths of a run, and the files that are neither models nor TensorBoard's."""
+    """Paths of a run's files; it reads and writes those that are neither models nor TensorBoard logs."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -33,7 +35,7 @@ class RunFolder:
         self.checkpoints = self.path / "checkpoints"
 
     def begin(self, training: Training) -> None:
-        """Make the folder of a new run. Raises InputError where there is already something."""
+        """Make the folder of a new run. Raises InputError where the folder holds something already."""
         if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             raise InputError(
                 f"{self.path} exists already; go on with it by --resume, or give another --output."
@@ -41,13 +43,13 @@ class RunFolder:
         self._write_settings(training)
 
     def resume(self, training: Training) -> None:
-        """Check that a run is there and is this one. Raises InputError where it is not."""
+        """Check that the folder holds a run with these settings. Raises InputError where it does not."""
         if not self.settings.is_file():
             raise InputError(
                 f"{self.path} holds no run to resume (no {self.settings.name}); train without --resume."
             )
         before = self.read_settings()
-        old, new = (_leaves(settings.model_dump(mode="json")) for settings in (before, training))
+        old, new = (_dotted(settings.model_dump(mode="json")) for settings in (before, training))
         differing = [
             f"{key} is {new.get(key)!r}, was {old.get(key)!r}"
             for key in sorted(old.keys() | new.keys())
@@ -66,7 +68,7 @@ class RunFolder:
         self._write_settings(training)
 
     def read_settings(self) -> Training:
-        """Settings of the run. Raises InputError where the file is not whole."""
+        """Settings of the run. Raises InputError where the file is damaged."""
         try:
             table = json.loads(self.settings.read_text(encoding="utf-8"))
             if not isinstance(table, dict):
@@ -86,7 +88,7 @@ class RunFolder:
         return self.checkpoints / f"step-{steps:09d}.zip"
 
     def newest_checkpoint(self) -> Path | None:
-        """Newest checkpoint that is whole, if there is any."""
+        """Newest checkpoint that is not damaged, if there is one."""
         for path in sorted(self.checkpoints.glob("step-*.zip"), reverse=True):
             try:
                 read_model(path)
@@ -96,8 +98,8 @@ class RunFolder:
         return None
 
     def drop_old_checkpoints(self) -> None:
-        """Keep the newest few."""
-        for path in sorted(self.checkpoints.glob("step-*.zip"))[:-KEPT]:
+        """Keep only the newest checkpoints."""
+        for path in sorted(self.checkpoints.glob("step-*.zip"))[:-CHECKPOINTS_KEPT]:
             path.unlink()
 
     def add_evaluation(self, steps: int, pairs: list[Pair]) -> None:
@@ -116,7 +118,7 @@ class RunFolder:
         self._write_rows(rows)
 
     def drop_evaluations_after(self, steps: int) -> None:
-        """Forget evaluations that a resumed run, at ``steps``, makes again."""
+        """Forget evaluations that a run resumed at ``steps`` will repeat."""
         if self.evaluations.is_file():
             self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
 
@@ -135,12 +137,12 @@ class RunFolder:
             temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
 
 
-def _leaves(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values of nested tables under dotted keys."""
-    leaves: dict[str, Any] = {}
+def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested tables under dotted keys, such as "hyperparameters.gamma"."""
+    values: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
-            leaves |= _leaves(value, f"{prefix}{key}.")
+            values |= _dotted(value, f"{prefix}{key}.")
         else:
-            leaves[prefix + key] = value
-    return leaves
+            values[prefix + key] = value
+    return values

@@ -21,11 +21,11 @@ class SAC(Algorithm):
     learning_starts: Annotated[int, Field(ge=0, strict=True)] = Field(
         2_000, description="steps with random actions before learning starts"
     )
-    tau: Share = Field(0.005, description="share of the critic its target takes over in an update")
+    tau: Share = Field(0.005, description="share of the critic that its target takes over per update")
     train_freq: Count = Field(1, description="steps of each lane between two updates")
     gradient_steps: Count = Field(1, description="minibatches in an update")
     ent_coef: NonNegative | Literal["auto", "auto_0.1", "auto_0.01"] = Field(
-        "auto", description="weight of the entropy; auto: adapted, from 1 or the number behind"
+        "auto", description="weight of the entropy; auto: adapted, beginning at 1 or at the number after it"
     )
 
     def check(self, lanes: int, total_steps: int) -> None:
@@ -35,14 +35,14 @@ class SAC(Algorithm):
                 f"learning_starts = {self.learning_starts} must be less than total_steps = {total_steps}"
             )
 
-    def make(self, lanes: Any, seed: int) -> Any:
+    def make_learner(self, lanes: Any, seed: int) -> Any:
         """Learner for a ``VecEnv``."""
         import stable_baselines3
 
         return stable_baselines3.SAC(
             "MlpPolicy",
             lanes,
-            learning_rate=self.schedule(),
+            learning_rate=self.learning_rate_schedule(),
             buffer_size=self.buffer_size,
             learning_starts=self.learning_starts,
             batch_size=self.batch_size,
@@ -51,11 +51,11 @@ class SAC(Algorithm):
             train_freq=self.train_freq,
             gradient_steps=self.gradient_steps,
             ent_coef=self.ent_coef,
-            policy_kwargs=self.network(),
+            policy_kwargs=self.policy_kwargs(),
             seed=seed,
             device="cpu",
         )
 
     def actor(self, model: Any) -> Actor:
-        """The mode of the action, squashed by tanh."""
-        return self.layers(model.actor.latent_pi, model.actor.mu).squash()
+        """Deterministic policy: the mode of the action, squashed by tanh."""
+        return self.actor_from_layers(model.actor.latent_pi, model.actor.mu).squash()

@@ -33,20 +33,20 @@ class Evaluation(Settings):
 
 
 class Training(Settings):
-    """All that defines a training."""
+    """Everything that defines a training."""
 
     algorithm: str = Field(description="one of ALGORITHMS")
-    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of everything random")
-    total_steps: Count = Field(description="environment steps, of all lanes together")
-    lanes: Count = Field(8, description="environments side by side")
+    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all random numbers")
+    total_steps: Count = Field(description="environment steps, summed over all lanes")
+    lanes: Count = Field(8, description="environments stepped together")
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
-    environment: dict[str, Any] = Field(description="id, and arguments of PantographEnv")
+    environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
     evaluation: Evaluation
     hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the environment, those of its id among them."""
+        """Arguments of the environment, including those that its id sets."""
         return arguments(self.environment)
 
     @property
@@ -56,16 +56,16 @@ class Training(Settings):
 
 
 def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of an environment given as a table with its id.
+    """Arguments of an environment that a table with its id describes.
 
     Raises InputError where the id or the name of an argument is unknown.
     """
     name = environment.get("id")
     if name not in IDS:
         raise InputError(f"[environment]: unknown id {name!r}: {suggest(str(name), list(IDS))}")
-    given = {key: value for key, value in environment.items() if key != "id"}
-    _check_keys(given, tuple(fields()), "[environment]")
-    return {**IDS[name], **given}
+    own = {key: value for key, value in environment.items() if key != "id"}
+    _check_keys(own, tuple(fields()), "[environment]")
+    return {**IDS[name], **own}
 
 
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
@@ -75,15 +75,15 @@ def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
 
 
 def load_training(path: str | Path, **changes: Any) -> Training:
-    """Read a training from a TOML file; ``changes`` (seed, total_steps) that aren't None win.
+    """Read a training from a TOML file; ``changes`` (seed, total_steps) replace the file's unless None.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
     if not Path(path).exists():
         raise InputError(f"The training file {path} does not exist; give a TOML file's path.")
     table = read_toml(path)
-    given = {key: value for key, value in changes.items() if value is not None}
-    return parse_training(table | given, str(path))
+    replacements = {key: value for key, value in changes.items() if value is not None}
+    return parse_training(table | replacements, str(path))
 
 
 def parse_training(table: Mapping[str, Any], name: str) -> Training:
@@ -93,11 +93,11 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         algorithm = table.get("algorithm")
         if algorithm not in ALGORITHMS:
             raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
-        kind = ALGORITHMS[str(algorithm)]
-        for key, fields in (("hyperparameters", kind), ("evaluation", Evaluation)):
+        algorithm_type = ALGORITHMS[str(algorithm)]
+        for key, expected in (("hyperparameters", algorithm_type), ("evaluation", Evaluation)):
             if isinstance(table.get(key), Mapping):
-                _check_keys(table[key], tuple(fields.model_fields), f"[{key}] of {algorithm}")
-        hyperparameters = parse(kind, table.get("hyperparameters", {}), "[hyperparameters]")
+                _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")
+        hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training.lanes, training.total_steps)
         _check_environment(training)
@@ -107,9 +107,8 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
 
 
 def _check_environment(training: Training) -> None:
-    given = training.arguments
     try:
-        task = Task(run_settings(given))
+        task = Task(run_settings(training.arguments))
         for speed in training.evaluation.speeds_kmh or ():
             task.check_speeds(speed)
     except InputError as error:

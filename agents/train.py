@@ -15,14 +15,14 @@ from stable_baselines3.common.logger import configure
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 
-from .callbacks import Bar, EpisodeLog, Regular
+from .callbacks import EpisodeLog, EveryNSteps, ProgressBar
 from .evaluation import Comparison, Pair, verdict
 from .lanes import make_lanes
 from .model_file import Facts, Needs, read_model, restore, write_model
 from .run_folder import RunFolder
 from .settings import Training
 
-LOGGED = ("mean", "std", "contact_loss", "cost_function")  # figures in the log
+LOGGED_FIGURES = ("mean", "std", "contact_loss", "cost_function")
 
 
 def train(
@@ -30,13 +30,13 @@ def train(
 ) -> RunFolder:
     """Train a model into the folder ``output``; returns the folder's paths.
 
-    resume: go on from the newest whole checkpoint of the run in ``output`` (from the beginning, if
-    there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
-    episodes are not, so a resumed run is as good as an uninterrupted one, but not the same.
-    progress: show a bar on stderr. Raises InputError where the run exists (or, to resume, does
-    not) or has other settings.
+    resume: continue from the newest undamaged checkpoint of the run in ``output`` (from the beginning,
+    if there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
+    episodes are not, so a resumed run is as good as an uninterrupted one, but not identical to it.
+    progress: show a bar on stderr. Raises InputError where the run exists already (or, with ``resume``,
+    does not exist) or has other settings.
     """
-    with _one_thread(), ExitStack() as stack:
+    with _torch_on_one_thread(), ExitStack() as stack:
         lanes = make_lanes(training)
         stack.callback(lanes.close)
         run = Run(training, RunFolder(output), lanes)
@@ -50,71 +50,74 @@ def train(
 
 
 class Run:
-    """A learner, its folder, and what is done with both between two rollouts."""
+    """A learner and its folder, and what happens with both between two rollouts."""
 
     def __init__(self, training: Training, folder: RunFolder, lanes: Any) -> None:
         """lanes: ``VecEnv`` to learn from."""
         self.training, self.folder = training, folder
-        self.model = training.hyperparameters.make(lanes, training.seed)
+        self.model = training.hyperparameters.make_learner(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation
         self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
-        self._best = (False, -math.inf)  # evaluation of the best model: qualified, minus the ratio
+        self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         self._comparison = Comparison(training.arguments, training.speeds_kmh, training.evaluation.seeds)
 
     def restore(self) -> None:
-        """Take up the newest whole checkpoint, if there is one."""
+        """Load the newest undamaged checkpoint, if there is one."""
         newest = self.folder.newest_checkpoint()
         if newest is not None:
             restore(newest, self.model)
-            # Else lanes and exploration would begin again with the first random numbers.
+            # Otherwise lanes and exploration would repeat the random numbers of the first part.
             self.model.set_random_seed(self.training.seed + self.model.num_timesteps)
         if self.folder.best.is_file():
             facts, _ = read_model(self.folder.best)
-            self._best = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
+            self._best_score = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
         self.folder.drop_evaluations_after(self.model.num_timesteps)
 
     def learn(self, stack: ExitStack, progress: bool) -> None:
-        """Learn the steps that are left, and write the final model."""
-        left = self.training.total_steps - self.model.num_timesteps
-        if left <= 0 and self.folder.model.is_file():
+        """Learn the remaining steps, and write the final model."""
+        remaining_steps = self.training.total_steps - self.model.num_timesteps
+        if remaining_steps <= 0 and self.folder.model.is_file():
             return
         self.model.set_logger(configure(str(self.folder.tensorboard), ["tensorboard"]))
         stack.callback(self.model.logger.close)
-        # Evaluations first: then no checkpoint lies behind the table of evaluations.
+        # Evaluations come first, so that no checkpoint is newer than the table of evaluations.
         callbacks: list[Any] = [
-            EpisodeLog(LOGGED),
-            Regular(self.training.evaluation.interval_steps, self.evaluate),
-            Regular(self.training.checkpoint_steps, self.checkpoint),
+            EpisodeLog(LOGGED_FIGURES),
+            EveryNSteps(self.training.evaluation.interval_steps, self.evaluate),
+            EveryNSteps(self.training.checkpoint_steps, self.checkpoint),
         ]
         if progress:
-            bar = Bar(self.training.total_steps, lambda: self.pairs)
+            bar = ProgressBar(self.training.total_steps, lambda: self.pairs)
             callbacks.append(stack.enter_context(bar))
-        if left > 0:
+        if remaining_steps > 0:
             self.model.learn(
-                left, callback=CallbackList(callbacks), log_interval=1, reset_num_timesteps=False
+                remaining_steps,
+                callback=CallbackList(callbacks),
+                log_interval=1,
+                reset_num_timesteps=False,
             )
         self._save(self.folder.model)
 
     def evaluate(self) -> None:
-        """Compare the policy with the passive pantograph; add to table and log; keep the best."""
+        """Compare the policy with the passive pantograph; note it in table and log; keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
         self.pairs = self._comparison.run(self.training.hyperparameters.actor(self.model))
         ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)
         for pair in self.pairs:
-            for name in LOGGED:
+            for name in LOGGED_FIGURES:
                 value = pair.policy.as_dict()[name]
                 logger.record_mean(f"evaluation/{name}_{pair.speed_kmh:g}_kmh", value)
         logger.dump(steps)
-        if (qualified, -ratio) > self._best or not self.folder.best.is_file():
-            self._best = (qualified, -ratio)
+        if (qualified, -ratio) > self._best_score or not self.folder.best.is_file():
+            self._best_score = (qualified, -ratio)
             self._save(self.folder.best)
 
     def checkpoint(self) -> None:
-        """Write a checkpoint; drop the oldest."""
-        replay = hasattr(self.model, "replay_buffer")
-        self._save(self.folder.checkpoint(self.model.num_timesteps), replay)
+        """Write a checkpoint and remove the oldest one."""
+        has_replay_buffer = hasattr(self.model, "replay_buffer")
+        self._save(self.folder.checkpoint(self.model.num_timesteps), replay=has_replay_buffer)
         self.folder.drop_old_checkpoints()
 
     def _save(self, path: Path, replay: bool = False) -> None:
@@ -136,8 +139,8 @@ class Run:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
-    """More threads gain networks this small nothing, and cost much where the cores are shared."""
+def _torch_on_one_thread() -> Iterator[None]:
+    """More threads do not speed up such small networks, and slow everything down on shared cores."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

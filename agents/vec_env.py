@@ -14,24 +14,24 @@ from panto_env.envs import PantographVectorEnv
 
 
 class PantographVecEnv(VecEnv):  # type: ignore[misc]
-    """A ``VecEnv`` over ``PantographVectorEnv``, which must begin anew in the same step.
+    """A ``VecEnv`` around a ``PantographVectorEnv`` with autoreset in the same step.
 
-    Observations and rewards are those of the native environment, not copied again. A lane whose episode
-    ends has in its info "terminal_observation", "TimeLimit.truncated" and the episode's "figures".
+    Observations and rewards are those of the native environment, not copied again. When its episode
+    ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the episode's "figures".
     """
 
     def __init__(self, env: PantographVectorEnv) -> None:
         self.env = env
-        self.seconds = 0.0  # spent in the environment
+        self.seconds = 0.0  # spent in the native environment's steps so far
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Start episodes in all lanes; lane i has the seed that ``seed`` gave plus i."""
-        given = [seed for seed in self._seeds if seed is not None]
-        observation, told = self.env.reset(seed=list(self._seeds) if given else None)
+        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i."""
+        seeded = any(seed is not None for seed in self._seeds)
+        observation, info = self.env.reset(seed=list(self._seeds) if seeded else None)
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = [{"speed_kmh": float(speed)} for speed in told["speed_kmh"]]
+        self.reset_infos = [{"speed_kmh": float(speed)} for speed in info["speed_kmh"]]
         return observation
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
@@ -39,18 +39,18 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
-        """Step all lanes: observations, rewards, dones and one info a lane."""
-        began = time.perf_counter()
-        observation, reward, terminated, truncated, told = self.env.step(self._actions)
-        self.seconds += time.perf_counter() - began
+        """Step all lanes: observations, rewards, dones and one info per lane."""
+        start = time.perf_counter()
+        observation, reward, terminated, truncated, info = self.env.step(self._actions)
+        self.seconds += time.perf_counter() - start
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
-            final, figures = told["final_obs"], told["final_info"]["figures"]
-            names = [name for name in figures if not name.startswith("_")]
+            final_observation, figures = info["final_obs"], info["final_info"]["figures"]
+            names = [name for name in figures if not name.startswith("_")]  # "_name" says who has one
             for lane in np.flatnonzero(done).tolist():
                 infos[lane] = {
-                    "terminal_observation": final[lane],
+                    "terminal_observation": final_observation[lane],
                     "TimeLimit.truncated": bool(truncated[lane]),
                     "figures": {name: float(figures[name][lane]) for name in names},
                 }
@@ -61,15 +61,15 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The native environment's attribute, once a lane asked for."""
+        """The native environment's attribute, repeated for each lane asked for."""
         return [getattr(self.env, attr_name)] * len(self._lanes(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: lanes share one environment, so an attribute can't be set for some."""
+        """Refused: lanes share one environment, so an attribute cannot be set for some of them."""
         raise NotImplementedError("The lanes share one environment; make it anew to change an attribute.")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the native environment once; its answer for each lane asked for."""
+        """Call a method of the native environment once; its answer, repeated for each lane asked for."""
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.base.settings import parse
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.actuators.lagged import ACTUATORS, Actuator
+from panto_env.plant.actuators import actuator_settings
+from panto_env.plant.actuators.lagged import LaggedActuator
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
-from panto_env.plant.step import FRAME_FORCE
+from panto_env.plant.state import Row
 
 STEP = 1e-3
 
@@ -17,34 +17,34 @@ def response(actuator, command, steps=200):
     plant = Plant(line, pantograph, numerics=Numerics(time_step=STEP), actuator=actuator)
     samples = plant.samples(steps + 1)
     plant.start(0, 50.0)
-    plant.advance(np.array([[command, 0.0]]), steps, samples)
-    return samples.channels[0, 1:, FRAME_FORCE]
+    plant.advance(np.array([[[command, 0.0]]]), steps, samples)
+    return samples.rows[0, 1:, 0, Row.FRAME_FORCE]
 
 
 def test_ideal_actuator_follows_at_once_within_its_limit():
-    assert response(Actuator(), 60.0, 3).tolist() == [60.0] * 3
-    assert response(Actuator(), 500.0, 1).tolist() == [100.0]
+    assert response(LaggedActuator(), 60.0, 3).tolist() == [60.0] * 3
+    assert response(LaggedActuator(), 500.0, 1).tolist() == [100.0]
 
 
 def test_delay_and_lag_are_those_of_the_closed_form():
-    forces = response(Actuator(delay=0.005, lag=0.015), 60.0)
+    forces = response(LaggedActuator(delay=0.005, lag=0.015), 60.0)
     time = STEP * (np.arange(200) + 1)
     expected = 60 * (1 - np.exp(-np.maximum(time - 0.005, 0) / 0.015))
     np.testing.assert_allclose(forces, expected, atol=1e-9)
 
 
 def test_rate_limit():
-    forces = response(Actuator(rate_limit=2500.0), 100.0)
+    forces = response(LaggedActuator(rate_limit=2500.0), 100.0)
     assert np.diff(forces, prepend=0.0).max() == pytest.approx(2.5)
     assert forces[-1] == 100.0
 
 
 def test_presets_and_errors():
-    assert parse(Actuator, "realistic", "actuator", ACTUATORS).delay == 0.005
+    assert actuator_settings("realistic").delay == 0.005
     with pytest.raises(InputError, match=r"actuator is not valid: key 'lag'"):
-        parse(Actuator, {"lag": -1}, "actuator", ACTUATORS)
+        actuator_settings({"lag": -1})
     with pytest.raises(InputError, match="actuator must be 'ideal' or 'realistic'"):
-        parse(Actuator, "perfect", "actuator", ACTUATORS)
+        actuator_settings("perfect")
 
 
 class Constant:

@@ -30,6 +30,7 @@ from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
 from panto_env import InputError, simulate
 from panto_env.control import Task
+from panto_env.control.settings import run_settings
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
@@ -188,7 +189,7 @@ class TestPolicy:
     def test_acts_as_stable_baselines_does(self, finished):
         model = getattr(stable_baselines3, algorithm_of(finished).upper()).load(finished.model)
         policy = load(finished.model)
-        task = Task(**settings(algorithm_of(finished)).arguments)
+        task = Task(run_settings(settings(algorithm_of(finished)).arguments))
         policy.reset(task.context(0))
         for observation in np.random.default_rng(0).uniform(-2, 2, (50, 9)).astype(np.float32):
             expected, _ = model.predict(observation, deterministic=True)
@@ -223,7 +224,7 @@ class TestPolicy:
         subprocess.run([sys.executable, "-c", code], check=True)
 
     @pytest.mark.parametrize(
-        ("change", "told"),
+        ("change", "message"),
         [
             ({"observation": "full"}, "observation='measured'"),
             ({"actuator": {"place": "head"}}, "'place': 'frame'"),
@@ -231,11 +232,11 @@ class TestPolicy:
             ({"control_interval": 0.02}, "control_interval of 0.01 s"),
         ],
     )
-    def test_refuses_another_task(self, finished, change, told):
+    def test_refuses_another_task(self, finished, change, message):
         line = settings(algorithm_of(finished)).arguments | change
         with pytest.raises(InputError, match="does not fit") as caught:
             simulate(**line, policy=str(finished.model))
-        assert told in str(caught.value)
+        assert message in str(caught.value)
         assert finished.model.name in str(caught.value)
 
     def test_broken_files(self, copied, tmp_path):
@@ -269,7 +270,7 @@ class TestSettings:
         assert load_training(path).total_steps > 0
 
     @pytest.mark.parametrize(
-        ("change", "told"),
+        ("change", "message"),
         [
             ({"algorithm": "pppo"}, "unknown algorithm 'pppo': did you mean 'ppo'?"),
             ({"total_step": 5}, "unknown key 'total_step' in the top level: did you mean 'total_steps'?"),
@@ -291,10 +292,10 @@ class TestSettings:
             ({"environment": LINE | {"reward": {"calm": 1.0}}}, "key 'calm'"),
         ],
     )
-    def test_errors_name_the_key(self, change, told):
+    def test_errors_name_the_key(self, change, message):
         with pytest.raises(InputError) as caught:
             settings("ppo", **change)
-        assert told in str(caught.value)
+        assert message in str(caught.value)
         assert str(caught.value).startswith("test: ")
         assert "\n" not in str(caught.value)
 
@@ -341,21 +342,21 @@ class TestCommand:
         monkeypatch.chdir(tmp_path)
         result = panto("train", config, "--seed", 3, "--steps", 128, "--json")
         assert result.exit_code == 0, result.stderr
-        told = json.loads(result.stdout)
-        assert told["output"] == "runs/tiny-ppo-seed3"
-        assert told["model_steps"] == 128
+        report = json.loads(result.stdout)
+        assert report["output"] == "runs/tiny-ppo-seed3"
+        assert report["model_steps"] == 128
         assert "σ" in result.stderr  # the evaluation's line beside the bar
 
-        result = panto("evaluate", told["best"], "--plot", "forces.png", "--json")
+        result = panto("evaluate", report["best"], "--plot", "forces.png", "--json")
         assert result.exit_code == 0, result.output
         passes = json.loads(result.stdout)["passes"]
         assert [entry["speed_kmh"] for entry in passes] == [250, 275, 300]
         assert np.mean([1 + entry["std_change_percent"] / 100 for entry in passes]) == pytest.approx(
-            told["best_ratio"]
+            report["best_ratio"]
         )
         assert Path("forces.png").read_bytes().startswith(b"\x89PNG")
 
-        table = panto("evaluate", told["best"], "--speed", 280, "--seeds", 2)
+        table = panto("evaluate", report["best"], "--speed", 280, "--seeds", 2)
         assert "standard deviation" in table.stdout
         assert "280" in table.stdout
 

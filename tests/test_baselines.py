@@ -14,8 +14,8 @@ from panto_baselines.policies.passive import Passive
 from panto_baselines.policies.pd import ProportionalDerivative
 from panto_baselines.policies.proportional import Proportional
 from panto_env import InputError, simulate
-from panto_env.control import Task
 from panto_env.control.context import Context
+from panto_env.envs import PantographEnv
 from panto_env.policies import Policy, find_policy
 
 SPEED_KMH = 300.0
@@ -27,10 +27,15 @@ POLICIES = {
 }
 
 
+def environment(**settings: Any) -> PantographEnv:
+    """An environment at the start of an episode."""
+    env = PantographEnv(**{"speed_kmh": SPEED_KMH} | settings)
+    env.reset(seed=0)
+    return env
+
+
 def a_context(**settings: Any) -> Context:
-    task = Task(speed_kmh=SPEED_KMH, **settings)
-    task.reset(0, np.random.default_rng(0))
-    return task.context(0)
+    return environment(**settings).context
 
 
 CONTEXT = a_context()
@@ -152,16 +157,14 @@ def test_feedback_takes_the_contact_force_in_from_0_to_300_newtons() -> None:
 
 @pytest.mark.parametrize(("speed", "gain"), [(200, 0.4), (275, 0.55), (300, 0.6), (400, 0.8)])
 def test_feedback_gain_depends_on_speed(speed: float, gain: float) -> None:
-    task = Task(speed_kmh=speed)
-    task.reset(0, np.random.default_rng(0))
-    policy = FeedbackFeedforward(gain={400: 0.8, 200: 0.4}, amplitude=0)
-    policy.reset(task.context(0))
-    got = force(policy, task.context(0), contact_force=NOMINAL - 10)
+    context = a_context(speed_kmh=speed)
+    policy = ready(FeedbackFeedforward(gain={400: 0.8, 200: 0.4}, amplitude=0), context)
+    got = force(policy, context, contact_force=context.nominal_force - 10)
     assert got == pytest.approx(10 * gain, rel=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("parameters", "turns_a_metre"),
+    ("parameters", "turns_per_metre"),
     [
         ({}, 1 / 60),
         ({"reading": "printed"}, 2 * 300 / 60 / (4 * 60)),
@@ -170,18 +173,17 @@ def test_feedback_gain_depends_on_speed(speed: float, gain: float) -> None:
 )
 @pytest.mark.parametrize("theta", [math.pi / 6, -1.0])
 def test_feedforward_follows_the_equation_along_the_line(
-    parameters: dict[str, Any], turns_a_metre: float, theta: float
+    parameters: dict[str, Any], turns_per_metre: float, theta: float
 ) -> None:
-    task = Task(speed_kmh=SPEED_KMH)
-    task.reset(0, np.random.default_rng(0))
-    policy = FeedbackFeedforward(gain=0, theta=theta, **parameters)
-    policy.reset(task.context(0))
-    for _ in range(100):
-        x = task.plant.step[0] * task.plant.stride[0]
-        action = policy.act(task.episode.observation[0])
-        expected = 10 * math.sin(2 * math.pi * turns_a_metre * x - theta)
+    env = environment()
+    policy = ready(FeedbackFeedforward(gain=0, theta=theta, **parameters), env.context)
+    observation, _ = env.reset(seed=0)
+    for k in range(100):
+        x = k * 0.01 * SPEED_KMH / 3.6
+        action = policy.act(observation)
+        expected = 10 * math.sin(2 * math.pi * turns_per_metre * x - theta)
         assert 100 * action[0] == pytest.approx(expected, abs=1e-6)
-        task.step(action[None])
+        observation, *_ = env.step(action)
 
 
 def test_feedforward_is_in_step_with_the_spans_wherever_the_run_begins() -> None:

@@ -200,11 +200,10 @@ def test_bad_action_is_refused_and_changes_nothing(action):
         ({"distance": -5}, "distance must be a positive number"),
         ({"distance": 1e9}, "spans"),
         ({"control_interval": 0.0015}, "whole number of time steps"),
-        ({"time_step": 0}, "the discretisation is not valid: key 'time_step'"),
+        ({"time_step": 0}, "time_step must be greater than 0, not 0"),
         ({"window": 4}, "must be an odd number of spans"),
-        ({"precision": "half"}, "key 'precision'"),
+        ({"precision": "half"}, "precision must be 'single' or 'double', not 'half'"),
         ({"spans": 1}, "spans must be a whole number from 3 to 1000"),
-        ({"velocity": 300}, "Unknown argument 'velocity'"),
         ({"render_mode": "human"}, "render_mode must be None or 'rgb_array'"),
     ],
 )
@@ -212,6 +211,16 @@ def test_bad_arguments_are_refused_in_one_sentence(settings, message):
     with pytest.raises(InputError, match=message) as caught:
         panto_env.envs.PantographEnv(**settings)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [panto_env.envs.PantographEnv, panto_env.envs.PantographVectorEnv])
+def test_unknown_argument_is_a_type_error_as_in_python(kind):
+    with pytest.raises(
+        TypeError, match=r"unexpected keyword argument 'pantogaph'; did you mean 'pantograph'"
+    ):
+        kind(pantogaph="dsa250")
+    with pytest.raises(TypeError, match="unexpected keyword argument 'velocity'"):
+        panto_env.simulate(velocity=300)
 
 
 def test_options_hold_for_one_episode():

@@ -1,13 +1,13 @@
-import numba
 import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.backend.compile import OPTIONS
+from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant import step as coupling
-from panto_env.plant.catenary.flexible import build as flexible
+from panto_env.plant.catenary.flexible import model
+from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
+from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, look_at_contact
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 
@@ -16,13 +16,16 @@ from .finite_element import simulation as finite_element
 WHOLE = {"window": 0, "precision": "double"}
 
 
-@numba.njit(**OPTIONS)
+@kernel
 def travel(line, wire, start, stride, force, heights):
     """Move a constant force along the line; heights of the wire under it."""
+    wire.position[0, 0], wire.force[0, 0] = start, force
     for n in range(heights.size):
         x0, x1 = start + stride * n, start + stride * (n + 1)
-        height, compliance, _ = coupling.move_wire(line, wire, 0, x0, x1, force)
-        coupling.load_wire(line, wire, 0, x0, x1, force)
+        advance_wire(line, wire, 0)
+        height, compliance, _ = look_at_contact(line, wire, 0, 0, x0, x1)
+        apply_force(line, wire, 0, 0, x0, x1, force)
+        end_step(line, wire, 0)
         heights[n] = height + compliance * force
 
 
@@ -40,9 +43,9 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     limp = line.droppers.model_copy(update={"stiffness": 1e-6})
     alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
     step, speed, force = 1e-3, 300 / 3.6, 100.0
-    built = flexible.build(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
+    built = constants(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
     bare = built._replace(shape=np.zeros_like(built.shape))
-    wire = flexible.at_rest(bare, 1)
+    wire = at_rest(bare, 1)
     steps = 3000  # before the far anchor's reflection
     heights = np.zeros(steps)
     travel(bare, wire, 0.0, speed * step, force, heights)
@@ -64,11 +67,11 @@ def energy(line, wire, step):
         u = old[w]
         pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
         total -= (now[w, 2:-2] * pull).sum() * mass / (2 * step**2)
-    springs = line.support_spring.sum(axis=2)
-    total += (springs * middle[:, line.support_node].T ** 2).sum() / 2
-    relative = middle[1] - middle[0]
-    extension = sum(line.dropper_weight[:, k] * relative[line.dropper_node + k] for k in range(4))
-    stiffness, static = line.dropper_stiffness, line.dropper_static
+    nodes = middle.ravel()
+    total += (line.spring_levels.sum(axis=1) * nodes[line.spring_node] ** 2).sum() / 2
+    lower, upper = (nodes[line.link_node[:, end, None] + np.arange(4)] for end in range(2))
+    extension = (line.link_weight * (upper - lower)).sum(axis=1)
+    stiffness, static = line.link_stiffness, line.link_static
     taut = stiffness * extension**2 / 2
     slack = -static * extension - static**2 / stiffness / 2
     return total + np.where(stiffness * extension > -static, taut, slack).sum()
@@ -79,8 +82,8 @@ def energy(line, wire, step):
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, bar):
     step = 1e-3
     numerics = Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
-    line = flexible.build(undamped(load_catenary("en50318-2002")), 10, numerics)
-    wire = flexible.at_rest(line, 1)
+    line = constants(undamped(load_catenary("en50318-2002")), 10, numerics)
+    wire = at_rest(line, 1)
     x = line.spacing * np.arange(line.mobility.shape[1])
     wire.displacement[0] = height * np.exp(-(((x - 300) / 4) ** 2))
     steps = np.zeros(100)
@@ -89,7 +92,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, 
     for _ in range(100):
         travel(line, wire, 300.0, 0.0, 0.0, steps)
         largest = max(largest, abs(energy(line, wire, step) / first - 1))
-        slack |= bool((wire.change[0] <= -line.dropper_static).any())
+        slack |= bool((wire.change[0] <= -line.link_static).any())
     assert largest < bar
     assert slack == goes_slack
 
@@ -153,13 +156,13 @@ def test_droppers_go_slack_under_the_pantograph(reference_run):
 
 def test_slackening_matters(monkeypatch):
     """With droppers that push, sigma is far off: the model would fail EN 50318."""
-    honest = flexible.build
+    honest = model.constants
 
     def never_slack(*arguments):
         line = honest(*arguments)
-        return line._replace(dropper_static=line.dropper_static + np.float32(1e6))
+        return line._replace(link_static=line.link_static + np.float32(1e6))
 
-    monkeypatch.setattr(flexible, "build", never_slack)
+    monkeypatch.setattr(model, "constants", never_slack)
     assert simulate().summary((5, 6)).std > 45
 
 
@@ -177,14 +180,14 @@ def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
     together = batch.samples(801)
     for lane, speed in enumerate(speeds):
         batch.start(lane, speed)
-    batch.advance(np.zeros((3, 2)), 800, together)
+    batch.advance(np.zeros((3, 1, 2)), 800, together)
     for lane, speed in enumerate(speeds):
         alone = Plant(line, pantograph)
         samples = alone.samples(801)
         alone.start(0, speed)
-        alone.advance(np.zeros((1, 2)), 300, samples)
-        alone.advance(np.zeros((1, 2)), 500, samples)
-        np.testing.assert_array_equal(samples.channels[0], together.channels[lane])
+        alone.advance(np.zeros((1, 1, 2)), 300, samples)
+        alone.advance(np.zeros((1, 1, 2)), 500, samples)
+        np.testing.assert_array_equal(samples.rows[0], together.rows[lane])
 
 
 def test_restarted_lane_forgets_the_run_before():
@@ -193,9 +196,9 @@ def test_restarted_lane_forgets_the_run_before():
     for _ in range(2):
         samples = plant.samples(401)
         plant.start(0, 300 / 3.6)
-        plant.advance(np.full((1, 2), 50.0), 400, samples)
+        plant.advance(np.full((1, 1, 2), 50.0), 400, samples)
         runs.append(samples)
-    np.testing.assert_array_equal(runs[0].channels, runs[1].channels)
+    np.testing.assert_array_equal(runs[0].rows, runs[1].rows)
     np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)
 
 

@@ -18,8 +18,11 @@ PACKAGE = Path(panto_env.__file__).parent
 CODE = """
 import json, sys
 from panto_env.control import Task
+from panto_env.control.settings import run_settings
 from panto_env.control.step import control_step
-Task(**json.loads(sys.argv[1]))
+settings = json.loads(sys.argv[1])
+lanes = settings.pop("lanes", 1)
+Task(run_settings(settings), lanes=lanes)
 (assembly,) = control_step.inspect_asm().values()
 print(assembly)
 """

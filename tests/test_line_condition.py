@@ -10,11 +10,11 @@ from scipy.sparse.linalg import splu
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
-from panto_env.plant.catenary.flexible import build as flexible
+from panto_env.control.settings import run_settings
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.parts import rise_by_defects
 from panto_env.plant.catenary.flexible.schema import Rayleigh
-from panto_env.plant.line_condition import LineCondition, draw
+from panto_env.plant.catenary.flexible.wires import rise_by_defects
+from panto_env.plant.line_condition import DrawnLine, LineCondition, draw
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 
@@ -140,11 +140,11 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
         load = np.zeros(system.free.size)
         load[4 * node + 2] = force
         change, tension = static_by_finite_elements(system, data, condition, load)
-        flexible.settle(plant.line, plant.wire, 0, 0.0)
-        travel(plant.line, plant.wire, at, 0.0, force, heights)
+        plant.model.settle(0, DrawnLine(condition), 0.0)
+        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights)
         static = float(system.static[node, 0] + change[4 * node + 2])
         assert heights[-1] == pytest.approx(static, abs=2e-4)
-        ours = plant.line.dropper_static[0] + plant.wire.change[0]
+        ours = plant.model.line.link_static[0] + plant.model.wire.change[0]
         np.testing.assert_allclose(ours, tension, atol=1.5)
         slack.append(ours[2 * 9 + 3] == 0)
     assert slack == [True, True, False]
@@ -245,10 +245,10 @@ def test_untouched_line_runs_exactly_as_an_intact_one(condition, window):
 
 def test_lanes_with_droppers_of_their_own_equal_single_runs_bit_for_bit():
     settings = {"line_condition": {"irregularity": 1.0, "dropper_scatter": 0.005}, "spans": 12}
-    batch = Task(lanes=2, record_droppers=True, **settings)
+    batch = Task(run_settings(settings), lanes=2, record_droppers=True)
     for lane in range(2):
         batch.reset(lane, np.random.default_rng(lane))
-    batch.coast()
+    batch.run_passively()
     alone = [simulate(seed=seed, **settings) for seed in range(2)]
     for lane in range(2):
         run = batch.trajectory(lane)
@@ -280,11 +280,11 @@ def test_scatter_is_drawn_after_the_phases():
 )
 def test_defects_that_the_line_cannot_have_are_refused(condition, message):
     with pytest.raises(InputError, match=message):
-        Task(line_condition=condition)
+        Task(run_settings({"line_condition": condition}))
 
 
 @pytest.mark.parametrize("line", ["ohl-three-span", "periodic-stiffness"])
 @pytest.mark.parametrize("condition", [{"broken_droppers": [(1, 1)]}, {"dropper_scatter": 1e-3}])
 def test_only_a_flexible_catenary_has_defects(line, condition):
     with pytest.raises(InputError, match="Only a flexible catenary"):
-        Task(catenary=line, line_condition=condition)
+        Task(run_settings({"catenary": line, "line_condition": condition}))

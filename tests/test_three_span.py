@@ -12,6 +12,10 @@ def data():
     return load_catenary("ohl-three-span")
 
 
+def built(data):
+    return three_span.ThreeSpan(data, lanes=1, spans=10, numerics=Numerics(), conditions=())
+
+
 def test_frequencies_are_the_closed_form_where_the_springs_vanish(data):
     """A tensioned beam on three spans, hinged at its ends: omega^2 = (T k^2 + EJ k^4) / m."""
     free = data.model_copy(update={"suspension_stiffness": 1e-9})
@@ -35,8 +39,7 @@ def test_static_compliance_is_the_string_s_between_springs(data):
     stringy = data.model_copy(
         update={"wire": data.wire.model_copy(update={"bending_stiffness": 0.0}), "modes": 400}
     )
-    line = three_span.build(stringy, 10, Numerics())
-    _, compliance, _ = three_span.start_point(line)
+    compliance = built(stringy).start_point.wire_compliance
     a, tension, spring = data.span_length, data.wire.tension, data.suspension_stiffness
     system = np.array([[2 * tension / a + spring, -tension / a], [-tension / a, 2 * tension / a + spring]])
     assert compliance == pytest.approx(np.linalg.solve(system, [1, 0])[0], rel=5e-3)
@@ -53,7 +56,7 @@ def test_modes_propagate_exactly(data):
 
 
 def test_projection_moves_the_deflection_back_by_one_span(data):
-    line = three_span.build(data, 10, Numerics())
+    line = built(data).line
     _, vectors = three_span.modes(data)
     x = np.linspace(0, 3 * data.span_length, 721)
     # A smooth bump in the second and third span that ends at rest.

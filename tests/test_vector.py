@@ -67,9 +67,9 @@ def test_disabled_autoreset_waits_for_a_masked_reset():
         ended = terminated | truncated
     with pytest.raises(InputError, match="has ended; call reset"):
         env.step(np.zeros((3, 1), np.float32))
-    before = env.unwrapped.task.plant.step.copy()
+    before = env.unwrapped.task.plant.steps_done.copy()
     env.reset(options={"reset_mask": ended})
-    after = env.unwrapped.task.plant.step
+    after = env.unwrapped.task.plant.steps_done
     assert (after[ended] == 0).all()
     assert (after[~ended] == before[~ended]).all()
     env.step(np.zeros((3, 1), np.float32))
@@ -100,7 +100,7 @@ def test_bad_actions_change_nothing(actions, message):
     env.reset(seed=0)
     with pytest.raises(InputError, match=message):
         env.step(actions)
-    assert (env.unwrapped.task.plant.step == 0).all()
+    assert (env.unwrapped.task.plant.steps_done == 0).all()
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,23 @@
-import numba
 import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.backend.compile import OPTIONS
+from panto_env.backend import kernel
 from panto_env.catalog import load_catenary
-from panto_env.plant import step as coupling
-from panto_env.plant.catenary.flexible import build as flexible
+from panto_env.plant.catenary.flexible.build import at_rest, constants
+from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step
 from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318 import window as windows
 
 
-@numba.njit(**OPTIONS)
+@kernel
 def wait(line, wire, x, steps):
     """Let a line swing for itself; x (m): anywhere in the window's middle."""
+    wire.position[0, 0], wire.force[0, 0] = x, 0.0
     for _ in range(steps):
-        coupling.move_wire(line, wire, 0, x, x, 0.0)
-        coupling.load_wire(line, wire, 0, x, x, 0.0)
+        advance_wire(line, wire, 0)
+        apply_force(line, wire, 0, 0, x, x, 0.0)
+        end_step(line, wire, 0)
 
 
 STEP = 2.5e-3
@@ -37,11 +38,11 @@ def test_ends_let_waves_out(precision):
     """A pulse on bare wires leaves a window in the middle of a line; what is reflected is told."""
     line = load_catenary("en50318-2002")
     limp = line.droppers.model_copy(update={"stiffness": 1e-6})
-    built = flexible.build(
+    built = constants(
         line.model_copy(update={"droppers": limp}), 30, Numerics(precision=precision, time_step=STEP)
     )
-    wire = flexible.at_rest(built, 1)
-    wire.shifted[0] = 10
+    wire = at_rest(built, 1)
+    wire.first_span[0] = 10
     x = built.spacing * np.arange(built.mobility.shape[1])
     wire.displacement[0, 0] = 0.05 * np.exp(-(((x - 210) / 5) ** 2))
     middle = 13.5 * line.span_length

@@ -7,44 +7,40 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from panto_env.analysis.options import with_settings
 from panto_env.terminal import Json, Plot, print_json, progress_console
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
 
 
+@with_settings(
+    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    defaults=False,
+)
 def benchmark(
+    given: dict[str, Any],
     policies: Annotated[
         list[str] | None,
-        typer.Argument(help="Names, with parameters or without (p:gain=0.5), or model files."),
+        typer.Argument(help="Names, with parameters (p:gain=0.5) or without, or model files."),
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="TOML file; options given beside it win over it.")
+        Path | None, typer.Option(help="TOML file; other options take precedence over it.")
     ] = None,
-    catenary: Annotated[
-        str | None, typer.Option(help="Line: catalogue name or TOML file, in place of the file's.")
-    ] = None,
-    pantograph: Annotated[
-        str | None, typer.Option(help="Catalogue name or TOML file, in place of the file's.")
-    ] = None,
-    speed: Annotated[
-        list[float] | None, typer.Option(help="Speed (km/h) on every line; can be given again.")
-    ] = None,
-    seeds: Annotated[int | None, typer.Option(help="How many seeds.")] = None,
-    actuator: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="'ideal' or 'realistic'.")] = None,
-    line_condition: Annotated[str | None, typer.Option(help="'new', 'fair' or 'worn'.")] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; one a core unless told otherwise.")] = None,
+    speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     output: Annotated[
-        Path | None, typer.Option(help="File to write: all as .json, passes as .csv or .parquet.")
+        Path | None,
+        typer.Option(help="File to write: everything as .json, or the passes as .csv or .parquet."),
     ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Compare policies on the same lines, at the same speeds, under the same seeds.
 
-    Ranks them by paper 1's cost function CF; one that buys calm by pressing less is disqualified. The
-    plot shows the contact force of every line at its highest speed, and σ over speed.
+    Ranks them by paper 1's cost function CF; a policy whose mean force leaves its range is disqualified.
+    The plot shows the contact force on every line at its highest speed, and σ over speed.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
@@ -55,14 +51,13 @@ def benchmark(
     from .report import WIDTH, tables
     from .run import check_format, run
 
+    line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
         config,
-        line={"catenary": catenary, "pantograph": pantograph, "speeds_kmh": speed or None},
+        line=line | {"speeds_kmh": speed or None},
         policies=policies or None,
         seeds=seeds,
-        actuator=actuator,
-        sensors=sensors,
-        line_condition=line_condition,
+        **given,
     )
     if output is not None:
         check_format(output)
@@ -92,21 +87,21 @@ def benchmark(
 
 
 def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> BenchmarkSettings:
-    """Settings of the file, or the defaults, under what was given on the command line.
+    """Settings of the file, or the defaults, changed by what was given on the command line.
 
-    A catenary or pantograph takes the place of all of the file's lines; speeds go to every line.
+    A catenary or pantograph replaces all of the file's lines; speeds apply to every line.
     """
     from panto_env.base.settings import parse
 
     from .settings import BenchmarkSettings, load_benchmark
 
     base = BenchmarkSettings() if config is None else load_benchmark(config)
-    own = _without_none(line)
+    line_changes = _without_none(line)
     table = base.model_dump() | _without_none(given)
-    if "catenary" in own or "pantograph" in own:
-        table["lines"] = [own]
+    if "catenary" in line_changes or "pantograph" in line_changes:
+        table["lines"] = [line_changes]
     else:
-        table["lines"] = [old | own for old in table["lines"]]
+        table["lines"] = [old | line_changes for old in table["lines"]]
     return parse(BenchmarkSettings, table, "the benchmark")
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 def plot(outcome: Benchmark) -> Figure:
     """Contact force along two spans of every line, and sigma over speed.
 
-    The force is that at a line's highest speed under the first seed, in the last two spans evaluated:
-    one more pass for each policy. ``panto_env.analysis.plots.save`` writes the figure.
+    The force is that at a line's highest speed with the first seed, over the last two evaluated spans;
+    this runs one more pass per policy and line. ``panto_env.analysis.plots.save`` writes the figure.
     """
     from matplotlib.figure import Figure
 
@@ -36,11 +36,11 @@ def plot(outcome: Benchmark) -> Figure:
     for k, line in enumerate(lines):
         colours = {policy: f"C{k % 10}" for k, policy in enumerate(settings.policies_on(line))}
         _forces(figure.add_subplot(grid[k, :]), outcome, k, colours)
-        _sigmas(figure.add_subplot(grid[len(lines), k]), line, _of(outcome, line), colours)
+        _sigmas(figure.add_subplot(grid[len(lines), k]), line, _cells_of(outcome, line), colours)
     return figure
 
 
-def _of(outcome: Benchmark, line: Line) -> list[Cell]:
+def _cells_of(outcome: Benchmark, line: Line) -> list[Cell]:
     names = (line.catenary, line.pantograph)
     return [cell for cell in outcome.cells if (cell.catenary, cell.pantograph) == names]
 
@@ -69,13 +69,13 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
 
 def _sigmas(axes: Axes, line: Line, cells: list[Cell], colours: dict[str, str]) -> None:
     for policy, colour in colours.items():
-        own = sorted((c for c in cells if c.policy == policy), key=lambda cell: cell.speed_kmh)
-        speeds = np.array([cell.speed_kmh for cell in own])
-        sigma = np.array([cell.figures["std"] for cell in own])
-        good = np.array([not cell.disqualified for cell in own])
+        by_speed = sorted((c for c in cells if c.policy == policy), key=lambda cell: cell.speed_kmh)
+        speeds = np.array([cell.speed_kmh for cell in by_speed])
+        sigma = np.array([cell.figures["std"] for cell in by_speed])
+        qualified = np.array([not cell.disqualified for cell in by_speed])
         axes.plot(speeds, sigma, color=colour, linewidth=1.3)
-        axes.plot(speeds[good], sigma[good], "o", color=colour, label=policy)
-        axes.plot(speeds[~good], sigma[~good], "o", color=colour, markerfacecolor="white")
+        axes.plot(speeds[qualified], sigma[qualified], "o", color=colour, label=policy)
+        axes.plot(speeds[~qualified], sigma[~qualified], "o", color=colour, markerfacecolor="white")
     if any(cell.disqualified for cell in cells):
         axes.plot([], [], "o", color="0.4", markerfacecolor="white", label="disqualified")
     axes.set(

@@ -22,7 +22,7 @@ from .single_pass import Row, run_pass
 from .statistics import Cell, compare
 
 FIRST_SPAN = 4
-"""First span evaluated unless told otherwise: the three before it are the run-in from rest."""
+"""First span that is evaluated by default: the three before it are the run-in from rest."""
 FORMATS = (".json", *TABLES)
 
 
@@ -31,12 +31,12 @@ class Benchmark:
     """Outcome of a benchmark."""
 
     settings: BenchmarkSettings
-    spans: tuple[tuple[int, int], ...]  # evaluated on each line: first and last, from 1
-    rows: tuple[Row, ...]  # one a pass, in the order of lines, speeds, policies and seeds
-    cells: tuple[Cell, ...]  # one a policy, line and speed
+    spans: tuple[tuple[int, int], ...]  # evaluated on each line: first and last, counted from 1
+    rows: tuple[Row, ...]  # one per pass, in the order of lines, speeds, policies and seeds
+    cells: tuple[Cell, ...]  # one per policy, line and speed
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, ready for JSON: no number is nan, it is None instead."""
+        """Everything, ready for JSON: nan becomes None."""
         table: dict[str, Any] = finite(
             {
                 "settings": self.settings.model_dump(mode="json"),
@@ -48,7 +48,7 @@ class Benchmark:
         return table
 
     def save(self, path: str | Path) -> None:
-        """Write a file, whole or not at all: all as JSON, or the rows as CSV or Parquet."""
+        """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet."""
         check_format(path)
         if Path(path).suffix != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
@@ -62,17 +62,17 @@ def run(
 ) -> Benchmark:
     """Run every policy on every line at every speed under every seed.
 
-    workers: processes, as many as there are cores by default; the outcome does not depend on it.
-    With more than one, a script must call this under ``if __name__ == "__main__":``. progress:
-    called with the number of passes done and of all. Raises InputError for what is not valid, and
-    naming the policy where one fails.
+    workers: number of processes, by default one per core; the outcome does not depend on it. With more
+    than one, a script must call this under ``if __name__ == "__main__":``. progress: called with the
+    number of passes done and the number of all. Raises InputError for settings that are not valid and,
+    naming it, for a policy that fails.
     """
     workers = cores() if workers is None else workers
     if workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy)
-    spans = tuple(_check(settings, line) for line in settings.lines)
+    spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
     jobs = [
         partial(run_pass, settings, line, covered, policy, speed, seed)
         for line, covered in zip(settings.lines, spans, strict=True)
@@ -88,13 +88,13 @@ def run(
 
 
 def check_format(path: str | Path) -> None:
-    """Raise InputError unless the name of a file says how to write a benchmark's outcome."""
+    """Raise InputError unless the suffix of the file is one of a known format."""
     if Path(path).suffix not in FORMATS:
         raise InputError(f"{path} must end in one of {', '.join(FORMATS)}.")
 
 
-def _check(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
-    """Spans to evaluate; raises InputError where a line can't be run as told."""
+def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
+    """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     task = Task(
         run_settings(
             {

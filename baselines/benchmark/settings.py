@@ -1,4 +1,4 @@
-"""What a benchmark is to run, from keywords or a TOML file."""
+"""What a benchmark runs, from keywords or a TOML file."""
 
 from __future__ import annotations
 
@@ -47,58 +47,59 @@ class Line(Settings):
     catenary: str = Field(default("catenary"), description=description("catenary"))
     pantograph: str = Field(default("pantograph"), description=description("pantograph"))
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
-    distance: Positive | None = Field(None, description="of a run (m), to the line's end if not given")
+    distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
     spans: tuple[int, int] | None = Field(
         None,
-        description="first and last span that the figures cover, counted from 1; if not given, from "
-        "the fourth (the run-in is left out) to the last that every run covers whole",
+        description="first and last span that the figures cover, counted from 1; by default from the "
+        "fourth, which leaves out the run-in, to the last one that every run covers completely",
     )
-
-    policies: tuple[str, ...] = Field((), description="policies that run on this line alone, added to all's")
+    policies: tuple[str, ...] = Field(
+        (), description="policies that run on this line only, in addition to those that run on every line"
+    )
 
     @field_validator("speeds_kmh", "policies")
     @classmethod
-    def _each_once(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _distinct(value)
+    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _checked_distinct(value)
 
 
 class BenchmarkSettings(Settings):
-    """Policies, lines with speeds, and seeds; every policy runs all of them under the same noise."""
+    """Policies, lines with speeds, and seeds. Every policy runs on the same lines, under the same noise."""
 
     policies: tuple[str, ...] = Field(
         ("passive", "p", "pd", "fb+ff"),
         description="names, with parameters (p:gain=0.5) or without, or model files; "
-        "the passive pantograph runs always",
+        "the passive pantograph always runs",
     )
-    lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, pantographs, speeds")
+    lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, with pantograph and speeds")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        tuple(range(5)), min_length=1, description="seeds, or how many from 0 on"
+        tuple(range(5)), min_length=1, description="seeds, or their number, counted from 0"
     )
     actuator: _Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
     line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
-        LINE_CONDITIONS["fair"], description="on a new line all seeds are alike"
+        LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
     )
     control_interval: Positive = Field(
         default("control_interval"), description=description("control_interval")
     )
 
     def policies_on(self, line: Line) -> tuple[str, ...]:
-        """Policies that run on a line."""
+        """All policies that run on a line."""
         return tuple(dict.fromkeys((*self.policies, *line.policies)))
 
     @field_validator("seeds", mode="before")
     @classmethod
-    def _count(cls, value: Any) -> Any:
-        counts = isinstance(value, int) and not isinstance(value, bool)
-        return tuple(range(value)) if counts else value
+    def _from_a_number_of_seeds(cls, value: Any) -> Any:
+        is_number = isinstance(value, int) and not isinstance(value, bool)
+        return tuple(range(value)) if is_number else value
 
     @field_validator("policies", "seeds")
     @classmethod
-    def _each_once(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _distinct(value)
+    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _checked_distinct(value)
 
     @field_validator("policies")
     @classmethod
@@ -106,20 +107,20 @@ class BenchmarkSettings(Settings):
         return value if REFERENCE in value else (REFERENCE, *value)
 
     @model_validator(mode="after")
-    def _each_line_once(self) -> Self:
-        _distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
+    def _without_repeated_line(self) -> Self:
+        _checked_distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
         return self
 
 
-def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    for place, value in enumerate(values):
-        if value in values[:place]:
+def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    for index, value in enumerate(values):
+        if value in values[:index]:
             raise ValueError(f"{value!r} is given twice")
     return values
 
 
 def load_benchmark(path: str | Path) -> BenchmarkSettings:
-    """Read a TOML file of ``BenchmarkSettings``; paths in it count from the working folder.
+    """Read a TOML file of ``BenchmarkSettings``; paths in it are relative to the working folder.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """

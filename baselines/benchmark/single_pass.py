@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Row:
-    """Figures of one pass; all nan where it ended early (``terminated``)."""
+    """Figures of one pass; all are nan if it ended early (``terminated``)."""
 
     policy: str
     catenary: str
@@ -34,13 +34,13 @@ class Row:
     nominal_force: float  # N
     terminated: bool
     figures: Figures
-    action_rate: float  # rms change of the commanded force from step to step, over the interval (N/s)
+    action_rate: float  # rms change of the commanded force between control steps, per second (N/s)
 
     def as_dict(self) -> dict[str, Any]:
-        """Names and values in this order, those of the figures among them."""
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "figures"}
-        rate = own.pop("action_rate")
-        return own | self.figures.as_dict() | {"action_rate": rate}
+        """Names and values in the order above, with the figures in one table with the rest."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "figures"}
+        action_rate = values.pop("action_rate")
+        return values | self.figures.as_dict() | {"action_rate": action_rate}
 
 
 def run_pass(
@@ -53,17 +53,17 @@ def run_pass(
 ) -> Row:
     """Run one pass; its figures cover ``spans``, first and last, counted from 1.
 
-    Raises InputError, naming the policy, where the policy fails.
+    Raises InputError, naming the policy, if the policy fails.
     """
     run, force = drive(settings, line, policy, speed_kmh, seed)
     if run.terminated:
         figures = Figures.none()
-        rate = float("nan")
+        action_rate = float("nan")
     else:
         figures = run.summary(spans)
         position = np.arange(len(force)) * settings.control_interval * speed_kmh / 3.6
         changes = np.diff(force[within(position, spans, run.span_length)], axis=0) / settings.control_interval
-        rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
+        action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
     return Row(
         policy=policy,
         catenary=line.catenary,
@@ -73,21 +73,21 @@ def run_pass(
         nominal_force=run.nominal_force,
         terminated=run.terminated,
         figures=figures,
-        action_rate=rate,
+        action_rate=action_rate,
     )
 
 
 def drive(
     settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
 ) -> tuple[Trajectory, Array]:
-    """The record of a pass, and the commanded forces, (control steps, actions) (N)."""
-    driver = _Recorder(find_policy(policy), policy)
+    """The record of a pass, and the commanded forces (N), (control steps, actions)."""
+    recorder = _CommandRecorder(find_policy(policy), policy)
     with _torch_on_one_thread():
         run = simulate(
             line.catenary,
             line.pantograph,
             speed_kmh,
-            driver,
+            recorder,
             seed=seed,
             actuator=settings.actuator,
             sensors=settings.sensors,
@@ -96,11 +96,11 @@ def drive(
             distance=line.distance,
             record_droppers=False,
         )
-    return run, np.array(driver.forces)
+    return run, np.array(recorder.forces)
 
 
-class _Recorder:
-    """A policy that keeps its commands, and says its name when it fails."""
+class _CommandRecorder:
+    """A policy around another one: it records the commands, and names the policy in its errors."""
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self._name = policy, name
@@ -108,12 +108,12 @@ class _Recorder:
 
     def reset(self, context: Context) -> None:
         self._context = context
-        with self._named():
+        with self._errors_name_the_policy():
             self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
         shape = (self._context.actions,)
-        with self._named():
+        with self._errors_name_the_policy():
             action = np.asarray(self._policy.act(observation), dtype=float)
             if action.shape != shape or not np.isfinite(action).all():
                 raise ValueError(f"its action must be finite numbers of shape {shape}, not {action}")
@@ -121,18 +121,19 @@ class _Recorder:
         return action
 
     @contextmanager
-    def _named(self) -> Iterator[None]:
+    def _errors_name_the_policy(self) -> Iterator[None]:
         try:
             yield
-        except Exception as error:  # somebody else's code: anything can happen
-            kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-            raise InputError(f"The policy '{self._name}' failed: {kind}{str(error).rstrip('.')}.") from error
+        except Exception as error:  # the policy may be anyone's code
+            prefix = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+            reason = prefix + str(error).rstrip(".")
+            raise InputError(f"The policy '{self._name}' failed: {reason}.") from error
 
 
 @contextmanager
 def _torch_on_one_thread() -> Iterator[None]:
-    """The cores are for passes, and the last bit must not depend on how many of them are free."""
-    torch = sys.modules.get("torch")  # loaded by a policy that needs it, if any
+    """The cores are needed for other passes, and results must not depend on how many of them are free."""
+    torch = sys.modules.get("torch")  # None unless a policy has imported it
     threads = torch.get_num_threads() if torch else 0
     try:
         if torch:

@@ -13,7 +13,7 @@ from panto_env.control.context import Context
 from .force_law import ForceLaw, number
 
 FORCE_RANGE = (0.0, 300.0)
-"""Range of the contact force (N) that the feedback takes in; beyond it the end counts (paper 1)."""
+"""Range (N) to which the feedback clips the contact force (paper 1)."""
 READINGS = ("span", "printed")
 SPEED_UNITS = {"km/h": 3.6, "m/s": 1.0}
 
@@ -21,22 +21,22 @@ SPEED_UNITS = {"km/h": 3.6, "m/s": 1.0}
 class FeedbackFeedforward(ForceLaw):
     """Feedback and feed-forward of paper 1, section 5, both as forces that lift the pantograph.
 
-    Feedback: gain (F_N - F), F clipped to 0-300 N; zero at F_N and within ``dead_zone`` of it, and
-    counted from the dead zone's edge outside. The paper prints no gain.
+    Feedback: gain (F_N - F), with F clipped to 0-300 N; zero where F is within ``dead_zone`` of F_N, and
+    beyond that counted from the edge of the dead zone. The paper prints no gain.
 
-    Feed-forward: A sin(k x - theta), x the distance run, 0 at a support. k is by ``reading``
-    "span": 2 pi / s, once per span s, which is what the paper's text describes;
-    "printed": Eqs 11 and 12 as they stand, k = w pi / (2 s) with w = 2 v / s. That is no angle and
-    not in step with the spans, and depends on the unit of v, which the paper does not give.
+    Feed-forward: A sin(k x - theta), where x is the distance run, 0 at a support. ``reading`` chooses k:
+    "span": 2 pi / s, one period per span s, which is what the paper's text describes;
+    "printed": Eqs 11 and 12 as they stand, k = w pi / (2 s) with w = 2 v / s. Then k x is not an angle,
+    is not in step with the spans, and depends on the unit of v, which the paper does not give.
 
-    The paper calls the control force positive where the contact force is above F_N, and draws no
-    axes: A sin(...) as a lift is our reading, as a push down it would be theta + pi. So read, the
-    least CF lies between theta = -pi/6 and pi/6 under `en50318-2002` and, at 350 and 400 km/h, under
-    `shinkansen-simple`; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 does harm: `panto
-    benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
+    The paper calls the control force positive where the contact force is above F_N, and draws no axes.
+    We read A sin(...) as a lift; read as a push down it would be the same with theta + pi. With our
+    reading, the least CF lies between theta = -pi/6 and pi/6 under `en50318-2002`, and under
+    `shinkansen-simple` at 350 and 400 km/h; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 makes
+    CF worse: `panto benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
 
-    A policy does not see where the train is: x starts from the sine and cosine of the position in
-    the first span and goes on by speed times control interval.
+    A policy does not see where the train is: x begins at the position within the span, from its sine and
+    cosine, and grows by speed times control interval at each step.
     """
 
     def __init__(
@@ -50,10 +50,10 @@ class FeedbackFeedforward(ForceLaw):
     ) -> None:
         """Take the parameters; raises ValueError for one that is not valid.
 
-        gain: N/N, or gains by speed (km/h), linear between and constant beyond; the default opposes
-        each newton with one newton, see ``Proportional``. theta: phase (rad), the paper's pi/6 for
-        every speed. amplitude: A (N). dead_zone: half its width (N). speed_unit: of v in Eq. 12,
-        for the reading "printed" alone.
+        gain: N/N, or a table of gains by speed (km/h), linear between these speeds and constant beyond
+        them; the default opposes each newton with one newton, see ``Proportional``. theta: phase (rad);
+        the default is the paper's for every speed. amplitude: A (N). dead_zone: half its width (N).
+        speed_unit: of v in Eq. 12, for the reading "printed" only.
         """
         gains = gain if isinstance(gain, Mapping) else {0.0: gain}
         if not gains:
@@ -81,9 +81,10 @@ class FeedbackFeedforward(ForceLaw):
         if self.reading == "span":
             self._wavenumber = 2 * math.pi / context.span_length
         else:
-            w = 2 * context.speed * SPEED_UNITS[self.speed_unit] / context.span_length  # Eq. 12
+            speed = context.speed * SPEED_UNITS[self.speed_unit]
+            w = 2 * speed / context.span_length  # Eq. 12
             self._wavenumber = w * math.pi / (2 * context.span_length)  # Eq. 11
-        self._start: float | None = None
+        self._start_distance: float | None = None
         self._steps = 0
 
     def force(self, observation: NDArray[np.float32]) -> float:
@@ -94,20 +95,20 @@ class FeedbackFeedforward(ForceLaw):
 
     def _feedback(self, contact_force: float) -> float:
         lowest, highest = FORCE_RANGE
-        lacking = self.context.nominal_force - min(max(contact_force, lowest), highest)
-        beyond = max(abs(lacking) - self.dead_zone, 0.0)
-        return self._gain * math.copysign(beyond, lacking)
+        shortfall = self.context.nominal_force - min(max(contact_force, lowest), highest)
+        outside_dead_zone = max(abs(shortfall) - self.dead_zone, 0.0)
+        return self._gain * math.copysign(outside_dead_zone, shortfall)
 
     def _feedforward(self, distance: float) -> float:
         return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
-        """Distance (m) from the support before the start."""
-        if self._start is None:
+        """Distance (m) from the support behind the start of the run."""
+        if self._start_distance is None:
             sine = self.read(observation, "sine of span position")
             cosine = self.read(observation, "cosine of span position")
-            turns = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
-            self._start = turns * self.context.span_length
-        distance = self._start + self._steps * self.context.control_interval * self.context.speed
+            share_of_span = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
+            self._start_distance = share_of_span * self.context.span_length
+        covered = self._steps * self.context.control_interval * self.context.speed
         self._steps += 1
-        return distance
+        return self._start_distance + covered

@@ -1,4 +1,4 @@
-"""No control: the pantograph as it is."""
+"""No control: the pantograph alone."""
 
 from __future__ import annotations
 

@@ -22,9 +22,10 @@ class ProportionalDerivative(ForceLaw):
         """Take ``gain`` (N/N), ``derivative`` (N per N/s) and ``damping`` (N s/m), each 0 or more.
 
         The defaults were chosen with `panto benchmark pd:gain=...,derivative=...,damping=... --config
-        configs/benchmark.toml` over gain 0.5, 0.75, 1; derivative 0, 0.005, 0.01, 0.015; damping 100,
-        150, 200: with the ideal actuator within 0.3 % of the least mean sigma, and with the realistic
-        one (configs/benchmark-realistic.toml) below the passive sigma at every line and speed.
+        configs/benchmark.toml` among gains of 0.5, 0.75, 1; derivatives of 0, 0.005, 0.01, 0.015; dampings
+        of 100, 150, 200. With the ideal actuator they come within 0.3 % of the least mean sigma; with the
+        realistic one (configs/benchmark-realistic.toml) sigma is below the passive sigma on every line at
+        every speed.
         Raises ValueError for a value that is not valid.
         """
         self.gain = number("gain", gain, lowest=0)
@@ -34,15 +35,15 @@ class ProportionalDerivative(ForceLaw):
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
         super().reset(context)
-        self._last: float | None = None
+        self._last_error: float | None = None
 
     def force(self, observation: NDArray[np.float32]) -> float:
         """Force (N) for an observation, before the actuator's limit."""
-        lacking = self.context.nominal_force - self.read(observation, "contact force")
-        change = 0.0 if self._last is None else lacking - self._last
-        self._last = lacking
+        error = self.context.nominal_force - self.read(observation, "contact force")
+        change = 0.0 if self._last_error is None else error - self._last_error
+        self._last_error = error
         return (
-            self.gain * lacking
+            self.gain * error
             + self.derivative * change / self.context.control_interval
             - self.damping * self.read(observation, "frame velocity")
         )

@@ -9,18 +9,18 @@ from .force_law import ForceLaw, number
 
 
 class Proportional(ForceLaw):
-    """Force in proportion to what the contact force lacks of the nominal force.
+    """Force proportional to the nominal force minus the contact force.
 
-    u = gain (F_N - F), F as measured. Where the passive mean lies below F_N the mean rises too.
+    u = gain (F_N - F), F as measured. Where the passive mean force lies below F_N, the mean rises too.
     """
 
     def __init__(self, gain: float = 1.0) -> None:
         """Take a ``gain`` (N/N) of 0 or more; raises ValueError otherwise.
 
         The default comes from `panto benchmark p:gain=0.5 p:gain=1.0 p:gain=1.5 p:gain=2.5 --config
-        configs/benchmark.toml` (ideal actuator): sigma falls on average up to a gain of about 1.5,
-        and from 2.5 on the loop swings by itself; 1 leaves a gain margin of two. A real actuator's
-        delay and lag bring that limit down to about 1: take 0.3 there.
+        configs/benchmark.toml` (ideal actuator): on average sigma falls up to a gain of about 1.5, and
+        from 2.5 on the loop oscillates by itself; 1 leaves a gain margin of two. The delay and lag of a
+        real actuator lower that limit to about 1: choose 0.3 there.
         """
         self.gain = number("gain", gain, lowest=0)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -62,6 +63,6 @@ def constants(names: type[E]) -> type[E]:
 
     Numba before 0.68, and its GPU compiler still, refuse a member of an enum as an index of an array.
     """
-    numbers: Any = NamedTuple(names.__name__, [(member.name, int) for member in names])
-    members: type[E] = numbers(*(int(member) for member in names))
-    return members
+    numbers: Any = namedtuple("numbers", [member.name for member in names])  # type: ignore[misc]
+    members: Any = numbers(*(int(member) for member in names))
+    return members  # type: ignore[no-any-return]

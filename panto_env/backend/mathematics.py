@@ -15,6 +15,6 @@ def floor(x: Any) -> Any:
     return np.floor(x)
 
 
-@overload(floor, jit_options=INLINED)  # type: ignore[untyped-decorator]
-def _floor(x):  # type: ignore[no-untyped-def] # the signature must be that of the source below
+@overload(floor, jit_options=INLINED)
+def _floor(x):  # no types: the signature must be that of the source below
     return lambda x: np.floor(x)

@@ -24,7 +24,7 @@ FOLDERS = {
 }
 _KINDS: dict[int | str, type[Settings]] = {name: kind.schema for name, kind in CATENARIES.items()}
 _CATENARY: TypeAdapter[Any] = TypeAdapter(
-    Annotated[Union[tuple(_KINDS.values())], Field(discriminator="kind")]  # noqa: UP007 - of a list
+    Annotated[Union[tuple(_KINDS.values())], Field(discriminator="kind")]  # type: ignore[arg-type] # noqa: UP007
 )
 _PANTOGRAPH: TypeAdapter[Any] = TypeAdapter(PantographData)
 _UNION_PARTS = {"constrained-float", "literal['rigid']"}  # how pydantic names alternatives

@@ -8,43 +8,21 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
+from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..metrics import en50367
 from ..metrics.labels import LABELS
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, console, number, print_json, progress_console
-from .pass_options import (
-    ActuatorName,
-    Bilateral,
-    Catenary,
-    Distance,
-    LineConditionName,
-    Pantograph,
-    Seed,
-    SensorsName,
-    Spans,
-    parse_spans,
-)
 
 
+@with_settings(left_out=("observation",))
 def simulate(
-    catenary: Catenary = "en50318-2002",
-    pantograph: Pantograph = "en50318-2002",
-    speed: Annotated[float, typer.Option(help="Train speed (km/h).")] = 300.0,
+    settings: dict[str, Any],
     policy: Annotated[
         str | None, typer.Option(help="Policy: a name, name:key=value,... or a model file.")
     ] = None,
     spans: Spans = None,
-    distance: Distance = None,
-    actuator: ActuatorName = "ideal",
-    sensors: SensorsName = "ideal",
-    line_condition: LineConditionName = "new",
     seed: Seed = 0,
-    time_step: Annotated[float | None, typer.Option(help="Time step (ms).")] = None,
-    spacing: Annotated[float | None, typer.Option(help="Grid of the flexible line (m).")] = None,
-    window: Annotated[
-        int | None, typer.Option(help="Spans computed about the train, odd; 0: the whole line.")
-    ] = None,
-    bilateral: Bilateral = False,
     output: Annotated[str | None, typer.Option(help="Save the run to this Parquet file.")] = None,
     plot: Plot = None,
     json: Json = False,
@@ -52,19 +30,6 @@ def simulate(
     """Simulate one pass along a line and print its figures."""
     from ..analysis.simulation import simulate as run
 
-    settings: dict[str, Any] = {
-        "actuator": actuator,
-        "sensors": sensors,
-        "line_condition": line_condition,
-        "distance": distance,
-        "bilateral": bilateral,
-    }
-    if time_step is not None:
-        settings["time_step"] = 1e-3 * time_step
-    if spacing is not None:
-        settings["spacing"] = spacing
-    if window is not None:
-        settings["window"] = window
     chosen = parse_spans(spans)
     if plot is not None:
         from ..analysis.plots import check_plot, plot_run, save
@@ -75,10 +40,7 @@ def simulate(
     ) as progress:
         bar = progress.add_task("simulating", total=1.0)
         trajectory = run(
-            catenary,
-            pantograph,
-            speed,
-            policy,
+            policy=policy,
             seed=seed,
             progress=lambda share: progress.update(bar, completed=share),
             **settings,

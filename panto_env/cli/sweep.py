@@ -12,27 +12,18 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 from rich.table import Table
 
+from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..base.errors import InputError
 from ..metrics.labels import LABELS
 from ..terminal import Json, Plot, console, number, print_json, progress_console
-from .pass_options import (
-    ActuatorName,
-    Bilateral,
-    Catenary,
-    Distance,
-    LineConditionName,
-    Pantograph,
-    Seed,
-    SensorsName,
-    Spans,
-    parse_spans,
-)
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
 
 
+@with_settings(left_out=("observation",))
 def sweep(
+    settings: dict[str, Any],
     parameters: Annotated[
         list[str],
         typer.Argument(
@@ -42,20 +33,12 @@ def sweep(
             "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),
     ],
-    catenary: Catenary = "en50318-2002",
-    pantograph: Pantograph = "en50318-2002",
-    speed: Annotated[float | None, typer.Option(help="Train speed (km/h) where it is not swept.")] = None,
     policy: Annotated[
         list[str] | None,
         typer.Option(help="Policy: a name, name:key=value,... or a model file; can be given again."),
     ] = None,
     spans: Spans = None,
-    distance: Distance = None,
-    actuator: ActuatorName = "ideal",
-    sensors: SensorsName = "ideal",
-    line_condition: LineConditionName = "new",
     seed: Seed = 0,
-    bilateral: Bilateral = False,
     workers: Annotated[int | None, typer.Option(help="Threads; one a core unless told otherwise.")] = None,
     output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
     plot: Plot = None,
@@ -74,11 +57,8 @@ def sweep(
         from ..analysis.sweep_plots import plot_sweep
 
         check_plot(plot)
-    settings: dict[str, Any] = {"distance": distance, "bilateral": bilateral, "seed": seed}
-    if speed is not None:
-        if SPEED in values:
-            raise InputError("The speed is swept already; leave out --speed.")
-        settings[SPEED] = speed
+    if SPEED in settings and SPEED in values:
+        raise InputError("The speed is swept already; leave out --speed.")
     columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(
         *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal
@@ -86,13 +66,9 @@ def sweep(
         bar = progress.add_task("passes", total=None)
         rows = run(
             values,
-            catenary=catenary,
-            pantograph=pantograph,
             policies=policy or (None,),
             spans=parse_spans(spans),
-            actuator=actuator,
-            sensors=sensors,
-            line_condition=line_condition,
+            seed=seed,
             workers=workers,
             progress=lambda done, total: progress.update(bar, completed=done, total=total),
             **settings,

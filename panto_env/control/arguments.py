@@ -21,6 +21,7 @@ def takes(
 
     What is decorated gets what was given, by name. An unknown argument raises TypeError, as Python does.
     """
+    settings: type[RunSettings] = kind  # type: ignore[assignment]
 
     def decorate(
         initialise: Callable[[Any, dict[str, Any]], None],
@@ -29,12 +30,12 @@ def takes(
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
                 raise TypeError(f"{type(self).__name__}() takes its arguments by name, as catenary='re250'")
-            check_arguments(given, kind, type(self).__name__)  # type: ignore[arg-type]
+            check_arguments(given, settings, type(self).__name__)
             initialise(self, given)
 
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
-        with_keywords.__signature__ = inspect.Signature([own, *parameters(kind)])  # type: ignore[attr-defined,arg-type]
-        return with_keywords  # type: ignore[return-value]
+        with_keywords.__signature__ = inspect.Signature([own, *parameters(settings)])  # type: ignore[attr-defined]
+        return with_keywords
 
     return decorate
 

@@ -94,15 +94,18 @@ class RunSettings(Numerics):
         description="train speed (km/h): a number, or a range of two to draw from",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
-        "ideal", validate_default=True, description='actuator: "ideal", "realistic" or a table'
+        "ideal", validate_default=True, description='actuator: "ideal", "realistic", or a table of its values'
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
-        "ideal", validate_default=True, description='sensors: "ideal", "realistic" or a table'
+        "ideal",
+        validate_default=True,
+        description='sensors: "ideal", "realistic", or a table of their values',
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn" or a table; of a list one is drawn per run',
+        description='condition of the line: "new", "fair", "worn", or a table; '
+        "of a list one is drawn per run",
     )
     pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
@@ -114,10 +117,11 @@ class RunSettings(Numerics):
         None, validate_default=True, description="weights of the reward's terms: a table"
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
-        None, description="of a run (m); None: to the end of the line, which gets more spans if too short"
+        None,
+        description="distance to run (m), by default to the end of the line; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
-        None, description="spans of the line; None: as the catalogue has it"
+        None, description="spans of the line; by default as the catalogue has it"
     )
     # Published active pantographs are controlled at 50-100 Hz.
     control_interval: float = Field(0.01, description="time between two actions (s)")
@@ -145,8 +149,13 @@ def description(name: str) -> str:
     return RunSettings.model_fields[name].description or ""
 
 
-def run_settings(given: Mapping[str, Any], kind: type[R] = RunSettings) -> R:  # type: ignore[assignment]
-    """Settings from what is given by name. Raises InputError where a value is not valid."""
+def run_settings(given: Mapping[str, Any]) -> RunSettings:
+    """Settings of a run from what is given by name. Raises InputError where a value is not valid."""
+    return read_settings(given, RunSettings)
+
+
+def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
+    """As ``run_settings``, of a class of settings that has more."""
     try:
         return kind.model_validate(dict(given))
     except ValidationError as error:

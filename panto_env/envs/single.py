@@ -15,7 +15,7 @@ from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.arguments import table, takes
 from ..control.observation import BOUND, layout
-from ..control.settings import check_names, default, run_settings
+from ..control.settings import check_names, default, read_settings
 from ..control.state import TERMS, TaskRow
 from ..metrics.trajectory import Trajectory
 from ..plant.actuators import actuator_settings
@@ -75,7 +75,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     @takes(EnvironmentSettings)
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
-        settings = run_settings(given, EnvironmentSettings)
+        settings = read_settings(given, EnvironmentSettings)
         self.render_mode = settings.render_mode
         self._given = given
         self._usual = Task(settings)
@@ -119,7 +119,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         check_names(options, "option")
         if not options:
             return self._usual
-        task = Task(run_settings(self._given | options, EnvironmentSettings))
+        task = Task(read_settings(self._given | options, EnvironmentSettings))
         if task.layout != self._usual.layout or task.actuator.places != self._usual.actuator.places:
             raise InputError(
                 f"The options {', '.join(options)} would change the observation or action space; "

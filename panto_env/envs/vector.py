@@ -16,7 +16,7 @@ from ..base.errors import InputError
 from ..control import Task
 from ..control.arguments import takes
 from ..control.observation import BOUND
-from ..control.settings import run_settings
+from ..control.settings import read_settings
 from ..control.state import TERMS
 from .settings import VectorSettings
 from .single import checked
@@ -41,7 +41,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
     @takes(VectorSettings)
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
-        settings = run_settings(given, VectorSettings)
+        settings = read_settings(given, VectorSettings)
         self.autoreset_mode = settings.autoreset_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.num_envs = settings.num_envs

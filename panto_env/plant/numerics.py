@@ -18,19 +18,19 @@ class Numerics(Settings):
 
     time_step: Positive | None = Field(
         None,
-        description="time step (s); None: 2.5 ms, or 2 ms on a flexible line that needs a finer grid for it, "
-        "or 5 ms on a line of periodic stiffness",
+        description="time step (s); by default 2.5 ms, or 2 ms on a flexible line that needs a finer grid "
+        "for it, or 5 ms on a line of periodic stiffness",
     )
     spacing: Positive | None = Field(
         None,
-        description="grid of the flexible catenary (m); None: 1/3 m, or the finest above it that is stable "
-        "with the time step (0.375 m on en50318-2002)",
+        description="grid of the flexible catenary (m); by default 1/3 m, or the finest above it that is "
+        "stable with the time step (0.375 m on en50318-2002)",
     )
     window: int = Field(
         7, description="spans of the flexible catenary computed about the train, odd; 0: the whole line"
     )
     precision: Literal["single", "double"] = Field(
-        "single", description="of the flexible catenary's wires; all else is double"
+        "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
     )
 
     @field_validator("window")

@@ -27,7 +27,9 @@ READING = constants(Reading)
 class SensorArrays(Protocol):
     """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
 
-    noise: Array  # (readings, lanes): of the next reading, in its units; or (readings, 0) for none
+    @property
+    def noise(self) -> Array:
+        """Noise of the next reading, (readings, lanes), in its units; (readings, 0) where there is none."""
 
     def reset(self, lane: int, sample: Array) -> None:
         """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,9 +38,9 @@ class PeriodicWire(NamedTuple):
 class PeriodicStiffness:
     """A massless spring, which any grid and any time step can carry."""
 
-    massless = True
-    wave_speed = np.inf  # no wave runs along a spring
-    length = np.inf  # the line has no end
+    massless: bool = True
+    wave_speed: float = np.inf  # no wave runs along a spring
+    length: float = np.inf  # the line has no end
 
     def __init__(
         self,
@@ -54,10 +54,11 @@ class PeriodicStiffness:
         """Build the line. Raises InputError where it is said to have defects."""
         refuse_defects(data, conditions)
         self.time_step = numerics.time_step or TIME_STEP
-        self.line = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)
-        self.wire = PeriodicWire(np.zeros(lanes))
+        self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)
+        self.wire: Any = PeriodicWire(np.zeros(lanes))
         self.usual_end = spans * data.span_length
-        self.supports = self.droppers = np.zeros(0)
+        self.supports: Array = np.zeros(0)
+        self.droppers: Array = np.zeros(0)
         stiffness = self.line.mean * (1.0 + self.line.variation)
         self.start_point = StartPoint(0.0, 0.0, 1.0 / stiffness)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,8 +46,8 @@ class ThreeSpanWire(NamedTuple):
 class ThreeSpan:
     """Paper 2's line; the wire has mass, but neither droppers nor an end."""
 
-    massless = False
-    length = np.inf  # the line has no end
+    massless: bool = False
+    length: float = np.inf  # the line has no end
 
     def __init__(
         self,
@@ -64,12 +64,12 @@ class ThreeSpan:
         """
         refuse_defects(data, conditions)
         self.time_step = numerics.time_step or TIME_STEP
-        self.line = _constants(data, self.time_step)
-        self.wire = _at_rest(lanes, data.modes)
+        self.line: Any = _constants(data, self.time_step)
+        self.wire: Any = _at_rest(lanes, data.modes)
         self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
         self.usual_end = spans * data.span_length
-        self.supports = data.span_length * np.arange(1, spans)
-        self.droppers = np.zeros(0)
+        self.supports: Array = data.span_length * np.arange(1, spans)
+        self.droppers: Array = np.zeros(0)
         compliance = float(self.line.at_support[0] ** 2 @ self.line.softness)
         self.start_point = StartPoint(0.0, compliance, 0.0)
 

@@ -1,0 +1,79 @@
+"""One pass of a benchmark: it runs as its settings ask, and its rate of action is that of the commands."""
+
+import numpy as np
+import pytest
+
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.single_pass import drive, run_pass
+from panto_env import simulate
+from panto_env.base.settings import parse
+
+LINE = Line(catenary="periodic-stiffness", pantograph="three-mass", distance=160.0)
+SPEED_KMH = 300.0
+INTERVAL = 0.02  # s
+
+
+def settings(**given):
+    return parse(BenchmarkSettings, given, "the benchmark")
+
+
+def run(**given):
+    return drive(settings(**{"line_condition": "new"} | given), LINE, "p:gain=0.5", SPEED_KMH, seed=3)[0]
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"actuator": {"force_limit": 7.0}},
+        {"sensors": {"delay": 0.03}},
+        {"line_condition": "worn"},
+        {"control_interval": INTERVAL},
+    ],
+    ids=lambda setting: next(iter(setting)),
+)
+def test_a_pass_is_run_under_each_setting(setting):
+    asked = run(**setting)
+    expected = simulate(
+        LINE.catenary, LINE.pantograph, SPEED_KMH, "p:gain=0.5", seed=3, distance=160.0, **setting
+    )
+    np.testing.assert_array_equal(asked.contact_force, expected.contact_force)
+    assert not np.array_equal(asked.contact_force, run().contact_force)
+
+
+class Shouting:
+    """Asks for more than there is, on frame and head, by a plan."""
+
+    def reset(self, context):
+        self.step = 0
+        self.plan = np.random.default_rng(0).normal(0, 1, (200, context.actions))
+
+    def act(self, observation):
+        self.step += 1
+        return self.plan[self.step - 1]
+
+
+def test_rate_of_action_is_that_of_the_possible_commands_within_the_spans():
+    given = settings(
+        actuator={"place": "both", "force_limit": 50.0}, line_condition="new", control_interval=INTERVAL
+    )
+    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0)
+    asked = 50.0 * np.clip(np.random.default_rng(0).normal(0, 1, (200, 2)), -1, 1)
+    # A span of 50 m takes 0.6 s, 30 commands: those of spans 2 and 3 are the 31st to the 90th.
+    changes = np.diff(asked[30:90], axis=0) / INTERVAL
+    assert row.action_rate == pytest.approx(np.sqrt((changes**2).sum() / 59))
+    assert (row.seed, row.speed_kmh, row.terminated) == (0, SPEED_KMH, False)
+    assert row.figures.distance == pytest.approx(100.0)
+
+
+def test_a_pass_that_ends_early_has_no_figures():
+    class Down:
+        def reset(self, context):
+            pass
+
+        def act(self, observation):
+            return -np.ones(1)
+
+    given = settings(actuator={"force_limit": 1000.0}, line_condition="new")
+    row = run_pass(given, LINE, (2, 3), Down(), SPEED_KMH, seed=0)
+    assert row.terminated
+    assert np.isnan([*row.figures.as_dict().values(), row.action_rate]).all()

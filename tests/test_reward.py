@@ -1,0 +1,132 @@
+"""The reward and its terms, worked out by hand from actions and recorded forces."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+NAME = "panto_env:PantographStiffness-v0"
+WEIGHTS = {"cost_function": 0.7, "contact_loss": 3.0, "effort": 0.2, "rate": 0.4}
+BOTH = {"place": "both", "force_limit": 250.0}
+
+
+def play(env, actions, seed=0):
+    """Rewards, terms and infos under given actions, or until the episode ends."""
+    env.reset(seed=seed)
+    rewards, terms, ended = [], {name: [] for name in WEIGHTS}, (False, False)
+    for action in actions:
+        _, reward, *ended, info = env.step(action)
+        rewards.append(reward)
+        for name, values in terms.items():
+            values.append(info["reward_terms"][name])
+        if any(ended):
+            break
+    return np.array(rewards), {name: np.array(values) for name, values in terms.items()}, ended
+
+
+def effort_and_rate(actions):
+    """Squared action, and squared half change of action, summed over the actuators; the first change is
+    from no action."""
+    actions = np.clip(actions, -1, 1)
+    changes = np.diff(actions, axis=0, prepend=np.zeros((1, actions.shape[1])))
+    return (actions**2).sum(axis=1), ((changes / 2) ** 2).sum(axis=1)
+
+
+@pytest.fixture
+def actions():
+    """Beyond the limits too, where they are clipped before anything is counted."""
+    return np.random.default_rng(0).uniform(-1.5, 1.5, (60, 2))
+
+
+@pytest.mark.parametrize("name", ["panto_env:PantographStiffness-v0", "panto_env:Pantograph-v0"])
+def test_effort_and_rate_are_those_of_the_clipped_actions(name, actions):
+    env = gymnasium.make(name, actuator=BOTH).unwrapped
+    effort, rate = effort_and_rate(actions)
+    for seed in (0, 1):  # a second episode begins from no action too
+        _, terms, _ = play(env, actions, seed)
+        assert terms["effort"] == pytest.approx(effort)
+        assert terms["rate"] == pytest.approx(rate)
+
+
+def test_full_force_reversed_within_a_step_costs_one():
+    env = gymnasium.make(NAME, reward={"cost_function": 0.0, "contact_loss": 0.0, "rate": 1.0}).unwrapped
+    rewards, _, _ = play(env, [[1.0], [-1.0], [1.0], [1.0]])
+    assert rewards == pytest.approx([-0.25, -1.0, -1.0, 0.0])
+
+
+def test_reward_is_the_weighted_sum_by_hand(actions):
+    env = gymnasium.make(NAME, actuator=BOTH, reward=WEIGHTS, speed_kmh=330).unwrapped
+    rewards, terms, _ = play(env, actions)
+    run = env.trajectory
+    steps = round(0.01 / run.time_step)
+    # Eq. 14 over a control step: trapezoids between samples; there is no interval before the first.
+    deviation = np.abs(run.contact_force - run.nominal_force)
+    intervals = np.append(0.0, 0.5 * (deviation[1:] + deviation[:-1])).reshape(-1, steps)
+    lost = (run.contact_force <= 0).reshape(-1, steps)
+    assert 0 < lost.mean() < 0.5
+    effort, rate = effort_and_rate(actions)
+    expected = (
+        WEIGHTS["cost_function"] * intervals.mean(axis=1) / run.nominal_force
+        + WEIGHTS["contact_loss"] * lost.mean(axis=1)
+        + WEIGHTS["effort"] * effort
+        + WEIGHTS["rate"] * rate
+    )
+    assert rewards == pytest.approx(-expected, rel=1e-9)
+    stride = run.speed_kmh / 3.6 * run.time_step
+    assert terms["cost_function"] == pytest.approx(stride * intervals.sum(axis=1), rel=1e-9)
+    # Of the whole episode's distance, so that the sum is the share of it.
+    distance = env.context.catenary.spans * run.span_length
+    control_steps = np.ceil(distance / (run.speed_kmh / 3.6 * 0.01))
+    share = 100 * lost.sum(axis=1) / (control_steps * steps)
+    assert terms["contact_loss"] == pytest.approx(share, rel=1e-9)
+
+
+def test_reward_without_weights_is_cf_and_cl_at_weight_one():
+    pushes = np.full((30, 1), 0.5)
+    usual, _, _ = play(gymnasium.make(NAME).unwrapped, pushes)
+    weights = {"cost_function": 1.0, "contact_loss": 1.0, "effort": 0.0, "rate": 0.0}
+    spelled, _, _ = play(gymnasium.make(NAME, reward=weights).unwrapped, pushes)
+    assert usual.tolist() == spelled.tolist()
+
+
+def test_early_end_is_charged_as_if_contact_were_lost_to_the_end():
+    weights = {"cost_function": 0.5, "contact_loss": 2.0}
+    actuator = {"force_limit": 400.0}
+    env = gymnasium.make(NAME, actuator=actuator, reward=weights, distance=400.5).unwrapped
+    rewards, terms, (terminated, truncated) = play(env, np.full((1000, 1), -1.0))
+    assert (terminated, truncated) == (True, False)
+    run = env.trajectory
+    stride = run.speed_kmh / 3.6 * run.time_step
+    steps = round(0.01 / run.time_step)
+    left = np.ceil(400.5 / (stride * steps)) - len(rewards)
+    assert left > 100
+    cost = terms["cost_function"][-1] / (stride * steps * run.nominal_force)
+    assert run.contact_force[-steps:].max() == 0.0
+    assert rewards[-1] == pytest.approx(-(0.5 * cost + 2.0) - left * (0.5 + 2.0), rel=1e-9)
+
+
+def test_vector_environment_counts_changes_of_action_in_each_lane():
+    """Over the end of an episode too: the lane begins anew, from no action, while its own is not taken."""
+    lanes = 3
+    env = gymnasium.make_vec(
+        NAME,
+        num_envs=lanes,
+        actuator=BOTH,
+        reward={"cost_function": 0.0, "contact_loss": 0.0, "rate": 1.0},
+        speed_kmh=(200, 300),
+        distance=20.0,
+    )
+    env.reset(seed=0)
+    random, before = np.random.default_rng(0), np.zeros((lanes, 2))
+    ended, ends = np.zeros(lanes, dtype=bool), 0
+    for _ in range(90):
+        actions = random.uniform(-1, 1, (lanes, 2))
+        _, rewards, terminated, truncated, infos = env.step(actions)
+        actions[ended] = 0.0  # these lanes have just begun anew
+        before[ended] = 0.0
+        expected = ((0.5 * (actions - before)) ** 2).sum(axis=1)
+        assert rewards == pytest.approx(-expected)
+        assert infos["rate"][~ended] == pytest.approx(expected[~ended])
+        assert infos["effort"][~ended] == pytest.approx((actions[~ended] ** 2).sum(axis=1))
+        before, ended = actions, terminated | truncated
+        ends += ended.sum()
+    assert ends >= 6

@@ -1,0 +1,106 @@
+"""A sample is the mean over its time step, judged by the pantograph's motion alone and by the contact."""
+
+import numpy as np
+import pytest
+
+from panto_env import simulate
+from panto_env.catalog import load_catenary, load_pantograph
+
+from .pantograph_alone import means, replay, rest
+
+LINE, PANTOGRAPH = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
+SPEED_KMH = 300.0
+
+
+class Shaking:
+    """Pushes frame and head independently of each other and of what it sees."""
+
+    def reset(self, context):
+        self.random = np.random.default_rng(0)
+        self.limit, self.forces = context.force_limit, []
+
+    def act(self, observation):
+        action = self.random.uniform(-1, 1, 2)
+        self.forces.append(self.limit * action)
+        return action
+
+
+def stiffness(position):
+    """k(x), Eq. 5 of paper 3 (N/m)."""
+    turns = position / LINE.span_length
+    return LINE.mean_stiffness * (1 + LINE.stiffness_variation * np.cos(2 * np.pi * turns))
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return Shaking()
+
+
+@pytest.fixture(scope="module")
+def run(policy):
+    actuator = {"place": "both", "force_limit": 100.0}
+    return simulate(LINE, PANTOGRAPH, SPEED_KMH, policy, actuator=actuator, distance=200.0)
+
+
+@pytest.fixture(scope="module")
+def states(run):
+    return replay(run, PANTOGRAPH, rest(PANTOGRAPH, run.nominal_force, stiffness(0.0)))
+
+
+def test_heights_and_velocities_are_means_over_the_step(run, states):
+    n = len(PANTOGRAPH.masses)
+    for series, place in (("head", 0), ("frame", n - 1), ("head_velocity", n), ("frame_velocity", 2 * n - 1)):
+        values, ends = getattr(run, series), states[:, place]
+        assert values == pytest.approx(means(ends), rel=1e-6, abs=1e-8), series
+        # The tolerance tells a mean from a value at either end.
+        assert np.abs(np.diff(ends)).max() > 1e-4, series
+
+
+def test_actuator_forces_are_those_that_the_policy_asked_for(run, policy):
+    asked = np.repeat(policy.forces, round(0.01 / run.time_step), axis=0)
+    assert run.frame_force == pytest.approx(asked[:, 0])
+    assert run.head_force == pytest.approx(asked[:, 1])
+
+
+def test_time_and_position_are_those_of_the_middle_of_the_step(run):
+    middle = (np.arange(len(run.time)) + 0.5) * run.time_step
+    assert run.time == pytest.approx(middle)
+    assert run.position == pytest.approx(middle * SPEED_KMH / 3.6)
+
+
+def test_massless_wire_stands_where_its_stiffness_bears_the_force(run):
+    """The wire has no mass, so F = k(x) w; the stiffness is that of the step's end."""
+    end = run.position + 0.5 * run.time_step * SPEED_KMH / 3.6
+    assert run.contact_force.min() == 0.0  # unloaded, the wire is back at rest
+    assert run.wire == pytest.approx(run.contact_force / stiffness(end), abs=1e-12)
+
+
+def test_massless_wire_goes_with_a_rigid_strip_while_it_is_pressed():
+    """Paper 3: the head is joined to the spring k(t); so it is the better the shorter the step."""
+    errors = []
+    for step in (2e-3, 1e-3, 5e-4):
+        run = simulate(LINE, PANTOGRAPH, SPEED_KMH, distance=200.0, time_step=step)
+        pressed = run.contact_force > 10.0
+        errors.append(np.abs(run.wire - run.head)[pressed].max() / run.head.max())
+    assert errors[-1] < 2e-3
+    assert errors[0] > 1.8 * errors[1] > 3.2 * errors[2]
+
+
+def test_elastic_strip_is_compressed_by_the_force_over_its_stiffness():
+    elastic = PANTOGRAPH.model_copy(update={"contact_stiffness": 20e3})
+    run = simulate(LINE, elastic, SPEED_KMH, distance=200.0, time_step=5e-4)
+    pressed = run.contact_force > 10.0
+    strip = (run.head - run.wire)[pressed]
+    assert strip == pytest.approx(run.contact_force[pressed] / 20e3, abs=1.2e-4)  # m, of up to 14 mm
+
+
+@pytest.mark.parametrize(
+    ("catenary", "pantograph"), [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")]
+)
+def test_head_stands_a_compressed_strip_above_a_wire_with_mass(catenary, pantograph):
+    data = load_pantograph(pantograph)
+    run = simulate(catenary, pantograph, 200.0, distance=100.0)
+    pressed = run.contact_force > 0.0
+    assert pressed.mean() > 0.99
+    strip = run.contact_force / data.contact_stiffness
+    assert (run.head - run.wire)[pressed] == pytest.approx(strip[pressed], rel=1e-6, abs=1e-9)
