@@ -1,12 +1,15 @@
-"""What commands share: tables for people, JSON for machines."""
+"""What commands share: tables and progress for people, JSON for machines."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
+import rich.progress
 import rich.table
 import typer
 from rich.console import Console
@@ -40,3 +43,22 @@ def print_table(table: Table) -> None:
 def number(value: float, digits: int = 1) -> str:
     """A figure for a table; a dash where there is none."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar while the body runs; the body calls what it gets with the number done and of all.
+
+    The bar is on standard error, and only where that is a terminal.
+    """
+    with rich.progress.Progress(
+        what,
+        rich.progress.BarColumn(),
+        rich.progress.MofNCompleteColumn(),
+        rich.progress.TimeRemainingColumn(),
+        console=progress_console,
+        transient=True,
+        disable=not progress_console.is_terminal,
+    ) as progress:
+        bar = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(bar, completed=done, total=total)

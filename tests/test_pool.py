@@ -41,8 +41,13 @@ def test_the_error_of_a_job_is_raised(run):
 
 def test_jobs_that_have_not_begun_are_cancelled_after_an_error():
     begun = []
+
+    def slow():
+        begun.append(1)
+        time.sleep(0.01)
+
     with pytest.raises(InputError):
-        in_threads([fail, *(partial(begun.append, k) for k in range(1000))], workers=1)
+        in_threads([fail, *[slow] * 1000], workers=1)
     assert len(begun) < 1000
 
 

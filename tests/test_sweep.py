@@ -12,7 +12,7 @@ from panto_env.analysis.parameters import change, parameter_names
 from panto_env.analysis.sweep import sweep
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.cli.sweep import parse_values
-from panto_env.plant.actuators.lagged import Actuator
+from panto_env.plant.actuators.lagged import LaggedActuator
 
 PANTO = Path(sys.executable).with_name("panto")
 PAPER_3 = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
@@ -80,7 +80,7 @@ def test_speed_actuator_and_policy_parameters_take_effect():
         (200, 0.0), (200, 0.02), (250, 0.0), (250, 0.02)
     ]  # fmt: skip
     for row in rows:
-        lag = Actuator(lag=row["actuator.lag"])
+        lag = LaggedActuator(lag=row["actuator.lag"])
         direct = simulate(**PAPER_3, speed_kmh=row["speed_kmh"], policy="pd", actuator=lag, distance=300)
         assert figures(row) == expected(direct, None)
     rows = sweep({"policy.gain": [0.3]}, **PAPER_3, policies=["p", "pd:damping=100"], distance=300)
@@ -104,7 +104,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
     for family, entry in (
         ("catenary", load_catenary("benchmark-2015")),
         ("pantograph", load_pantograph("three-mass")),
-        ("actuator", Actuator()),
+        ("actuator", LaggedActuator()),
     ):
         names = parameter_names(entry, family)
         assert names
@@ -115,7 +115,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
             if isinstance(value, int | float):
                 assert change(entry, name, value) == entry
     assert "pantograph.contact_stiffness" in parameter_names(load_pantograph("three-mass"), "pantograph")
-    assert "actuator.rate_limit" in parameter_names(Actuator(), "actuator")
+    assert "actuator.rate_limit" in parameter_names(LaggedActuator(), "actuator")
     assert not any(
         "holds_wire" in name for name in parameter_names(load_catenary("en50318-2002"), "catenary")
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from panto_env.analysis.options import with_settings
-from panto_env.terminal import Json, Plot, print_json, progress_console
+from panto_env.terminal import Json, Plot, counting, print_json
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
@@ -43,7 +43,6 @@ def benchmark(
     The plot shows the contact force on every line at its highest speed, and σ over speed.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
     from panto_env.analysis.plots import check_plot, save
 
@@ -63,16 +62,8 @@ def benchmark(
         check_format(output)
     if plot is not None:
         check_plot(plot)
-    columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal
-    ) as progress:
-        task = progress.add_task("passes", total=None)
-        outcome = run(
-            settings,
-            workers,
-            lambda done, total: progress.update(task, completed=done, total=total),
-        )
+    with counting("passes") as progress:
+        outcome = run(settings, workers, progress)
     if output is not None:
         outcome.save(output)
     if plot is not None:

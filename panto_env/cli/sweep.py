@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..base.errors import InputError
 from ..metrics.labels import LABELS
-from ..terminal import Json, Plot, console, number, print_json, progress_console
+from ..terminal import Json, Plot, console, counting, number, print_json
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -59,18 +58,14 @@ def sweep(
         check_plot(plot)
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
-    columns = ("passes", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=progress_console, transient=True, disable=not progress_console.is_terminal
-    ) as progress:
-        bar = progress.add_task("passes", total=None)
+    with counting("passes") as progress:
         rows = run(
             values,
             policies=policy or (None,),
             spans=parse_spans(spans),
             seed=seed,
             workers=workers,
-            progress=lambda done, total: progress.update(bar, completed=done, total=total),
+            progress=progress,
             **settings,
         )
     if output is not None:
