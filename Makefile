@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs mutants oldest rllib clean
+.PHONY: demo test lint proofs coverage mutants same oldest ptx rllib clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -38,17 +38,36 @@ test: $(READY) lint
 proofs: $(READY)
 	$(BIN)/pytest -n auto -m slow
 
+# Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
+coverage: $(READY)
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m 'plain and not slow'
+	$(BIN)/coverage report
+
+# Results and speed beside those of an earlier commit: make same BEFORE=1cef35a
+same: $(READY)
+	$(BIN)/python -m tests.before.compare --before $(BEFORE)
+	$(BIN)/python -m tests.before.speed --before $(BEFORE)
+
 # The source is broken on purpose, place by place: a test must notice (an hour on two cores).
 mutants: $(READY)
 	$(BIN)/python -m tests.mutants
 
-# The oldest Gymnasium that is supported, without the extra 'agents'.
+# The oldest Gymnasium and Numba that are supported, without the extra 'agents'. The newest are in constraints.txt.
 OLDEST := .venv-oldest
+OLDEST_ONES := gymnasium==1.1.1 numba==0.61.0 numpy==2.1.3 scipy==1.15.3
 oldest:
 	$(PYTHON) -m venv $(OLDEST)
-	grep -v '^gymnasium==' constraints.txt > $(OLDEST)/constraints.txt
-	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt gymnasium==1.1.1 pytest --editable .
+	grep -vE '^(gymnasium|numba|llvmlite|numpy|scipy)==' constraints.txt > $(OLDEST)/constraints.txt
+	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt $(OLDEST_ONES) pytest --editable .
 	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py
+
+# The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.
+PTX := .venv-ptx
+ptx:
+	$(PYTHON) -m venv $(PTX)
+	$(PTX)/bin/pip install -qq --constraint constraints.txt numba-cuda==0.30.4 nvidia-cuda-nvrtc==13.5.37 \
+	  nvidia-nvvm==13.5.37 nvidia-cuda-cccl==13.3.5.0.6 pytest --editable .
+	$(PTX)/bin/pytest tests/test_ptx.py
 
 # RLlib on the native vector environment: Ray is large and pins a Gymnasium of its own.
 RLLIB := .venv-rllib
@@ -59,4 +78,4 @@ rllib:
 	$(RLLIB)/bin/pytest tests/test_rllib.py
 
 clean:
-	rm -rf $(VENV) $(OLDEST) $(RLLIB) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) $(PTX) $(RLLIB) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

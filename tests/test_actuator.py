@@ -9,6 +9,8 @@ from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 
+pytestmark = pytest.mark.plain
+
 STEP = 1e-3
 
 

@@ -15,6 +15,8 @@ import pytest
 
 import panto_env
 
+pytestmark = pytest.mark.plain
+
 ROOT = Path(panto_env.__file__).parents[1]
 GIVEN = Path(__file__).parent / "extensions"
 RAIL = """

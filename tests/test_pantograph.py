@@ -5,6 +5,8 @@ from scipy.integrate import solve_ivp
 from panto_env.catalog import available, load_pantograph
 from panto_env.plant.pantograph import build as pantograph
 
+pytestmark = pytest.mark.plain
+
 
 @pytest.mark.parametrize("name", available("pantograph"))
 def test_discretisation_is_exact_for_held_forces(name):
@@ -38,7 +40,7 @@ def test_matrices_of_two_masses_as_written_out():
 def test_rest_is_in_equilibrium_and_carries_the_lift_less_the_lowest_spring():
     data = load_pantograph("identified-2dof")
     compliance = 1 / 33e3
-    state = pantograph.rest(data, 54.0, 0.01, compliance)
+    state = pantograph.rest_state(data, 54.0, 0.01, compliance)
     force = (state[0] - 0.01) / compliance
     assert force == pytest.approx(54.0 - data.stiffnesses[-1] * state[1])
     a, b = pantograph.matrices(data)

@@ -57,7 +57,7 @@ def check_origin(site: Path) -> None:
             places.append(str(module.__file__))
     wrong = [place for place in places if not Path(place).resolve().is_relative_to(site.resolve())]
     if wrong:
-        sys.exit(f"Not from {site}, so that there is nothing to compare: {', '.join(wrong)}")
+        sys.exit(f"{len(wrong)} parts are not from {site}, so that nothing is proved; first: {wrong[0]}")
 
 
 def main() -> None:
