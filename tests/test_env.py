@@ -115,9 +115,9 @@ def test_id_works_in_a_fresh_process_by_module_name():
 
 def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
     code = (
-        "import sys, panto_env; from panto_env.plant import coupling;"
+        "import sys, panto_env; from panto_env.plant import step;"
         "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'pyarrow', 'scipy.linalg', 'scipy.signal'};"
-        "print(len(coupling.advance.signatures), sorted(heavy & set(sys.modules)))"
+        "print(len(step.advance.signatures), sorted(heavy & set(sys.modules)))"
     )
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert result.stdout.strip() == "0 []"

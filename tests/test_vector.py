@@ -108,7 +108,6 @@ def test_bad_actions_change_nothing(actions, message):
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),
         ({"lanes": 0}, "number of lanes must be a whole number from 1"),
-        ({"velocity": 3}, "Unknown argument 'velocity'"),
         ({"render_mode": "rgb_array"}, "does not render"),
     ],
 )
@@ -150,8 +149,8 @@ def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
             seen, reward, *_ = single.step(actions[lane])
             np.testing.assert_array_equal(observations[lane], seen)
             assert rewards[lane] == reward
-    body = env.unwrapped.task.plant.body
-    assert len({body.transition[variety].tobytes() for variety in body.variety}) == 5
+    pantographs = env.unwrapped.task.plant.pantographs
+    assert len({pantographs.transition[variant].tobytes() for variant in pantographs.variant}) == 5
     waves = env.unwrapped.task.plant.run.waves
     assert {int(np.count_nonzero(waves[:, 0, lane])) for lane in range(5)} == {0, 4}
 

@@ -28,7 +28,7 @@ def ptx_of(function: Callable[..., Any], *arguments: Any) -> str:
     from numba import cuda
     from numba.cuda.extending import overload
 
-    @overload(floor)  # type: ignore[untyped-decorator]
+    @overload(floor)
     def _floor(x):  # no types: the signature must be that of the source below
         return lambda x: float(math.floor(x))
 

@@ -26,6 +26,7 @@ from .observation import OBSERVATIONS
 from .reward import Reward
 
 R = TypeVar("R", bound="RunSettings")
+_Speed = Annotated[float, Field(allow_inf_nan=True)]  # a line says itself which speeds it bears
 
 
 def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
@@ -88,7 +89,7 @@ class RunSettings(Numerics):
         validate_default=True,
         description="pantograph: a name of the catalogue or a TOML file",
     )
-    speed_kmh: Annotated[tuple[float, float], BeforeValidator(speed_range)] = Field(
+    speed_kmh: Annotated[tuple[_Speed, _Speed], BeforeValidator(speed_range)] = Field(
         300.0,
         validate_default=True,
         description="train speed (km/h): a number, or a range of two to draw from",
