@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from panto_env.backend import python_function
 from panto_env.plant.contact import contact_force
 
-law = contact_force.py_func
+law = python_function(contact_force)
 
 
 def test_force_is_the_mean_of_the_springs_at_both_ends_of_the_step():

@@ -115,9 +115,9 @@ def test_id_works_in_a_fresh_process_by_module_name():
 
 def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
     code = (
-        "import sys, panto_env; from panto_env.plant import coupling;"
+        "import sys, panto_env; from panto_env.plant import step;"
         "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'pyarrow', 'scipy.linalg', 'scipy.signal'};"
-        "print(len(coupling.advance.signatures), sorted(heavy & set(sys.modules)))"
+        "print(len(step.advance.signatures), sorted(heavy & set(sys.modules)))"
     )
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert result.stdout.strip() == "0 []"
@@ -273,6 +273,33 @@ def test_losing_contact_for_long_ends_the_episode_and_is_no_way_out():
     assert info["figures"]["contact_loss"] > 50
     passive, _, _ = run_episode(gymnasium.make("Pantograph-v0"))
     assert total < sum(passive)
+
+
+def test_contact_lost_for_half_a_second_or_a_head_too_high_ends_the_episode():
+    drop, lift = -np.ones(1), np.ones(1)
+    env = gymnasium.make("PantographStiffness-v0", actuator={"force_limit": 165.0}).unwrapped
+    env.reset(seed=0)  # under 157 N: without contact the pantograph sinks slowly
+    terminated, lost = False, 0
+    while not terminated:
+        _, _, terminated, _, info = env.step(drop)
+        lost = lost + 1 if info["reward_terms"]["contact_loss"] > 0 else 0
+    assert lost * 0.01 == pytest.approx(0.5, abs=0.011)
+    env.reset(seed=0, options={"actuator": {"force_limit": 4000.0}})
+    terminated = False
+    while not terminated:
+        assert abs(info["head"]) < 0.3 or info["contact_force"] == 0
+        _, _, terminated, truncated, info = env.step(lift)
+        assert not truncated
+    assert info["head"] > 0.25
+    assert env.trajectory.contact_force[-1] > 0
+
+
+def test_a_step_is_10_ms_at_300_kmh_unless_told_otherwise():
+    env = gymnasium.make("PantographStiffness-v0").unwrapped
+    _, info = env.reset(seed=0)
+    assert info["speed_kmh"] == pytest.approx(300)
+    assert env.context.control_interval == 0.01
+    assert env.step(np.zeros(1))[4]["position"] == pytest.approx(300 / 3.6 * 0.01)
 
 
 def test_renders_a_picture():

@@ -8,6 +8,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import splu
 
 from panto_env import InputError, simulate
+from panto_env.backend import python_function
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -22,6 +23,7 @@ from .finite_element import simulation as finite_element
 from .finite_element.system import build
 from .test_flexible import WHOLE, travel
 
+of_defects = python_function(rise_by_defects)
 EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
 
 
@@ -49,7 +51,7 @@ def static_by_finite_elements(system, line, condition, load=None, scatter=0.0):
 
 def rise(line, state, x):
     """Change of the contact wire's height (m) at positions x (m)."""
-    return np.array([rise_by_defects.py_func(state.rise, line.breaks, line.decay, at) for at in x])
+    return np.array([of_defects(state.rise, line.breaks, line.decay, at) for at in x])
 
 
 CONDITIONS = [
