@@ -69,6 +69,22 @@ def test_weights_scale_the_reward():
     assert sum(effort) < sum(unweighted)
 
 
+def test_second_episode_is_as_if_it_were_the_first():
+    settings = {"sensors": "realistic", "actuator": "realistic", "line_condition": "worn", "distance": 40.0}
+    env = gymnasium.make("PantographStiffness-v0", **settings).unwrapped
+    runs = []
+    for actions in (np.ones((99, 1)), -np.ones((99, 1)), np.ones((99, 1))):
+        runs.append([env.reset(seed=3)[0]])
+        ended = False
+        for action in actions[: 99 if len(runs) != 2 else 7]:  # the second one stops half-way
+            if not ended:
+                observation, reward, _, ended, _ = env.step(action)
+                runs[-1].append(np.append(observation, reward))
+    assert ended
+    for first, third in zip(runs[0], runs[2], strict=True):
+        np.testing.assert_array_equal(first, third)
+
+
 SCRIPT = """
 import gymnasium, hashlib, panto_env
 env = gymnasium.make("{name}", sensors="realistic", actuator="realistic", line_condition="worn",

@@ -259,6 +259,12 @@ def test_lanes_with_droppers_of_their_own_equal_single_runs_bit_for_bit():
     assert (alone[0].contact_force - alone[1].contact_force).std() > 1.0
 
 
+def test_one_of_several_conditions_is_drawn():
+    conditions = [LineCondition(irregularity=k) for k in (1.0, 2.0, 3.0)]
+    seeds = [np.random.default_rng(seed) for seed in range(30)]
+    assert {draw(conditions, random).condition.irregularity for random in seeds} == {1.0, 2.0, 3.0}
+
+
 def test_scatter_is_drawn_after_the_phases():
     fair, scattered = LineCondition(irregularity=1.0), LineCondition(irregularity=1.0, dropper_scatter=0.01)
     plain, drawn = (draw([c], np.random.default_rng(3), 90) for c in (fair, scattered))

@@ -46,6 +46,10 @@ def test_uplift_of_an_episode_is_that_of_its_trajectory():
         figures = play(env, lambda position, p=push: np.full(2, p if position > 1.4 * SPAN else -0.05))
         run = env.trajectory
         assert same(figures, run)
+        same_push = make(WITH_SUPPORTS)  # in an environment without a past
+        play(same_push, lambda position, p=push: np.full(2, p if position > 1.4 * SPAN else -0.05))
+        np.testing.assert_array_equal(run.uplift, same_push.trajectory.uplift)
+        np.testing.assert_array_equal(run.contact_force, same_push.trajectory.contact_force)
         passed, ahead = run.uplift[:, 0], run.uplift[:, 1]
         assert passed[-1] < passed.max() == figures["max_uplift"]
         assert push < 0.2 or ahead.max() > 1.1 * passed.max()
