@@ -19,6 +19,12 @@ def test_each_text_is_found_once_in_its_file(path):
     assert counts == dict.fromkeys(counts, 1)
 
 
+def test_each_mutant_is_valid_python():
+    for mutant in MUTANTS:
+        text = (ROOT / mutant.path).read_text(encoding="utf-8").replace(mutant.before, mutant.after)
+        compile(text, f"{mutant.path}, {mutant.breaks}", "exec")
+
+
 def test_each_mutant_is_described_once_and_names_tests_that_exist():
     described = Counter((mutant.path, mutant.breaks) for mutant in MUTANTS)
     assert described.most_common(1)[0][1] == 1

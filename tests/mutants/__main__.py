@@ -82,6 +82,10 @@ def _judge(mutants: Sequence[Mutant], jobs: int, own: bool) -> list[Verdict]:
                 with _taken(free) as bench:
                     verdict = _verdict(bench, mutant, [] if own else tests[mutant.plain])
                 progress.update(task, advance=1, description=f"{mutant.breaks}: {verdict.word}")
+                if not console.is_terminal:
+                    console.print(
+                        f"{verdict.word} in {verdict.seconds:.0f} s: {mutant.path}: {mutant.breaks}"
+                    )
                 return verdict
 
             return list(pool.map(judge, mutants))
