@@ -310,12 +310,27 @@ def test_contact_lost_for_half_a_second_or_a_head_too_high_ends_the_episode():
     assert env.trajectory.contact_force[-1] > 0
 
 
+def test_contact_lost_now_and_then_does_not_end_the_episode():
+    env = gymnasium.make("PantographStiffness-v0", speed_kmh=350, distance=1500, actuator={"place": "head"})
+    _, infos, terminated = run_episode(env)
+    assert not terminated
+    assert infos[-1]["figures"]["contact_loss"] / 100 * len(infos) * 0.01 > 1.0  # s
+
+
 def test_a_step_is_10_ms_at_300_kmh_unless_told_otherwise():
     env = gymnasium.make("PantographStiffness-v0").unwrapped
     _, info = env.reset(seed=0)
     assert info["speed_kmh"] == pytest.approx(300)
     assert env.context.control_interval == 0.01
     assert env.step(np.zeros(1))[4]["position"] == pytest.approx(300 / 3.6 * 0.01)
+
+
+def test_episode_covers_its_distance_in_whole_control_steps():
+    env = gymnasium.make("PantographStiffness-v0", distance=20.5)
+    _, infos, terminated = run_episode(env)
+    assert not terminated
+    assert len(infos) == 25  # of 0.83 m
+    assert infos[-1]["position"] == pytest.approx(25 * 0.01 * 300 / 3.6)
 
 
 def test_renders_a_picture():
