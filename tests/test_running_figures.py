@@ -42,12 +42,16 @@ def test_figures_of_an_episode_are_those_of_its_trajectory():
 def test_uplift_of_an_episode_is_that_of_its_trajectory():
     """A push lifts the support ahead, which the train has not come to when the episode ends."""
     env = make(WITH_SUPPORTS)
-    for push in (0.25, 0.05):  # the second episode lifts less
-        figures = play(env, lambda position, p=push: np.full(2, p if position > 1.4 * SPAN else -0.05))
+    for push, before in ((0.25, 0.03), (0.05, -0.05)):  # the second episode lifts both supports less
+
+        def act(position, p=push, b=before):
+            return np.full(2, p if position > 1.4 * SPAN else b)
+
+        figures = play(env, act)
         run = env.trajectory
         assert same(figures, run)
         same_push = make(WITH_SUPPORTS)  # in an environment without a past
-        play(same_push, lambda position, p=push: np.full(2, p if position > 1.4 * SPAN else -0.05))
+        play(same_push, act)
         np.testing.assert_array_equal(run.uplift, same_push.trajectory.uplift)
         np.testing.assert_array_equal(run.contact_force, same_push.trajectory.contact_force)
         passed, ahead = run.uplift[:, 0], run.uplift[:, 1]
