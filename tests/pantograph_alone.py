@@ -30,13 +30,15 @@ def equations(data):
     return rates, forces
 
 
-def rest(data, lift, wire_stiffness):
-    """State at rest under ``lift`` (N) against a wire that is a spring to the ground (N/m)."""
+def rest(data, lift, wire_stiffness, wire_height=0.0):
+    """State at rest under ``lift`` (N) against a wire that is a spring (N/m) to the ground, or to a height
+    above it (m)."""
     n = len(data.masses)
     rates, forces = equations(data)
     stiffness = -rates[n:, :n]
     stiffness[0, 0] += wire_stiffness / data.masses[0]
-    return np.concatenate([np.linalg.solve(stiffness, forces[n:, 1] * lift), np.zeros(n)])
+    push = forces[n:, 1] * lift + forces[n:, 0] * wire_stiffness * wire_height
+    return np.concatenate([np.linalg.solve(stiffness, push), np.zeros(n)])
 
 
 def replay(run, data, start):

@@ -5,8 +5,11 @@ from scipy.integrate import solve_ivp
 from panto_env.backend import python_function
 from panto_env.plant.contact import contact_force
 
+<<<<<<< HEAD
 pytestmark = pytest.mark.plain
 
+=======
+>>>>>>> refs/heads/baselines
 law = python_function(contact_force)
 
 
@@ -20,6 +23,13 @@ def test_force_is_the_mean_of_the_springs_at_both_ends_of_the_step():
 def test_damper_adds_its_rate():
     force = law(50e3, 2e-3, 50e3, 3e-3, 1e4, 0.0, 0.0)
     assert force == pytest.approx(50e3 * 2.5e-3 + 1e4 * 1e-3)
+
+
+def test_stiffness_may_change_and_the_damper_gives_way_too():
+    gap_0, gap_free, compliance, damping = 2e-3, 3e-3, 1e-5, 4e4
+    force = law(50e3, gap_0, 30e3, gap_free, damping, compliance, 0.0)
+    gap_1 = gap_free - compliance * force
+    assert force == pytest.approx((50e3 * gap_0 + 30e3 * gap_1) / 2 + damping * (gap_1 - gap_0))
 
 
 def test_contact_only_pushes_unless_told_otherwise():

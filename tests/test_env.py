@@ -69,6 +69,22 @@ def test_weights_scale_the_reward():
     assert sum(effort) < sum(unweighted)
 
 
+def test_second_episode_is_as_if_it_were_the_first():
+    settings = {"sensors": "realistic", "actuator": "realistic", "line_condition": "worn", "distance": 40.0}
+    env = gymnasium.make("PantographStiffness-v0", **settings).unwrapped
+    runs = []
+    for actions in (np.ones((99, 1)), -np.ones((99, 1)), np.ones((99, 1))):
+        runs.append([env.reset(seed=3)[0]])
+        ended = False
+        for action in actions[: 99 if len(runs) != 2 else 7]:  # the second one stops half-way
+            if not ended:
+                observation, reward, _, ended, _ = env.step(action)
+                runs[-1].append(np.append(observation, reward))
+    assert ended
+    for first, third in zip(runs[0], runs[2], strict=True):
+        np.testing.assert_array_equal(first, third)
+
+
 SCRIPT = """
 import gymnasium, hashlib, panto_env
 env = gymnasium.make("{name}", sensors="realistic", actuator="realistic", line_condition="worn",
@@ -273,6 +289,48 @@ def test_losing_contact_for_long_ends_the_episode_and_is_no_way_out():
     assert info["figures"]["contact_loss"] > 50
     passive, _, _ = run_episode(gymnasium.make("Pantograph-v0"))
     assert total < sum(passive)
+
+
+def test_contact_lost_for_half_a_second_or_a_head_too_high_ends_the_episode():
+    drop, lift = -np.ones(1), np.ones(1)
+    env = gymnasium.make("PantographStiffness-v0", actuator={"force_limit": 165.0}).unwrapped
+    env.reset(seed=0)  # under 157 N: without contact the pantograph sinks slowly
+    terminated, lost = False, 0
+    while not terminated:
+        _, _, terminated, _, info = env.step(drop)
+        lost = lost + 1 if info["reward_terms"]["contact_loss"] > 0 else 0
+    assert lost * 0.01 == pytest.approx(0.5, abs=0.011)
+    env.reset(seed=0, options={"actuator": {"force_limit": 4000.0}})
+    terminated = False
+    while not terminated:
+        assert abs(info["head"]) < 0.3 or info["contact_force"] == 0
+        _, _, terminated, truncated, info = env.step(lift)
+        assert not truncated
+    assert info["head"] > 0.25
+    assert env.trajectory.contact_force[-1] > 0
+
+
+def test_contact_lost_now_and_then_does_not_end_the_episode():
+    env = gymnasium.make("PantographStiffness-v0", speed_kmh=350, distance=1500, actuator={"place": "head"})
+    _, infos, terminated = run_episode(env)
+    assert not terminated
+    assert infos[-1]["figures"]["contact_loss"] / 100 * len(infos) * 0.01 > 1.0  # s
+
+
+def test_a_step_is_10_ms_at_300_kmh_unless_told_otherwise():
+    env = gymnasium.make("PantographStiffness-v0").unwrapped
+    _, info = env.reset(seed=0)
+    assert info["speed_kmh"] == pytest.approx(300)
+    assert env.context.control_interval == 0.01
+    assert env.step(np.zeros(1))[4]["position"] == pytest.approx(300 / 3.6 * 0.01)
+
+
+def test_episode_covers_its_distance_in_whole_control_steps():
+    env = gymnasium.make("PantographStiffness-v0", distance=20.5)
+    _, infos, terminated = run_episode(env)
+    assert not terminated
+    assert len(infos) == 25  # of 0.83 m
+    assert infos[-1]["position"] == pytest.approx(25 * 0.01 * 300 / 3.6)
 
 
 def test_renders_a_picture():

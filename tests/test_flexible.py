@@ -2,11 +2,14 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.backend import kernel
+from panto_env.backend import kernel, python_function
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.build import at_rest, constants
+from panto_env.plant.catenary.flexible.grid import spring_levels
+from panto_env.plant.catenary.flexible.line import CONTACT, PAD
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
+from panto_env.plant.catenary.flexible.wires import leapfrog
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, look_at_contact
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
@@ -53,6 +56,44 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     wave = np.sqrt(string.tension / string.mass)
     exact = force * speed * time / (string.mass * wave * (wave + speed))
     assert np.abs(heights - exact).max() < 0.005 * exact.max()
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (3.0, 0.0), (0.0, 2e-3)])
+@pytest.mark.parametrize("waves", [1, 4])
+def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
+    """Half-waves: omega^2 = (T k^2 + EI k^4) / m less that of the decay, (alpha + beta omega^2) / 2."""
+    data, step = load_catenary("en50318-2002"), 1e-3
+    contact = data.contact_wire.model_copy(update={"bending_stiffness": 5e4})
+    damped = data.model_copy(update={"damping": Rayleigh(alpha=alpha, beta=beta), "contact_wire": contact})
+    line = constants(damped, 3, Numerics(spacing=1.0, time_step=step, window=0, precision="double"))
+    wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[CONTACT].copy()
+    stencil[4] = 0.0  # the quieting load
+    shape = np.sin(wavenumber * line.spacing * (np.arange(line.mobility.shape[1]) - PAD))
+    u, d, amplitude, inner = shape.copy(), np.zeros(len(shape)), [], slice(PAD, -PAD)
+
+    def projected(values):
+        """Beyond the ends too, which the leapfrog leaves alone."""
+        return values[inner] @ shape[inner] / (shape[inner] @ shape[inner])
+
+    for _ in range(5):
+        python_function(leapfrog)(u, d, np.zeros(len(u)), line.inertia[CONTACT][:0], stencil)
+        amplitude.append(projected(u))
+        u, d = amplitude[-1] * shape, projected(d) * shape
+    a = np.array(amplitude)
+    p, q = np.linalg.lstsq(np.column_stack([a[1:-1], a[:-2]]), a[2:], rcond=None)[0]
+    decay = -np.log(-q) / (2 * step)
+    squared = (contact.tension * wavenumber**2 + contact.bending_stiffness * wavenumber**4) / contact.mass
+    assert decay == pytest.approx((alpha + beta * squared) / 2, rel=0.01, abs=1e-6)
+    frequency = np.arccos(p / (2 * np.sqrt(-q))) / step
+    assert frequency == pytest.approx(np.sqrt(squared - decay**2), rel=1e-3)
+
+
+def test_springs_and_dampers_to_the_ground_take_three_time_levels():
+    """A spring bears displacement, a damper velocity."""
+    step = 1e-3
+    levels = spring_levels(5e5, 800.0, step)
+    assert levels @ np.ones(3) == pytest.approx(5e5)
+    assert levels @ [step, 0.0, -step] == pytest.approx(800.0)  # at 1 m/s
 
 
 def energy(line, wire, step):
@@ -194,9 +235,9 @@ def test_restarted_lane_forgets_the_run_before():
     plant = Plant(load_catenary("en50318-2002"), load_pantograph("en50318-2002"))
     runs = []
     for _ in range(2):
-        samples = plant.samples(401)
+        samples = plant.samples(1301)  # the window has begun to travel
         plant.start(0, 300 / 3.6)
-        plant.advance(np.full((1, 1, 2), 50.0), 400, samples)
+        plant.advance(np.full((1, 1, 2), 50.0), 1300, samples)
         runs.append(samples)
     np.testing.assert_array_equal(runs[0].rows, runs[1].rows)
     np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)

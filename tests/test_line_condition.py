@@ -23,6 +23,7 @@ from .finite_element import simulation as finite_element
 from .finite_element.system import build
 from .test_flexible import WHOLE, travel
 
+of_defects = python_function(rise_by_defects)
 EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
 
 
@@ -50,7 +51,11 @@ def static_by_finite_elements(system, line, condition, load=None, scatter=0.0):
 
 def rise(line, state, x):
     """Change of the contact wire's height (m) at positions x (m)."""
+<<<<<<< HEAD
     return np.array([python_function(rise_by_defects)(state.rise, line.breaks, line.decay, at) for at in x])
+=======
+    return np.array([of_defects(state.rise, line.breaks, line.decay, at) for at in x])
+>>>>>>> refs/heads/baselines
 
 
 CONDITIONS = [
@@ -256,6 +261,12 @@ def test_lanes_with_droppers_of_their_own_equal_single_runs_bit_for_bit():
         np.testing.assert_array_equal(run.contact_force, alone[lane].contact_force)
         np.testing.assert_array_equal(run.dropper_force, alone[lane].dropper_force)
     assert (alone[0].contact_force - alone[1].contact_force).std() > 1.0
+
+
+def test_one_of_several_conditions_is_drawn():
+    conditions = [LineCondition(irregularity=k) for k in (1.0, 2.0, 3.0)]
+    seeds = [np.random.default_rng(seed) for seed in range(30)]
+    assert {draw(conditions, random).condition.irregularity for random in seeds} == {1.0, 2.0, 3.0}
 
 
 def test_scatter_is_drawn_after_the_phases():

@@ -154,10 +154,12 @@ def test_measured_observation_is_the_beginning_of_the_full_one():
     assert names[: len(seen)] == [entry.name for entry in measured.context.layout.entries]
 
 
-def test_entries_are_clipped_to_ten_of_their_scales():
-    heavy = load_pantograph("three-mass").model_copy(update={"static_force": 3000.0})
-    env = gymnasium.make("panto_env:PantographStiffness-v0", pantograph=heavy).unwrapped
+@pytest.mark.parametrize("sign", [1, -1])
+def test_entries_are_clipped_to_ten_of_their_scales(sign):
+    heavy = load_pantograph("three-mass").model_copy(update={"static_force": sign * 3000.0})
+    env = gymnasium.make("panto_env:PantographStiffness-v0", pantograph=heavy, bilateral=True).unwrapped
     observation, _ = env.reset(seed=0)
-    assert env.context.nominal_force > 3000.0
-    assert observation.max() == observation[env.context.layout.index("contact force")] == 10.0
+    assert sign * env.context.nominal_force > 2000.0
+    force = observation[env.context.layout.index("contact force")]
+    assert sign * force == (sign * observation).max() == 10.0
     assert env.observation_space.contains(observation)

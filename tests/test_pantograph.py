@@ -53,3 +53,12 @@ def test_head_actuator_is_a_pair_of_forces():
     _, b = pantograph.matrices(data)
     n = len(data.masses)
     assert b[n:, 2] @ np.array(data.masses) == pytest.approx(0.0)
+
+
+def test_scatter_is_of_its_size_and_leaves_nothing_out():
+    data, random = load_pantograph("three-mass"), np.random.default_rng(0)
+    drawn = [pantograph.with_scatter(data, 0.1, random) for _ in range(300)]
+    for name in ("masses", "stiffnesses", "dampings"):
+        changes = np.log(np.array([getattr(each, name) for each in drawn]) / getattr(data, name))
+        assert changes.std(axis=0) == pytest.approx([0.1] * 3, rel=0.2), name
+        assert np.abs(np.corrcoef(changes.T) - np.eye(3)).max() < 0.25, name

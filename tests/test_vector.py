@@ -42,6 +42,33 @@ def test_lane_i_is_the_single_environment_seeded_seed_plus_i(name, lanes):
                 assert figures == pytest.approx(info["figures"], rel=1e-9, abs=1e-9, nan_ok=True)
 
 
+def test_lanes_of_a_massless_line_are_single_environments():
+    """Speed, pantograph and noise each of its own; over the ends of episodes."""
+    settings = LIVELY | {"speed_kmh": (200, 330), "pantograph_scatter": 0.1, "distance": 15.0}
+    vector, plain = (
+        make("PantographStiffness-v0", **settings | more) for more in ({}, {"pantograph_scatter": 0})
+    )
+    singles = [gymnasium.make("panto_env:PantographStiffness-v0", **settings) for _ in range(3)]
+    observations, info = vector.reset(seed=5)
+    for i, env in enumerate(singles):
+        np.testing.assert_array_equal(observations[i], env.reset(seed=5 + i)[0])
+    assert np.ptp(info["speed_kmh"]) > 10
+    assert not np.array_equal(plain.reset(seed=5)[0][:, 0], observations[:, 0])
+    ended, ends = [False] * 3, 0
+    for actions in np.random.default_rng(0).uniform(-1, 1, (70, 3, 1)):
+        observations, rewards, *_, infos = vector.step(actions)
+        for i, env in enumerate(singles):
+            if ended[i]:
+                (observation, _), reward, ended[i], position = env.reset(), 0.0, False, 0.0
+            else:
+                observation, reward, *ending, single = env.step(actions[i])
+                ended[i], position = any(ending), single["position"]
+                ends += ended[i]
+            np.testing.assert_array_equal(observations[i], observation)
+            assert (rewards[i], infos["position"][i]) == (reward, position)
+    assert ends >= 6
+
+
 def test_autoreset_modes_are_declared_and_kept():
     same = make(distance=10.0, autoreset_mode="SameStep")
     assert same.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "words", nargs="*", help="only mutants with one of these in list, path or description"
     )
     parser.add_argument("-j", "--jobs", type=int, default=2, help="mutants at a time")
+    parser.add_argument("--own", action="store_true", help="only the tests that a mutant's list names")
     parser.add_argument("--list", action="store_true", help="show them, and whether their texts are found")
     options = parser.parse_args(arguments)
     mutants = [mutant for mutant in load_mutants() if _asked_for(mutant, options.words)]
@@ -45,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         console.print(f"{mutant.path}: {mutant.breaks}{note}")
     if lost or options.list:
         return int(bool(lost))
-    verdicts = _judge(mutants, max(1, options.jobs))
+    verdicts = _judge(mutants, max(1, options.jobs), options.own)
     if not verdicts:
         return 1
     return print_report(verdicts, Console() if sys.stdout.isatty() else Console(width=WIDTH))
@@ -56,16 +57,20 @@ def _asked_for(mutant: Mutant, words: Sequence[str]) -> bool:
     return not words or any(word in name for word in words)
 
 
-def _judge(mutants: Sequence[Mutant], jobs: int) -> list[Verdict]:
+def _judge(mutants: Sequence[Mutant], jobs: int, own: bool) -> list[Verdict]:
     """Verdicts in the mutants' order; none where tests fail on the source as it is."""
-    tests = list(dict.fromkeys(test for mutant in mutants for test in mutant.tests))
+    ways = {mutant.plain for mutant in mutants}
+    tests = {plain: _tests(mutant for mutant in mutants if mutant.plain == plain) for plain in ways}
     with tempfile.TemporaryDirectory(prefix="panto-mutants-") as folder, ThreadPoolExecutor(jobs) as pool:
         benches = [Workbench(Path(folder) / str(number)) for number in range(jobs)]
-        with console.status(f"{len(tests)} tests or files on the source as it is"):
-            for outcome in pool.map(lambda bench: bench.check(tests), benches):
-                if outcome.failed:
-                    console.print(f"The source as it is fails {outcome.failed}:\n{outcome.output[-4000:]}")
-                    return []
+        for plain, some in tests.items():
+            with console.status(f"{len(some)} tests or files on the source as it is"):
+                for outcome in pool.map(lambda bench, t=some, p=plain: bench.check(t, p), benches):
+                    if outcome.failed:
+                        console.print(
+                            f"The source as it is fails {outcome.failed}:\n{outcome.output[-4000:]}"
+                        )
+                        return []
         free: Queue[Workbench] = Queue()
         for bench in benches:
             free.put(bench)
@@ -75,11 +80,19 @@ def _judge(mutants: Sequence[Mutant], jobs: int) -> list[Verdict]:
 
             def judge(mutant: Mutant) -> Verdict:
                 with _taken(free) as bench:
-                    verdict = _verdict(bench, mutant, tests)
+                    verdict = _verdict(bench, mutant, [] if own else tests[mutant.plain])
                 progress.update(task, advance=1, description=f"{mutant.breaks}: {verdict.word}")
+                if not console.is_terminal:
+                    console.print(
+                        f"{verdict.word} in {verdict.seconds:.0f} s: {mutant.path}: {mutant.breaks}"
+                    )
                 return verdict
 
             return list(pool.map(judge, mutants))
+
+
+def _tests(mutants: Iterable[Mutant]) -> list[str]:
+    return list(dict.fromkeys(test for mutant in mutants for test in mutant.tests))
 
 
 @contextmanager
@@ -92,7 +105,7 @@ def _taken(free: Queue[Workbench]) -> Iterator[Workbench]:
 
 
 def _verdict(bench: Workbench, mutant: Mutant, tests: Sequence[str]) -> Verdict:
-    """Its own tests first; where none of them fails, all the others."""
+    """Its own tests first; where none of them fails, the others that run as its own do."""
     outcome = bench.judge(mutant, mutant.tests)
     if outcome.failed:
         return Verdict(mutant, outcome.failed, True, outcome.seconds)

@@ -21,6 +21,7 @@ class Mutant:
     tests: tuple[str, ...]  # under tests/, the one that should notice first
     harmless: str = ""  # why no figure that is printed changes, for a mutant that no test notices
     kernels: bool = True  # whether kernels have to be compiled anew: not where the file has none
+    plain: bool = False  # whether its tests run without compilation, the sooner where they take few steps
 
     def occurrences(self, root: Path) -> int:
         """How often the text is found in a checkout; it should be once."""
@@ -42,8 +43,9 @@ class Mutant:
 def load_mutants(folder: Path = FOLDER) -> list[Mutant]:
     """Mutants of all lists in a folder. Raises ValueError, naming the list, where one is not valid.
 
-    A list is a TOML file of tables [[file]] with ``path``, ``tests`` and maybe ``kernels = false``; each
-    has tables [[file.mutant]] with ``breaks``, ``before``, ``after``, and maybe ``tests`` and ``harmless``.
+    A list is a TOML file of tables [[file]] with ``path``, ``tests`` and maybe ``kernels = false`` or
+    ``plain = true``; each has tables [[file.mutant]] with ``breaks``, ``before``, ``after``, and maybe
+    ``tests``, ``harmless`` or ``plain``.
     """
     mutants = []
     for path in sorted(folder.glob("*.toml")):
@@ -56,7 +58,7 @@ def load_mutants(folder: Path = FOLDER) -> list[Mutant]:
 
 def _mutant(area: str, table: dict[str, object]) -> Mutant:
     names = {field.name for field in fields(Mutant)} - {"area"}
-    required = names - {"harmless", "kernels"}
+    required = names - {"harmless", "kernels", "plain"}
     if not required <= table.keys() <= names or table["before"] == table["after"]:
         raise ValueError(f"{area}.toml: {table.get('breaks')!r} is not a mutant: {sorted(table)}")
     tests = table["tests"]

@@ -52,17 +52,17 @@ class Workbench:
         for package, name in PACKAGES.items():
             (self.root / package).symlink_to(name)
 
-    def check(self, tests: Sequence[str]) -> Outcome:
-        """Run tests on the source as it is."""
-        return self._pytest(tests, self._kernels)
+    def check(self, tests: Sequence[str], plain: bool) -> Outcome:
+        """Run tests on the source as it is; plain: without compiling kernels."""
+        return self._pytest(tests, self._kernels, plain)
 
     def judge(self, mutant: Mutant, tests: Sequence[str]) -> Outcome:
         """Run tests on a mutant until one fails, and leave the copy as it was."""
         text = mutant.apply(self.root)
         try:
-            if not mutant.kernels:
+            if not (mutant.kernels or mutant.plain):
                 self._take_over_kernels()
-            return self._pytest(tests, self._mutant_kernels)
+            return self._pytest(tests, self._mutant_kernels, mutant.plain)
         finally:
             mutant.undo(self.root, text)
             shutil.rmtree(self._mutant_kernels, ignore_errors=True)
@@ -74,11 +74,11 @@ class Workbench:
             folder = self._python(["-c", source], self._mutant_kernels, 60).stdout.strip()
             shutil.copytree(compiled, folder, dirs_exist_ok=True)
 
-    def _pytest(self, tests: Sequence[str], kernels: Path) -> Outcome:
+    def _pytest(self, tests: Sequence[str], kernels: Path, plain: bool) -> Outcome:
         start = time.monotonic()
         arguments = ["-m", "pytest", "-x", "-q", "-rfE", "-p", "no:cacheprovider", "--tb=short", *tests]
         try:
-            done = self._python(arguments, kernels, TIME_LIMIT)
+            done = self._python(arguments, kernels, TIME_LIMIT, plain)
         except subprocess.TimeoutExpired:
             return Outcome(f"no end within {TIME_LIMIT} s", TIME_LIMIT, "")
         output = done.stdout + done.stderr
@@ -88,13 +88,14 @@ class Workbench:
         return Outcome(failed[1] if failed else "", time.monotonic() - start, output)
 
     def _python(
-        self, arguments: Sequence[str], kernels: Path, limit: float
+        self, arguments: Sequence[str], kernels: Path, limit: float, plain: bool = False
     ) -> subprocess.CompletedProcess[str]:
         # Bytecode would be stale where a file changes twice within a second and keeps its size.
         environment = os.environ | {
             "PYTHONPATH": str(self.root),
             "PYTHONDONTWRITEBYTECODE": "1",
             "PANTO_CACHE_DIR": str(kernels),
+            "NUMBA_DISABLE_JIT": str(int(plain)),
         }
         return subprocess.run(
             [sys.executable, *arguments],

@@ -1,0 +1,27 @@
+"""Plain arithmetic that kernels have in the place of a library's functions."""
+
+import numpy as np
+import pytest
+
+from panto_env.backend import python_function
+from panto_env.plant.interpolation import stencil
+from panto_env.plant.trigonometry import cosine_of_turns, sine_of_turns
+
+
+def test_cubics_are_interpolated_exactly():
+    positions, spacing = np.random.default_rng(0).uniform(1, 9, 50), 0.25
+    nodes = spacing * np.arange(60)
+    first, weights = stencil(positions, spacing)
+    for cubic in np.polynomial.Polynomial([1, -2, 0.5, 0.1]), np.polynomial.Polynomial([0, 0, 0, 1]):
+        four = cubic(nodes)[first[:, None] + np.arange(4)]
+        assert (weights * four).sum(axis=1) == pytest.approx(cubic(positions))
+    between = positions / spacing - first
+    assert ((between >= 1) & (between < 2)).all()
+
+
+@pytest.mark.parametrize("name", ["sine", "cosine"])
+def test_turns_are_numpy_s(name):
+    ours = python_function({"sine": sine_of_turns, "cosine": cosine_of_turns}[name])
+    theirs = {"sine": np.sin, "cosine": np.cos}[name]
+    turns = np.random.default_rng(0).uniform(-3, 50, 200)
+    assert [ours(each) for each in turns] == pytest.approx(theirs(2 * np.pi * turns), abs=1e-13)

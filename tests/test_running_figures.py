@@ -1,0 +1,59 @@
+"""Figures kept as an episode runs are those of its whole trajectory."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from panto_env.catalog import load_catenary
+
+SPAN = load_catenary("ohl-three-span").span_length
+MASSLESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 330, "distance": 150.0}
+WITH_SUPPORTS = {"catenary": "ohl-three-span", "pantograph": "dsa350", "distance": 2 * SPAN - 1.0}
+
+
+def make(settings):
+    actuator = {"place": "both", "force_limit": 300.0}
+    return gymnasium.make("panto_env:Pantograph-v0", actuator=actuator, **settings).unwrapped
+
+
+def play(env, act):
+    """Figures at the end of an episode, under actions by position (m)."""
+    env.reset(seed=0)
+    ended, position = (False, False), 0.0
+    while not any(ended):
+        _, _, *ended, info = env.step(act(position))
+        position = info["position"]
+    return info["figures"]
+
+
+def same(figures, run):
+    return figures == pytest.approx(run.summary().as_dict(), rel=1e-9, nan_ok=True)
+
+
+def test_figures_of_an_episode_are_those_of_its_trajectory():
+    """In a second episode too, which begins anew."""
+    env, random = make(MASSLESS), np.random.default_rng(0)
+    for _ in range(2):
+        figures = play(env, lambda position: random.uniform(-1, 1, 2))
+        assert figures["contact_loss"] > 0
+        assert same(figures, env.trajectory)
+
+
+def test_uplift_of_an_episode_is_that_of_its_trajectory():
+    """A push lifts the support ahead, which the train has not come to when the episode ends."""
+    env = make(WITH_SUPPORTS)
+    for push, before in ((0.25, 0.03), (0.05, -0.05)):  # the second episode lifts both supports less
+
+        def act(position, p=push, b=before):
+            return np.full(2, p if position > 1.4 * SPAN else b)
+
+        figures = play(env, act)
+        run = env.trajectory
+        assert same(figures, run)
+        same_push = make(WITH_SUPPORTS)  # in an environment without a past
+        play(same_push, act)
+        np.testing.assert_array_equal(run.uplift, same_push.trajectory.uplift)
+        np.testing.assert_array_equal(run.contact_force, same_push.trajectory.contact_force)
+        passed, ahead = run.uplift[:, 0], run.uplift[:, 1]
+        assert passed[-1] < passed.max() == figures["max_uplift"]
+        assert push < 0.2 or ahead.max() > 1.1 * passed.max()
