@@ -5,11 +5,8 @@ from scipy.integrate import solve_ivp
 from panto_env.backend import python_function
 from panto_env.plant.contact import contact_force
 
-<<<<<<< HEAD
 pytestmark = pytest.mark.plain
 
-=======
->>>>>>> refs/heads/baselines
 law = python_function(contact_force)
 
 

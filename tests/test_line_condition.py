@@ -51,11 +51,7 @@ def static_by_finite_elements(system, line, condition, load=None, scatter=0.0):
 
 def rise(line, state, x):
     """Change of the contact wire's height (m) at positions x (m)."""
-<<<<<<< HEAD
-    return np.array([python_function(rise_by_defects)(state.rise, line.breaks, line.decay, at) for at in x])
-=======
     return np.array([of_defects(state.rise, line.breaks, line.decay, at) for at in x])
->>>>>>> refs/heads/baselines
 
 
 CONDITIONS = [
