@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec
 
+from ..base.settings import nearest
 from .settings import RunSettings, fields
 
 P = ParamSpec("P")
-O = TypeVar("O")  # noqa: E741 - the class whose ``__init__`` it is
 
 
 def takes(
@@ -52,8 +51,8 @@ def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function:
     """Raise TypeError for a name that is no setting, as Python does for an unknown argument."""
     for name in given:
         if name not in kind.model_fields:
-            near = difflib.get_close_matches(name, kind.model_fields, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(fields(kind))}"
+            near = nearest(name, list(kind.model_fields))
+            hint = f"; did you mean '{near}'?" if near else f"; known are {', '.join(fields(kind))}"
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
 
 
