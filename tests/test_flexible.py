@@ -24,10 +24,10 @@ def travel(line, wire, start, stride, force, heights):
     """Move a constant force along the line; heights of the wire under it."""
     wire.position[0, 0], wire.force[0, 0] = start, force
     for n in range(heights.size):
-        x0, x1 = start + stride * n, start + stride * (n + 1)
+        x = start + stride * (n + 1)
         advance_wire(line, wire, 0)
-        height, compliance, _ = look_at_contact(line, wire, 0, 0, x0, x1)
-        apply_force(line, wire, 0, 0, x0, x1, force)
+        height, compliance, _ = look_at_contact(line, wire, 0, 0, x)
+        apply_force(line, wire, 0, 0, x, force)
         end_step(line, wire, 0)
         heights[n] = height + compliance * force
 

@@ -16,7 +16,7 @@ def wait(line, wire, x, steps):
     wire.position[0, 0], wire.force[0, 0] = x, 0.0
     for _ in range(steps):
         advance_wire(line, wire, 0)
-        apply_force(line, wire, 0, 0, x, x, 0.0)
+        apply_force(line, wire, 0, 0, x, 0.0)
         end_step(line, wire, 0)
 
 

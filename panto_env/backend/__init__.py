@@ -10,7 +10,7 @@ With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 from .block import LANES_ABREAST, new_block, new_blocks
 from .compile import JIT, constants, inlined, kernel, python_function, subroutine
 from .dispatch import implements, operation
-from .mathematics import floor
+from .mathematics import NOT_NEGATIVE, floor
 from .memory import CACHE_LINE, aligned_zeros, lane_table
 from .packed import bind, open_packed
 from .threads import LaneThreads, lane_threads
@@ -19,6 +19,7 @@ __all__ = [
     "CACHE_LINE",
     "JIT",
     "LANES_ABREAST",
+    "NOT_NEGATIVE",
     "LaneThreads",
     "aligned_zeros",
     "bind",

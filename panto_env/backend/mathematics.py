@@ -1,4 +1,4 @@
-"""Functions of a number that the processor and a GPU's compiler know under different names."""
+"""Arithmetic that the compiler is to understand: on the processor and on a GPU."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import numpy as np
 from numba.extending import overload
 
 from .dispatch import INLINED
+
+NOT_NEGATIVE = 0xFFFFFFF
+"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
 
 
 def floor(x: Any) -> Any:

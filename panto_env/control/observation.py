@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import inlined, subroutine
+from ..backend import NOT_NEGATIVE, inlined, subroutine
 from ..base.arrays import Array, Index
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
@@ -19,8 +19,6 @@ from .state import MAX_ENTRIES, TASK_ROW
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
-NOT_NEGATIVE = 0xFFFFFFF
-"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
 
 
 @dataclass(frozen=True)

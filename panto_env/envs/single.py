@@ -22,6 +22,13 @@ from ..plant.actuators import actuator_settings
 from ..plant.state import Row
 from .settings import EnvironmentSettings
 
+# Places in a lane's columns as plain integers: members of an enum would double the time that `step` takes.
+CONTACT_FORCE, HEAD, WIRE = int(Row.CONTACT_FORCE), int(Row.HEAD_HEIGHT), int(Row.WIRE_HEIGHT)
+FRAME_FORCE, HEAD_FORCE = int(Row.FRAME_FORCE), int(Row.HEAD_FORCE)
+STEP, STRIDE = int(Row.STEP), int(Row.STRIDE)
+REWARD = int(TaskRow.REWARD)
+TERM_ROWS = tuple(enumerate(TERMS, int(TaskRow.TERM)))
+
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A pantograph under a catenary, whose contact force an actuator is to keep steady.
@@ -112,7 +119,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task, episode = task, task.episode
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
-        self._plant_column, self._task_column = task.plant.run.table[0, :, 0], episode.table[:, 0]
+        self._plant_column = task.plant.run.table[0, : STRIDE + 1, 0]
+        self._task_column = episode.table[:, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
@@ -137,19 +145,18 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         terminated, truncated = self._terminated.item(), self._truncated.item()
         plant, task = self._plant_column.tolist(), self._task_column.tolist()
         info: dict[str, Any] = {
-            "contact_force": plant[Row.CONTACT_FORCE],
-            "head": plant[Row.HEAD_HEIGHT],
-            "wire": plant[Row.WIRE_HEIGHT],
-            "frame_force": plant[Row.FRAME_FORCE],
-            "head_force": plant[Row.HEAD_FORCE],
-            "position": plant[Row.STEP] * plant[Row.STRIDE],
-            "reward_terms": dict(zip(TERMS, task[TaskRow.TERM :], strict=True)),
+            "contact_force": plant[CONTACT_FORCE],
+            "head": plant[HEAD],
+            "wire": plant[WIRE],
+            "frame_force": plant[FRAME_FORCE],
+            "head_force": plant[HEAD_FORCE],
+            "position": plant[STEP] * plant[STRIDE],
+            "reward_terms": {name: task[row] for row, name in TERM_ROWS},
         }
         if terminated or truncated:
             self._running = False
             info["figures"] = self.task.figures(0).as_dict()
-        reward = task[TaskRow.REWARD]
-        return self._observation.copy(), reward, terminated, truncated and not terminated, info
+        return self._observation.copy(), task[REWARD], terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
@@ -173,7 +180,7 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     if force.shape != shape:
         raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
     # The sum is finite where all are: cheaper than to ask each; Python adds up a few sooner than NumPy.
-    if not math.isfinite(sum(force.tolist()) if force.ndim == 1 else force.sum(dtype=np.float64)):
+    if not math.isfinite(sum(force.tolist()) if len(shape) == 1 else force.sum(dtype=np.float64)):
         raise InputError(f"The action must be finite, not {action!r}; check the policy.")
     return force
 

@@ -48,9 +48,7 @@ class Row(IntEnum):
     FREE_STATE = STATE + MAX_STATE  # the state at the end of the step, were there no contact force
     COMMAND = FREE_STATE + MAX_STATE  # of the actuators (N), one row per place
     ARRIVING_COMMAND = COMMAND + len(Place)  # the command that arrives at an actuator now (N)
-    POSITION_BEFORE = ARRIVING_COMMAND + 1  # of the contact point at the start of the step (m)
-    POSITION = ARRIVING_COMMAND + 2  # of the contact point at the end of the step (m)
-    IRREGULARITY = ARRIVING_COMMAND + 3  # of the contact wire's height, at the end of the step (m)
+    IRREGULARITY = ARRIVING_COMMAND + 1  # of the contact wire's height, at the end of the step (m)
 
 
 ROW, PLACE = constants(Row), constants(Place)

@@ -6,7 +6,7 @@ the table to a block on its stack, steps the block, and copies it back.
 
 from __future__ import annotations
 
-from ..backend import inlined, kernel, new_blocks, open_packed
+from ..backend import NOT_NEGATIVE, inlined, kernel, new_blocks, open_packed
 from .actuators import drive
 from .catenary.protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
 from .contact import contact_force
@@ -34,16 +34,14 @@ def store(block, table, begin, count):
 
 
 @inlined
-def move_along(waves, block, begin, count):
-    """Positions of the contact points, and the height of the wire's irregularity there: a sum of cosines."""
+def read_irregularity(waves, block, begin, count):
+    """Height of the contact wire's irregularity at the end of the step (m): a sum of cosines."""
     for i in range(count):
-        block[ROW.POSITION_BEFORE, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i]
-        block[ROW.POSITION, i] = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
         block[ROW.IRREGULARITY, i] = 0.0
     for k in range(waves.shape[0]):
         wave = waves[k, :, begin : begin + count]
         for i in range(count):
-            turns = wave[1, i] * block[ROW.POSITION, i] + wave[2, i]
+            turns = wave[1, i] * (block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)) + wave[2, i]
             block[ROW.IRREGULARITY, i] += wave[0, i] * cosine_of_turns(turns)
 
 
@@ -55,7 +53,7 @@ def approach(pantographs, actuators, run, contact, block, begin, count):
     state, free_state = block[ROW.STATE :], block[ROW.FREE_STATE :]
     variant = pantographs.variant[begin]
     move_freely(pantographs, variant, state, free_state, block[ROW.NOMINAL_FORCE], force, count)
-    move_along(run.waves, block, begin, count)
+    read_irregularity(run.waves, block, begin, count)
 
 
 @inlined
@@ -65,8 +63,9 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
     contact_input = pantographs.contact_input[variant, 0]
     strip, damping = pantographs.strip_compliance[variant], pantographs.strip_damping[variant]
     for i in range(count):
-        x0, x1 = block[ROW.POSITION_BEFORE, i], block[ROW.POSITION, i]
-        height, wire_yield, spring = look_at_contact(line, wire, begin + i, contact, x0, x1)
+        lane = (begin + i) & NOT_NEGATIVE
+        x = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
+        height, wire_yield, spring = look_at_contact(line, wire, lane, contact, x)
         height += block[ROW.IRREGULARITY, i]
         stiffness = 1.0 / (strip + spring)
         gap = block[ROW.GAP, i]
@@ -88,7 +87,7 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
         block[ROW.CONTACT_FORCE, i] = force
         block[ROW.HEAD_HEIGHT, i] = mean_head
         block[ROW.WIRE_HEIGHT, i] = mean_head - 0.5 * (gap + new_gap) + spring * force
-        apply_force(line, wire, begin + i, contact, x0, x1, force)
+        apply_force(line, wire, lane, contact, x, force)
 
 
 @inlined
@@ -137,7 +136,7 @@ def record_blocks(line, wire, samples, blocks, begin, count):
     if rows.shape[1] > 1:
         for c in range(blocks.shape[0]):
             for i in range(count):
-                row = rows[begin + i, int(blocks[c, ROW.STEP, i]), c]
+                row = rows[(begin + i) & NOT_NEGATIVE, int(blocks[c, ROW.STEP, i]) & NOT_NEGATIVE, c]
                 for k in range(SAMPLE_ROWS):
                     row[k] = blocks[c, k, i]
     if uplift.shape[2] > 0 or tension.shape[2] > 0:

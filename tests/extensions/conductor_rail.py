@@ -59,7 +59,7 @@ KIND = CatenaryKind(ConductorRailData, ConductorRail)
 
 
 @implements(look_at_contact, RailLine)
-def _look(line, wire, lane, contact, x0, x1):
+def _look(line, wire, lane, contact, x):
     return 0.0, 0.0, line.compliance
 
 
@@ -69,7 +69,7 @@ def _advance(line, wire, lane):
 
 
 @implements(apply_force, RailLine)
-def _apply(line, wire, lane, contact, x0, x1, force):
+def _apply(line, wire, lane, contact, x, force):
     pass
 
 

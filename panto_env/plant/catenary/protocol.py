@@ -82,16 +82,16 @@ def advance_wire(line: Any, wire: Any, lane: int) -> None:
 
 
 @operation
-def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x0: float, x1: float) -> Any:
-    """One contact point, between ``advance_wire`` and ``apply_force``; x0, x1: at the step's ends (m).
+def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
+    """One contact point, between ``advance_wire`` and ``apply_force``; x: at the step's end (m).
 
-    Returns at x1: the wire's height (m), its yield to 1 N of contact force over the step (m/N), and the
+    Returns there: the wire's height (m), its yield to 1 N of contact force over the step (m/N), and the
     compliance of a massless spring in series (m/N, 0 if none).
     """
 
 
 @operation
-def apply_force(line: Any, wire: Any, lane: int, contact: int, x0: float, x1: float, force: float) -> None:
+def apply_force(line: Any, wire: Any, lane: int, contact: int, x: float, force: float) -> None:
     """Apply the contact force (N), the mean over the step, at one contact point."""
 
 

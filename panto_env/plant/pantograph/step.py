@@ -12,12 +12,14 @@ def move_freely(pantographs, variant, state, free_state, nominal_force, actuator
     size = pantographs.transition.shape[1]
     for r in range(size):
         frame_input, head_input = pantographs.frame_input[variant, r], pantographs.head_input[variant, r]
+        a, b = pantographs.transition[variant, r, 0], pantographs.transition[variant, r, 1]
         for i in range(count):
-            free_state[r, i] = (
+            forced = (
                 frame_input * (nominal_force[i] + actuator_force[PLACE.FRAME, i])
                 + head_input * actuator_force[PLACE.HEAD, i]
             )
-        for j in range(0, size, 2):  # in pairs: there are as many velocities as displacements
+            free_state[r, i] = forced + (a * state[0, i] + b * state[1, i])
+        for j in range(2, size, 2):  # in pairs: there are as many velocities as displacements
             a, b = pantographs.transition[variant, r, j], pantographs.transition[variant, r, j + 1]
             for i in range(count):
                 free_state[r, i] += a * state[j, i] + b * state[j + 1, i]

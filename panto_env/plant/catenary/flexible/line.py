@@ -11,8 +11,6 @@ CONTACT, MESSENGER = 0, 1
 """The wires of today's lines; the pantograph touches the first."""
 LOWER, UPPER = 0, 1
 """The two ends of a link."""
-NOT_NEGATIVE = 0xFFFFFFF
-"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
 
 
 class FlexibleLine(NamedTuple):

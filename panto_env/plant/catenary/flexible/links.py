@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from ....backend import inlined
-from .line import LOWER, NOT_NEGATIVE, UPPER
+from ....backend import NOT_NEGATIVE, inlined
+from .line import LOWER, UPPER
 
 
 @inlined

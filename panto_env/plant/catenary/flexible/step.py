@@ -52,15 +52,15 @@ def _advance(line, wire, lane):
 
 
 @implements(look_at_contact, FlexibleLine)
-def _look(line, wire, lane, contact, x0, x1):
+def _look(line, wire, lane, contact, x):
     u, mobility = wire.displacement[lane], line.mobility
     start = wire.first_span[lane] * line.span
-    first_0, weights_0 = locate(x0 - start, line.spacing, u.shape[1])
-    first_1, weights_1 = locate(x1 - start, line.spacing, u.shape[1])
-    height = static_height(line.shape, line.span, x1)
+    first_0, weights_0 = locate(wire.position[lane, contact] - start, line.spacing, u.shape[1])
+    first_1, weights_1 = locate(x - start, line.spacing, u.shape[1])
+    height = static_height(line.shape, line.span, x)
     if line.rise.shape[1] > 0:
         rise = line.rise[defect_row(line.link_static, lane)]
-        height += rise_by_defects(rise, line.rise_breaks, line.rise_decay, x1)
+        height += rise_by_defects(rise, line.rise_breaks, line.rise_decay, x)
     compliance = 0.0
     for k in range(4):
         height += weights_1[k] * u[CONTACT, first_1 + k]
@@ -71,11 +71,12 @@ def _look(line, wire, lane, contact, x0, x1):
 
 
 @implements(apply_force, FlexibleLine)
-def _apply(line, wire, lane, contact, x0, x1, force):
+def _apply(line, wire, lane, contact, x, force):
     u, d = wire.displacement[lane], wire.increment[lane]
-    first, weights = locate(x0 - wire.first_span[lane] * line.span, line.spacing, u.shape[1])
+    start = wire.first_span[lane] * line.span
+    first, weights = locate(wire.position[lane, contact] - start, line.spacing, u.shape[1])
     apply_on_contact_wire(u, d, line.mobility, first, weights, 0.5 * force)
-    wire.position[lane, contact] = x1
+    wire.position[lane, contact] = x
     wire.force[lane, contact] = force
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ....backend import floor, inlined
+from ....backend import NOT_NEGATIVE, floor, inlined
 from ...interpolation import cubic_weights
-from .line import CONTACT, NOT_NEGATIVE, PAD
+from .line import CONTACT, PAD
 
 
 @inlined

@@ -15,8 +15,8 @@ def stiffness(line, x):
 
 
 @implements(look_at_contact, PeriodicLine)
-def _look(line, wire, lane, contact, x0, x1):
-    return 0.0, 0.0, 1.0 / stiffness(line, x1)
+def _look(line, wire, lane, contact, x):
+    return 0.0, 0.0, 1.0 / stiffness(line, x)
 
 
 @implements(advance_wire, PeriodicLine)
@@ -25,7 +25,7 @@ def _advance(line, wire, lane):
 
 
 @implements(apply_force, PeriodicLine)
-def _apply(line, wire, lane, contact, x0, x1, force):
+def _apply(line, wire, lane, contact, x, force):
     pass
 
 

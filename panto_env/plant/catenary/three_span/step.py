@@ -27,11 +27,11 @@ def _advance(line, wire, lane):
 
 
 @implements(look_at_contact, ThreeSpanLine)
-def _look(line, wire, lane, contact, x0, x1):
+def _look(line, wire, lane, contact, x):
     q, middle, end = wire.modal[lane, 0], wire.mid_shape[lane, contact], wire.scratch[lane, 0]
     # The force acts all along the step: it is as good as one at mid-step, to the second order.
-    read_shape(line, wire, lane, 0.5 * (x0 + x1), middle)
-    read_shape(line, wire, lane, x1, end)
+    read_shape(line, wire, lane, 0.5 * (wire.position[lane, contact] + x), middle)
+    read_shape(line, wire, lane, x, end)
     height, compliance = 0.0, 0.0
     for m in range(q.size):
         height += end[m] * q[m]
@@ -40,12 +40,12 @@ def _look(line, wire, lane, contact, x0, x1):
 
 
 @implements(apply_force, ThreeSpanLine)
-def _apply(line, wire, lane, contact, x0, x1, force):
+def _apply(line, wire, lane, contact, x, force):
     modal, shape = wire.modal[lane], wire.mid_shape[lane, contact]
     for m in range(shape.size):
         modal[0, m] += line.impulse[0, m] * shape[m] * force
         modal[1, m] += line.impulse[1, m] * shape[m] * force
-    wire.position[lane, contact] = x1
+    wire.position[lane, contact] = x
 
 
 @implements(end_step, ThreeSpanLine)
