@@ -400,7 +400,7 @@ BAD: list[tuple[str, str, str, str, str]] = [
     ("line", ", tension = 2e4", "", "contact_wire.tension", "missing: tension (N)"),
     ("line", "damping = { alpha", "damping2 = { alpha", "damping", "a table of alpha, beta"),
     ("line", "{ stiffness = 5e5, damping = 1000 }", "5e5", "support", "must be a table"),
-    ("line", "[0, 0.02, 0]", "[0, 0]", "droppers", "sag must hold one value a dropper: 3"),
+    ("line", "[0, 0.02, 0]", "[0, 0]", "droppers", "sag must hold one value per dropper: 3"),
     ("line", "[0, 0.02, 0]", "[0, nan, 0]", "droppers.sag.1", "a finite number"),
     ("line", "[10, 25, 40]", "[10, 40, 25]", "droppers", "positions must increase"),
     ("line", "[10, 25, 40]", "[10, 25, 60]", "dropper", "60.0 m lies outside the span of 50.0 m"),

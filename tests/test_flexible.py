@@ -9,6 +9,7 @@ from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
 from panto_env.plant.catenary.flexible.line import CONTACT, PAD
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
+from panto_env.plant.catenary.flexible.static_shape import solve
 from panto_env.plant.catenary.flexible.wires import leapfrog
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, look_at_contact
 from panto_env.plant.numerics import Numerics
@@ -32,6 +33,10 @@ def travel(line, wire, start, stride, force, heights):
         heights[n] = height + compliance * force
 
 
+def constants_of(line, spans, numerics):
+    return constants(line, solve(line), spans, numerics)
+
+
 def undamped(line):
     return line.model_copy(
         update={"damping": Rayleigh(alpha=0, beta=0), "support": Support(stiffness=5e5, damping=0)}
@@ -46,7 +51,9 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     limp = line.droppers.model_copy(update={"stiffness": 1e-6})
     alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
     step, speed, force = 1e-3, 300 / 3.6, 100.0
-    built = constants(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
+    built = constants(
+        alone, solve(alone), 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
+    )
     bare = built._replace(shape=np.zeros_like(built.shape))
     wire = at_rest(bare, 1)
     steps = 3000  # before the far anchor's reflection
@@ -65,7 +72,9 @@ def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
     data, step = load_catenary("en50318-2002"), 1e-3
     contact = data.contact_wire.model_copy(update={"bending_stiffness": 5e4})
     damped = data.model_copy(update={"damping": Rayleigh(alpha=alpha, beta=beta), "contact_wire": contact})
-    line = constants(damped, 3, Numerics(spacing=1.0, time_step=step, window=0, precision="double"))
+    line = constants(
+        damped, solve(damped), 3, Numerics(spacing=1.0, time_step=step, window=0, precision="double")
+    )
     wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[CONTACT].copy()
     stencil[4] = 0.0  # the quieting load
     shape = np.sin(wavenumber * line.spacing * (np.arange(line.mobility.shape[1]) - PAD))
@@ -123,7 +132,7 @@ def energy(line, wire, step):
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, bar):
     step = 1e-3
     numerics = Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
-    line = constants(undamped(load_catenary("en50318-2002")), 10, numerics)
+    line = constants_of(undamped(load_catenary("en50318-2002")), 10, numerics)
     wire = at_rest(line, 1)
     x = line.spacing * np.arange(line.mobility.shape[1])
     wire.displacement[0] = height * np.exp(-(((x - 300) / 4) ** 2))

@@ -40,4 +40,4 @@ def test_leapfrog_and_links_of_the_flexible_line():
 def test_whole_step(line):
     ready = plant(line)
     blocks = np.zeros((CONTACTS, BLOCK_ROWS, ready.lanes_abreast))
-    assert "fma.rn.f64" in ptx_of(step_blocks, *ready.packed, blocks, 0, 1)
+    assert "fma.rn.f64" in ptx_of(step_blocks, *ready.arrays, blocks, 0, 1)

@@ -147,7 +147,7 @@ def test_bad_resets_are_refused():
     env = make()
     with pytest.raises(InputError, match="call reset before step"):
         env.step(np.zeros((3, 1)))
-    with pytest.raises(InputError, match="seed must be a number or one a lane"):
+    with pytest.raises(InputError, match="seed must be a number or one per lane"):
         env.reset(seed=[1, 2])
     with pytest.raises(InputError, match="Unknown option 'speed'"):
         env.reset(options={"speed": 1})

@@ -1,9 +1,10 @@
 """All that touches Numba's and llvmlite's insides; the rest of the house writes plain functions.
 
 ``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` let a
-function differ by the type of what it works on; ``new_block`` gives a kernel memory on its stack; ``bind``
-packs a kernel's arguments once; ``constants`` gives kernels the names of rows; ``lane_table`` and
-``aligned_zeros`` are memory that vector instructions like; ``lane_threads`` shares lanes among cores.
+function differ by the type of what it works on; ``new_block`` gives a kernel memory on its stack; ``pack``
+and ``bind`` take a kernel's arguments apart only once; ``constants`` gives kernels the names of rows;
+``lane_table`` and ``aligned_zeros`` are memory that vector instructions like; ``lane_threads`` shares lanes
+among cores.
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
@@ -12,7 +13,7 @@ from .compile import JIT, constants, inlined, kernel, python_function, subroutin
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, floor
 from .memory import CACHE_LINE, aligned_zeros, lane_table
-from .packed import bind, open_packed
+from .packed import bind, open_packed, pack
 from .threads import LaneThreads, lane_threads
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "new_blocks",
     "open_packed",
     "operation",
+    "pack",
     "python_function",
     "subroutine",
 ]

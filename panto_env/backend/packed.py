@@ -1,7 +1,7 @@
 """Arguments of kernels, packed once in their compiled form.
 
 To turn Python tuples of fifty arrays into what a kernel works on takes a microsecond in each call, as
-long as a step of the plant. ``bind`` does it once; the kernel is given where each tuple lies and reads the
+long as a step of the plant. ``pack`` does it once; the kernel is given where each tuple lies and reads the
 fields that it uses, as ``line.span``. The arrays must keep their memory, as those of tuples that are never
 rebuilt do.
 """
@@ -45,6 +45,7 @@ class Packed:
         for argument, place in zip(arguments, self._table.tolist(), strict=True):
             _pack(argument, place)
         self.address = self._table.ctypes.data
+        self.type = PackedType(tuple(numba.typeof(argument) for argument in arguments))
 
 
 class PackedType(types.Type):  # type: ignore[misc]
@@ -66,7 +67,7 @@ class PackedTupleType(types.Type):  # type: ignore[misc]
 
 @typeof_impl.register(Packed)  # type: ignore[untyped-decorator]
 def _type_of(packed: Packed, context: Any) -> PackedType:
-    return PackedType(tuple(numba.typeof(argument) for argument in packed.arguments))
+    return packed.type
 
 
 @register_model(PackedType)
@@ -142,15 +143,19 @@ def _pack(argument: Any, address: int) -> Any:
     return _write_packed(argument, address)
 
 
-def bind(compiled: Callable[..., Any], fixed: tuple[Any, ...], *changing: Any) -> Callable[..., Any]:
+def pack(*arguments: Any) -> Any:
+    """Named tuples, packed for ``bind``; several kernels can be bound to them."""
+    return Packed(arguments) if JIT else arguments
+
+
+def bind(compiled: Callable[..., Any], packed: Any, *changing: Any) -> Callable[..., Any]:
     """A kernel's entry, to be called with arguments of the types of ``changing`` alone.
 
-    The kernel takes the named tuples ``fixed``, packed, as one argument before them. Numba's look at the
-    types of arguments is skipped as well.
+    The kernel takes what ``pack`` has packed as one argument before them. Numba's look at the types of
+    arguments is skipped as well.
     """
     if not JIT:
-        return partial(compiled, fixed)
-    packed = Packed(fixed)
+        return partial(compiled, packed)
     signature = tuple(numba.typeof(argument) for argument in (packed, *changing))
     compiled.compile(signature)  # type: ignore[attr-defined]
     return partial(compiled.overloads[signature].entry_point, packed)  # type: ignore[attr-defined]

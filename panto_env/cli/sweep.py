@@ -38,7 +38,7 @@ def sweep(
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    workers: Annotated[int | None, typer.Option(help="Threads; one a core unless told otherwise.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads; one per core unless told otherwise.")] = None,
     output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
     plot: Plot = None,
     json: Json = False,

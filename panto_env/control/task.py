@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import bind, lane_table, lane_threads
+from ..backend import bind, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.figures import Figures
@@ -86,7 +86,7 @@ class Task:
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
         self._threads = lane_threads(lanes, plant.lanes_abreast)
         self._action = self.episode.action
-        packed = (*plant.packed, self.sensors, self.samples, self.episode, self.running)
+        packed = pack(*plant.arrays, self.sensors, self.samples, self.episode, self.running)
         self._control_step = bind(control_step, packed, 0, 1)
         self._observe_start = bind(observe_start, packed, 0, 1)
 

@@ -28,11 +28,11 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
-    speed, line irregularity and noise drawn a lane. Lane i, seeded seed + i, sees bit for bit what a
+    speed, line irregularity and noise drawn for each lane. Lane i, seeded seed + i, sees bit for bit what a
     single environment seeded so sees. `autoreset_mode` is "NextStep" (as Gymnasium's default), "SameStep"
     or "Disabled", where `reset(options={"reset_mask": ...})` begins anew in the lanes marked.
 
-    `infos` holds arrays of a value a lane ("contact_force" (N), "position" (m), the reward's terms) and,
+    `infos` holds arrays with a value per lane ("contact_force" (N), "position" (m), the reward's terms) and,
     for lanes whose episode ends, "figures".
     """
 
@@ -63,7 +63,7 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
 
-        seed: of lane 0, lane i having seed + i; or one a lane.
+        seed: of lane 0, lane i having seed + i; or one per lane.
         """
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
@@ -161,5 +161,5 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         if isinstance(seed, int):
             return [seed + lane for lane in range(self.num_envs)]
         if len(seed) != self.num_envs:
-            raise InputError(f"seed must be a number or one a lane, {self.num_envs}, not {len(seed)}.")
+            raise InputError(f"seed must be a number or one per lane, {self.num_envs}, not {len(seed)}.")
         return [None if each is None else int(each) for each in seed]

@@ -78,7 +78,7 @@ class DrawnLine:
 
     condition: LineCondition
     waves: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """(waves, 3): irregularity as amplitude (m), turns a metre (1/m), phase in turns."""
+    """(waves, 3): irregularity as amplitude (m), turns per metre (1/m), phase in turns."""
     scatter: Array | None = None  # (droppers,): length errors (m); None where there are none
 
 

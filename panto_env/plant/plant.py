@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import LANES_ABREAST, bind, lane_table
+from ..backend import LANES_ABREAST, bind, lane_table, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
@@ -80,7 +80,7 @@ class Plant:
         self.pantographs.set_variant(variant, pantograph, self.model.massless, self.time_step)
 
     @property
-    def packed(self) -> tuple[Any, ...]:
+    def arrays(self) -> tuple[Any, ...]:
         """The named tuples that every kernel takes first: line, wire, pantographs, actuators, run."""
         return self.model.line, self.model.wire, self.pantographs, self.actuators, self.run
 
@@ -161,7 +161,7 @@ class Plant:
         The sample of a lane's step n (counted from 0) is recorded in row n + 1.
         """
         if self._advance is None:
-            self._advance = bind(advance, self.packed, samples, command, steps, 0, 1)
+            self._advance = bind(advance, pack(*self.arrays), samples, command, steps, 0, 1)
         self._advance(samples, command, steps, 0, self.lanes)
 
     def advance_passively(self, steps: int, samples: Samples) -> None:

@@ -15,7 +15,7 @@ from .static import static_shape
 
 @dataclass(frozen=True)
 class LineSystem:
-    """Unknowns a node: messenger height and slope, contact wire height and slope (m, -)."""
+    """Unknowns per node: messenger height and slope, contact wire height and slope (m, -)."""
 
     nodes: Array
     """Node positions (m), shape (n_nodes,)."""

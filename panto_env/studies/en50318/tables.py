@@ -101,7 +101,7 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
         f"Worn line of EN 50318:2002 at {wear.SPEED_KMH:g} km/h, spans {first} to {last}; "
         f"mean ± standard deviation over {wear.SEEDS} seeds",
         (
-            *("wave\n(m)", "depth\n(mm)", "grid\n(m)", "step\n(ms)", "steps\na wave"),
+            *("wave\n(m)", "depth\n(mm)", "grid\n(m)", "step\n(ms)", "steps\nper wave"),
             *(LABELS[name].column for name in ("std", "max", "min")),
             f"raw {LABELS['max'].column}",
             LABELS["contact_loss"].column,

@@ -40,7 +40,7 @@ def _draw_lanes(axis: Axes, rows: Sequence[Row]) -> None:
     for name, of_environment in _by_environment(rows).items():
         rates = [row["steps_per_second"] for row in of_environment]
         axis.loglog([row["lanes"] for row in of_environment], rates, "o-", label=name)
-    axis.set(xlabel="lanes, on all cores", ylabel="environment steps a second")
+    axis.set(xlabel="lanes, on all cores", ylabel="environment steps per second")
     axis.legend(fontsize="small")
 
 
@@ -57,7 +57,7 @@ def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
         label = f"{name}, {first['lanes']} lanes"
         axis.plot([row["cores"] for row in of_environment], gain, "o-", label=label)
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
-    axis.set(xlabel="cores", ylabel="steps a second, times one core's", xticks=counts, ylim=(0, None))
+    axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
     axis.legend(fontsize="small", loc="lower left")
 
 

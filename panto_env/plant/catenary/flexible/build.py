@@ -14,7 +14,7 @@ from ...state import CONTACTS
 from .grid import nodes_per_span, spring_levels, stencil_weights, time_step
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .schema import FlexibleCatenaryData
-from .static_shape import StaticShape, solve
+from .static_shape import StaticShape
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 QUIET = 1e-25
@@ -40,12 +40,11 @@ class Links(NamedTuple):
     mass: Array  # (links, 2): that moves with its lower and upper end (kg)
 
 
-def constants(data: FlexibleCatenaryData, spans: int, numerics: Numerics) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans.
+def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics) -> FlexibleLine:
+    """Constants of an intact line of ``spans`` spans, each of a static shape.
 
     Raises InputError where the time step is too long for the grid to be stable.
     """
-    shape = solve(data)
     window = min(numerics.window or spans, spans)
     step, damping = time_step(data, numerics), data.damping
     per_span = nodes_per_span(data, numerics.spacing, step)

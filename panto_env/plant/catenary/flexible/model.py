@@ -37,13 +37,14 @@ class FlexibleCatenary:
         condition says is defective.
         """
         self.time_step = time_step(data, numerics)
-        self.line = constants(data, spans, numerics)
+        shape = solve(data)
+        self.line = constants(data, shape, spans, numerics)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)
         self.droppers = dropper_positions(data, spans)
-        self._tension = np.tile(solve(data).dropper_tension, (1, spans))
+        self._tension = np.tile(shape.dropper_tension, (1, spans))
         self._defective: dict[LineCondition, DefectiveLine] = {}
         self._lines_differ = False
         if any(condition.defective for condition in conditions):

@@ -29,7 +29,7 @@ class Droppers(Settings):
     def _consistent(self) -> Self:
         if len(self.sag) != len(self.positions):
             raise ValueError(
-                f"sag must hold one value a dropper: {len(self.positions)} positions are given, "
+                f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
                 f"but {len(self.sag)} sags"
             )
         if any(b <= a for a, b in zip(self.positions, self.positions[1:], strict=False)):
