@@ -51,9 +51,7 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     limp = line.droppers.model_copy(update={"stiffness": 1e-6})
     alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
     step, speed, force = 1e-3, 300 / 3.6, 100.0
-    built = constants(
-        alone, solve(alone), 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
-    )
+    built = constants_of(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
     bare = built._replace(shape=np.zeros_like(built.shape))
     wire = at_rest(bare, 1)
     steps = 3000  # before the far anchor's reflection
@@ -72,9 +70,7 @@ def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
     data, step = load_catenary("en50318-2002"), 1e-3
     contact = data.contact_wire.model_copy(update={"bending_stiffness": 5e4})
     damped = data.model_copy(update={"damping": Rayleigh(alpha=alpha, beta=beta), "contact_wire": contact})
-    line = constants(
-        damped, solve(damped), 3, Numerics(spacing=1.0, time_step=step, window=0, precision="double")
-    )
+    line = constants_of(damped, 3, Numerics(spacing=1.0, time_step=step, window=0, precision="double"))
     wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[CONTACT].copy()
     stencil[4] = 0.0  # the quieting load
     shape = np.sin(wavenumber * line.spacing * (np.arange(line.mobility.shape[1]) - PAD))

@@ -27,11 +27,11 @@ CHUNKS = 12  # of each version in a round
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 CLOCK = 0  # column of the seconds by the clock; the other one is of the processor
 Seconds = NDArray[np.float64]
-"""(2, 2): of the older and the newer version, by the clock and of the processor."""
+"""(chunks, 2, 2): of the older and the newer version, by the clock and of the processor."""
 
 
 def one_round(name: str, versions: tuple[Version, Version], later_first: bool) -> Seconds:
-    """Median seconds of a chunk of both versions, in fresh processes."""
+    """Seconds of each chunk of both versions, in fresh processes."""
     with ExitStack() as stack:
         clocks = []
         for version in versions:
@@ -60,7 +60,7 @@ def one_round(name: str, versions: tuple[Version, Version], later_first: bool) -
         for clock in clocks:
             assert clock.stdin is not None
             clock.stdin.close()
-    return np.median(seconds, axis=0)
+    return seconds
 
 
 def _hear(clock: subprocess.Popen[str]) -> str:
@@ -71,10 +71,19 @@ def _hear(clock: subprocess.Popen[str]) -> str:
     return line
 
 
+def _ratios(seconds: Seconds) -> NDArray[np.float64]:
+    """How much faster the newer version is in a round, by the clock and of the processor.
+
+    Two chunks that follow one another meet the machine in the same state, which may change a second later:
+    so the median is of their ratios.
+    """
+    ratios: NDArray[np.float64] = np.median(seconds[:, 0] / seconds[:, 1], axis=0)
+    return ratios
+
+
 def _cells(row: Row, rounds: list[Seconds]) -> list[str]:
-    seconds = np.array(rounds)
-    speeds = row.amount / np.median(seconds[:, :, CLOCK], axis=0)
-    ratio, ratio_of_processor = (seconds[:, 0] / seconds[:, 1]).T
+    speeds = row.amount / np.median(np.concatenate(rounds)[:, :, CLOCK], axis=0)
+    ratio, ratio_of_processor = np.array([_ratios(seconds) for seconds in rounds]).T
     shown = (np.median(ratio), ratio.min(), ratio.max(), np.median(ratio_of_processor))
     told = [f"{speed:,.0f}" if speed >= 100 else f"{speed:.3g}" for speed in speeds]
     return [*told, row.unit, *(f"{each:.3f}" for each in shown)]
@@ -96,8 +105,8 @@ def main() -> None:
         for k in range(given.rounds):
             for name in chosen:
                 rounds[name].append(one_round(name, versions, later_first=k % 2 == 1))
-                before, after = rounds[name][-1][:, CLOCK]
-                print(f"round {k + 1}: {before / after:.3f}  {name}", file=sys.stderr, flush=True)
+                ratio = _ratios(rounds[name][-1])[CLOCK]
+                print(f"round {k + 1}: {ratio:.3f}  {name}", file=sys.stderr, flush=True)
     table = Table(
         title=f"Speed of {versions[1].title} over that of {versions[0].title}, {given.rounds} rounds"
     )
