@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -12,6 +13,7 @@ import pytest
 
 import panto_env
 from panto_env.backend import JIT
+from panto_env.catalog import load_catenary
 
 pytestmark = pytest.mark.plain
 
@@ -47,28 +49,61 @@ def observations(name):
     return rows
 
 
-def in_the_other_way(names):
-    """The same, compiled where this process runs plain Python and the other way round."""
-    code = (
-        f"import json; from {__name__} import observations; "
-        f"print(json.dumps([observations(name) for name in {names}]))"
+def short_line():
+    """The reference line with spans of 12 m: a window of three moves along it within a short run."""
+    line = load_catenary("en50318-2002")
+    near = line.droppers.model_copy(update={"positions": (2.0, 6.0, 10.0), "sag": (0.0, 0.0, 0.0)})
+    return line.model_copy(update={"span_length": 12.0, "droppers": near, "spans": 5})
+
+
+def passive_run():
+    """Forces of contact and droppers and uplift, from the line's first anchor to its last."""
+    run = panto_env.simulate(
+        catenary=short_line(), window=3, precision="double", distance=58.0, spacing=0.5, time_step=2e-3
     )
+    return [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+
+
+def lanes_abreast():
+    """Observations and rewards of four lanes that end apart, each then idle for a step."""
+    envs = gymnasium.make_vec(
+        "PantographStiffness-v0", num_envs=4, speed_kmh=(200, 300), distance=12.0, line_condition="worn"
+    )
+    rows = [envs.reset(seed=3)[0].tolist()]
+    tape = np.random.default_rng(0)
+    for _ in range(30):
+        action = tape.uniform(-1, 1, envs.action_space.shape).astype(np.float32)
+        observation, reward, *_ = envs.step(action)
+        rows.append(np.column_stack([observation, reward]).tolist())
+    return rows
+
+
+RUNS = {
+    **{name: partial(observations, name) for name in CASES},
+    "a window that moves along a line": passive_run,
+    "lanes abreast": lanes_abreast,
+}
+
+
+def in_the_other_way():
+    """All runs, compiled where this process runs plain Python and the other way round."""
+    code = f"import json; from {__name__} import RUNS; print(json.dumps([run() for run in RUNS.values()]))"
     environment = os.environ | {"NUMBA_DISABLE_JIT": str(int(JIT))}
     root = Path(__file__).parents[1]
     result = subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
-    return dict(zip(names, json.loads(result.stdout), strict=True))
+    return dict(zip(RUNS, json.loads(result.stdout), strict=True))
 
 
 @pytest.fixture(scope="module")
 def others():
-    return in_the_other_way(list(CASES))
+    return in_the_other_way()
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", RUNS)
 def test_plain_python_and_compiled_kernels_agree(name, others):
-    for ours, theirs in zip(observations(name), others[name], strict=True):
+    for ours, theirs in zip(RUNS[name](), others[name], strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
 
 
