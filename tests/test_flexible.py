@@ -61,6 +61,7 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     wave = np.sqrt(string.tension / string.mass)
     exact = force * speed * time / (string.mass * wave * (wave + speed))
     assert np.abs(heights - exact).max() < 0.005 * exact.max()
+    assert (wire.displacement[0, :, [PAD, -1 - PAD]] == 0).all()  # the anchors
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (3.0, 0.0), (0.0, 2e-3)])
