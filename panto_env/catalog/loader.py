@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import reprlib
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ..base.errors import InputError
 from ..base.files import read_toml
-from ..base.settings import Settings
+from ..base.settings import Settings, nearest
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.pantograph.schema import PantographData
 
@@ -81,8 +80,8 @@ def _find(family: str, source: str | Path) -> Path:
         if path.is_file():
             return path
         raise InputError(f"The {family} file {text} does not exist; give the path of a TOML file.")
-    near = difflib.get_close_matches(text, available(family), n=1)
-    hint = f", did you mean '{near[0]}'" if near else ""
+    near = nearest(text, available(family))
+    hint = f", did you mean '{near}'" if near else ""
     raise InputError(
         f"Unknown {family} '{text}'{hint}: known are {', '.join(available(family))}; "
         "or give the path of a .toml file."
@@ -153,8 +152,8 @@ def _complaint(problem: ErrorDetails, loc: list[int | str], family: type[Setting
             return f"is missing: {field.description or _table_of(field)}"
         case "extra_forbidden":
             known = [name for name in _fields(family, loc) if name != "sources"]
-            near = difflib.get_close_matches(str(loc[-1]), known, n=1)
-            hint = f"did you mean '{near[0]}'" if near else f"known are {', '.join(known)}"
+            near = nearest(str(loc[-1]), known)
+            hint = f"did you mean '{near}'" if near else f"known are {', '.join(known)}"
             return f"is not known: {hint}"
         case "union_tag_not_found":
             return f"key 'kind' is missing: one of {kinds}"

@@ -18,6 +18,7 @@ from ..base.settings import parse, sentence, suggest
 from ..catalog import load_catenary, load_pantograph
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
+from ..plant.catenary.schema import check_spans
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
@@ -47,9 +48,7 @@ def _observation(value: Any) -> str:
 
 
 def _spans(value: Any) -> int | None:
-    if value is not None and not (isinstance(value, int) and 3 <= value <= 1000):
-        raise InputError(f"spans must be a whole number from 3 to 1000, not {value!r}.")
-    return value
+    return None if value is None else check_spans(value)
 
 
 def _distance(value: Any) -> float | None:

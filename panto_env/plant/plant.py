@@ -12,6 +12,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
+from .catenary.schema import check_spans
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
 from .pantograph.build import pantographs, rest_state
@@ -43,10 +44,8 @@ class Plant:
         its values. Raises InputError where grid and step are not usable, or the line has not what is said
         to be defective.
         """
-        if spans is not None and not (isinstance(spans, int) and 3 <= spans <= 1000):
-            raise InputError(f"spans must be a whole number from 3 to 1000, not {spans!r}.")
         self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
-        self.spans = spans or catenary.spans
+        self.spans = check_spans(catenary.spans if spans is None else spans)
         self._conditions = tuple(conditions)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import Field
 
+from ...base.errors import InputError
 from ...base.settings import NonNegative, Positive, Settings
+
+FEWEST_SPANS, MOST_SPANS = 3, 1000
+
+
+def check_spans(spans: Any) -> int:
+    """Number of spans of a line. Raises InputError where it is none."""
+    if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
+        raise InputError(f"spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}.")
+    return spans
 
 
 class CatenaryData(Settings):
@@ -14,7 +26,7 @@ class CatenaryData(Settings):
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
     span_length: Positive = Field(description="distance between supports (m)")
-    spans: int = Field(ge=3, le=1000, description="number of spans unless told otherwise")
+    spans: int = Field(ge=FEWEST_SPANS, le=MOST_SPANS, description="number of spans unless told otherwise")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
 
