@@ -26,6 +26,7 @@ def response(actuator, command, steps=200):
 def test_ideal_actuator_follows_at_once_within_its_limit():
     assert response(LaggedActuator(), 60.0, 3).tolist() == [60.0] * 3
     assert response(LaggedActuator(), 500.0, 1).tolist() == [100.0]
+    assert response(LaggedActuator(), -500.0, 1).tolist() == [-100.0]
 
 
 def test_delay_and_lag_are_those_of_the_closed_form():
@@ -39,6 +40,7 @@ def test_rate_limit():
     forces = response(LaggedActuator(rate_limit=2500.0), 100.0)
     assert np.diff(forces, prepend=0.0).max() == pytest.approx(2.5)
     assert forces[-1] == 100.0
+    assert (response(LaggedActuator(rate_limit=2500.0), -100.0) == -forces).all()
 
 
 def test_presets_and_errors():

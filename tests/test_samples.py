@@ -1,4 +1,4 @@
-"""A sample is the mean over its time step, judged by the pantograph's motion alone and by the contact."""
+"""A sample is the mean over its time step: compared with the pantograph's motion alone and the contact."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.plant.plant import Plant
 
 from .pantograph_alone import means, replay, rest
 
@@ -134,3 +135,20 @@ def test_head_stands_a_compressed_strip_above_a_wire_with_mass(catenary, pantogr
     stiffness = 50e3 if data.contact_stiffness == "rigid" else data.contact_stiffness
     strip = run.contact_force / stiffness
     assert (run.head - run.wire)[pressed] == pytest.approx(strip[pressed], rel=1e-6, abs=1e-9)
+
+
+def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
+    """At the same time step the slower train is a span behind: the support ahead has not moved yet."""
+
+    def uplift(plant, samples, speed, steps):
+        plant.start(0, speed)
+        plant.clear(samples, 0)
+        plant.advance_passively(steps, samples)
+        return samples.uplift[0, 1 : steps + 1].copy()
+
+    steps = 400
+    used, fresh = (Plant(load_catenary("ohl-three-span"), load_pantograph("dsa350")) for _ in range(2))
+    samples = used.samples(steps + 1)
+    assert uplift(used, samples, 330.0 / 3.6, steps)[:, 1].max() > 0
+    slower = uplift(fresh, fresh.samples(steps + 1), 100.0 / 3.6, steps)
+    assert (uplift(used, samples, 100.0 / 3.6, steps) == slower).all()
