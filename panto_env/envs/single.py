@@ -16,7 +16,7 @@ from ..control import Context, Task
 from ..control.arguments import table, takes
 from ..control.observation import BOUND, layout
 from ..control.settings import check_names, default, read_settings
-from ..control.state import TERMS, TaskRow
+from ..control.state import EPISODE_ROWS, TaskRow
 from ..metrics.trajectory import Trajectory
 from ..plant.actuators import actuator_settings
 from ..plant.state import Row
@@ -26,8 +26,6 @@ from .settings import EnvironmentSettings
 CONTACT_FORCE, HEAD, WIRE = int(Row.CONTACT_FORCE), int(Row.HEAD_HEIGHT), int(Row.WIRE_HEIGHT)
 FRAME_FORCE, HEAD_FORCE = int(Row.FRAME_FORCE), int(Row.HEAD_FORCE)
 STEP, STRIDE = int(Row.STEP), int(Row.STRIDE)
-REWARD = int(TaskRow.REWARD)
-TERM_ROWS = tuple(enumerate(TERMS, int(TaskRow.TERM)))
 
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -120,7 +118,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
         self._plant_column = task.plant.run.table[0, : STRIDE + 1, 0]
-        self._task_column = episode.table[:, 0]
+        self._reward_and_terms = episode.table[TaskRow.REWARD : EPISODE_ROWS, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
     def _episode_task(self, options: dict[str, Any]) -> Task:
@@ -143,7 +141,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise InputError("The episode has not begun or has ended; call reset before step.")
         self.task.step(checked(action, self._shape))
         terminated, truncated = self._terminated.item(), self._truncated.item()
-        plant, task = self._plant_column.tolist(), self._task_column.tolist()
+        plant = self._plant_column.tolist()
+        reward, cost_function, contact_loss, effort, rate = self._reward_and_terms.tolist()
         info: dict[str, Any] = {
             "contact_force": plant[CONTACT_FORCE],
             "head": plant[HEAD],
@@ -151,12 +150,17 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "frame_force": plant[FRAME_FORCE],
             "head_force": plant[HEAD_FORCE],
             "position": plant[STEP] * plant[STRIDE],
-            "reward_terms": {name: task[row] for row, name in TERM_ROWS},
+            "reward_terms": {
+                "cost_function": cost_function,
+                "contact_loss": contact_loss,
+                "effort": effort,
+                "rate": rate,
+            },
         }
         if terminated or truncated:
             self._running = False
             info["figures"] = self.task.figures(0).as_dict()
-        return self._observation.copy(), task[REWARD], terminated, truncated and not terminated, info
+        return self._observation.copy(), reward, terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
