@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import runpy
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,7 +27,9 @@ class Policy(Protocol):
 
 
 def find_policy(source: Any) -> Policy:
-    """Policy from an object, a name ("pd"), a name with parameters ("pd:gain=0.5") or a model file.
+    """Policy from an object, a name, a model file, or a class in a file of yours.
+
+    A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5".
 
     Raises InputError where there is none such.
     """
@@ -39,14 +42,11 @@ def find_policy(source: Any) -> Policy:
     name, _, parameters = str(source).partition(":")
     known = plugins.installed(plugins.POLICIES)
     if name in known:
-        maker = plugins.load(known[name])
-        try:
-            policy: Policy = maker(**_parameters(str(source), parameters))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"Policy '{source}' cannot be made: {error}.") from error
-        return policy
+        return _make(plugins.load(known[name]), str(source), parameters)
     path = Path(source)
     loaders = plugins.installed(plugins.LOADERS)
+    if name.endswith(".py"):
+        return _policy_from_file(str(source), Path(name), parameters)
     if path.suffix[1:] in loaders:
         if not path.is_file():
             raise InputError(f"The model file {path} does not exist; check the path.")
@@ -54,8 +54,33 @@ def find_policy(source: Any) -> Policy:
         return loaded
     raise InputError(
         f"Unknown policy '{source}': {suggest(name, list(known))}; or give the path of a model file "
-        f"(.{', .'.join(loaders)})."
+        f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
     )
+
+
+def _make(maker: Any, source: str, parameters: str) -> Policy:
+    try:
+        policy: Policy = maker(**_parameters(source, parameters))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"Policy '{source}' cannot be made: {error}.") from error
+    return policy
+
+
+def _policy_from_file(source: str, path: Path, text: str) -> Policy:
+    """Policy of the class that ``text``, "Name" or "Name:key=value,...", names in a Python file."""
+    name, _, parameters = text.partition(":")
+    if not name:
+        raise InputError(f"Policy '{source}' must name a class in the file, as {source}:Name.")
+    if not path.is_file():
+        raise InputError(f"The Python file {path} does not exist; check the path.")
+    try:
+        content = runpy.run_path(str(path))
+    except Exception as error:
+        raise InputError(f"{path} cannot be run: {type(error).__name__}: {error}.") from error
+    if not callable(content.get(name)):
+        classes = [key for key, value in content.items() if isinstance(value, type)]
+        raise InputError(f"{path} has no class '{name}': it has {', '.join(classes) or 'none'}.")
+    return find_policy(_make(content[name], source, parameters))
 
 
 def policy_names() -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -53,13 +54,22 @@ def simulate(
 def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | None = None) -> None:
     """Drive lane 0, already reset, to the end of its run.
 
-    Raises InputError where the policy's action is not finite or not of the right shape.
+    Raises InputError where the policy fails, or its action is not finite or not of the right shape.
     """
     policy.reset(task.context(0))
     episode = task.episode
     while not (episode.truncated[0] or episode.terminated[0]):
         # A copy: a policy may keep what it was shown.
-        action = np.asarray(policy.act(episode.observation[0].copy()), dtype=float)
+        try:
+            action = np.asarray(policy.act(episode.observation[0].copy()), dtype=float)
+        except InputError:
+            raise
+        except Exception as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            raise InputError(
+                f"The policy {type(policy).__name__} failed in act, at {place.filename}:{place.lineno}: "
+                f"{type(error).__name__}: {error}."
+            ) from error
         if action.shape != episode.action[0].shape or not np.isfinite(action).all():
             raise InputError(
                 f"The policy must return {episode.action.shape[1]} finite numbers as its action, "

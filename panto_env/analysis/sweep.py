@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -24,6 +25,7 @@ SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
 MOST_PARAMETERS = 2
+MOST_PASSES = 100_000
 
 Row = dict[str, Any]
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
@@ -100,6 +102,9 @@ def _check(
         _check_name(name, entries)
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
+    passes = len(policies) * math.prod(len(values) for values in parameters.values())
+    if passes > MOST_PASSES:
+        raise InputError(f"This sweep has {passes:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
 
 
 def _check_name(name: str, entries: Mapping[str, Settings]) -> None:

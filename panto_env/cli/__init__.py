@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
+import typer
+
+from .. import __version__
 from ..base import plugins
 from ..base.errors import InputError
 
 
 def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
-    import typer
-
     from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
@@ -22,7 +24,7 @@ def main() -> None:
         help="Pantograph-catenary simulation, control and learning.",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    app.callback()(_version)
+    app.callback()(_about)
     app.command("list")(catalogue.list_entries)
     app.command()(simulate.simulate)
     app.command()(sweep.sweep)
@@ -39,5 +41,16 @@ def main() -> None:
         sys.exit(2)
 
 
-def _version() -> None:
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"panto-env {__version__}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Say which version this is.")
+]
+
+
+def _about(version: Version = False) -> None:
     """Pantograph-catenary simulation, control and learning."""

@@ -11,7 +11,7 @@ from rich.table import Table
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..metrics import en50367
 from ..metrics.labels import LABELS
-from ..metrics.trajectory import Trajectory
+from ..metrics.trajectory import Trajectory, check_run_file
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 
 
@@ -19,7 +19,8 @@ from ..terminal import Json, Plot, console, number, print_json, progress_console
 def simulate(
     settings: dict[str, Any],
     policy: Annotated[
-        str | None, typer.Option(help="Policy: a name, name:key=value,... or a model file.")
+        str | None,
+        typer.Option(help="Policy: a name, name:key=value,..., a model file or file.py:Class."),
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
@@ -31,6 +32,8 @@ def simulate(
     from ..analysis.simulation import simulate as run
 
     chosen = parse_spans(spans)
+    if output is not None:
+        check_run_file(output)
     if plot is not None:
         from ..analysis.plots import check_plot, plot_run, save
 

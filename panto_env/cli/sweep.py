@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
+from ..analysis.sweep import MOST_PASSES
 from ..base.errors import InputError
 from ..metrics.labels import LABELS
 from ..terminal import Json, Plot, console, counting, number, print_json
@@ -99,8 +100,14 @@ def parse_values(name: str, text: str) -> list[float]:
             first, last, steps = float(start), float(stop), int(count) - 1
             if steps < 1:
                 raise ValueError
+            if steps >= MOST_PASSES:  # before as many are made
+                raise InputError(
+                    f"{name} has {steps + 1:,} values; {MOST_PASSES:,} passes at most can be run."
+                )
             return [first + (last - first) * k / steps for k in range(steps + 1)]
         return [float(value) for value in text.split(",")]
+    except InputError:
+        raise
     except ValueError as error:
         raise InputError(
             f"The values of {name} must be start:stop:count with a count from 2 up, or numbers with "

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ..backend import NOT_NEGATIVE, inlined, subroutine
 from ..base.arrays import Array, Index
+from ..base.errors import InputError
+from ..base.settings import suggest
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
 from ..plant.state import ROW
@@ -39,11 +41,14 @@ class Layout:
         return np.array([(entry.writer, entry.number) for entry in self.entries])
 
     def index(self, name: str) -> int:
-        """Place of an entry."""
-        return [entry.name for entry in self.entries].index(name)
+        """Place of an entry. Raises InputError where there is none of this name."""
+        names = [entry.name for entry in self.entries]
+        if name not in names:
+            raise InputError(f"The observation has no entry '{name}': {suggest(name, names)}.")
+        return names.index(name)
 
     def read(self, observation: NDArray[np.float32], name: str) -> float:
-        """Physical value of an entry."""
+        """Physical value of an entry. Raises InputError where there is none of this name."""
         place = self.index(name)
         return float(observation[place]) * self.entries[place].scale
 

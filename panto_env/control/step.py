@@ -33,7 +33,7 @@ def end_episodes(episode, block, task, begin, count):
     terminated = episode.terminated[begin : begin + count]
     truncated = episode.truncated[begin : begin + count]
     for i in range(count):
-        too_high = abs(block[ROW.STATE, i]) > episode.head_range
+        too_high = not abs(block[ROW.STATE, i]) <= episode.head_range  # nor is NaN
         terminated[i] = too_high or task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] >= episode.loss_limit
         truncated[i] = block[ROW.STEP, i] >= task[TASK_ROW.END, i]
         if terminated[i]:

@@ -29,6 +29,10 @@ HEAD_RANGE = 0.3
 """Height of the head (m), either way, beyond which an episode ends: outside the wire's clearance."""
 LOSS_TIME = 0.5
 """Time without contact (s) after which an episode ends."""
+LARGEST_FORCE = 1e5
+"""Contact force (N) beyond which, a thousand times any real one, a computation has diverged."""
+LARGEST_HEIGHT = 3.0
+"""Height of the wire (m), either way, beyond which it has, too."""
 
 
 class Task:
@@ -195,15 +199,34 @@ class Task:
         self.plant.advance_passively(self.end(0), self.samples)
 
     def figures(self, lane: int) -> Figures:
-        """Figures of a lane's control steps so far, the same as its trajectory's summary."""
+        """Figures of a lane's control steps so far, the same as its trajectory's summary.
+
+        Raises InputError where the computation diverged.
+        """
         plant = self.plant
         nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
-        return self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
+        figures = self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
+        self._refuse_divergence(
+            lane, np.array([figures.mean, figures.max, figures.min]), plant.sample[Row.WIRE_HEIGHT, lane]
+        )
+        return figures
+
+    def _refuse_divergence(self, lane: int, force: Array, height: Array) -> None:
+        """Raise InputError where a lane's contact force (N) or wire height (m) is that of no line."""
+        possible = (np.abs(force) < LARGEST_FORCE).all() and (np.abs(height) < LARGEST_HEIGHT).all()
+        if not possible:
+            plant = self.plant
+            raise InputError(
+                f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
+                f"{3.6 * self.speed[lane]:g} km/h diverged, so it has no result; take a time_step below "
+                f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
+            )
 
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
-        """Record of a lane's run so far."""
+        """Record of a lane's run so far. Raises InputError where its computation diverged."""
         plant, steps = self.plant, int(self.plant.steps_done[lane])
         rows = self.samples.rows[lane, 1 : steps + 1, 0]
+        self._refuse_divergence(lane, rows[:, Row.CONTACT_FORCE], rows[:, Row.WIRE_HEIGHT])
         middle = (np.arange(steps) + 0.5) * plant.time_step
         return Trajectory(
             time=middle,

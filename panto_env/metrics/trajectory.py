@@ -34,6 +34,12 @@ SERIES = (
 )
 
 
+def check_run_file(path: str | Path) -> None:
+    """Raise InputError unless the name of a file is that of a run, a Parquet file."""
+    if Path(path).suffix != ".parquet":
+        raise InputError(f"A run is saved as Parquet: {path} must end in .parquet.")
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """One pass along a line. n samples; each is the mean over one time step, at its middle."""
@@ -116,10 +122,11 @@ class Trajectory:
         return within(self.position, spans, self.span_length)
 
     def save(self, path: str | Path) -> None:
-        """Write a Parquet file, whole or not at all.
+        """Write a Parquet file, whole or not at all. Raises InputError for a name that is not such a file's.
 
         One column per series, and one per support and per dropper, by number.
         """
+        check_run_file(path)
         import pyarrow as pa
         import pyarrow.parquet as pq
 
