@@ -12,7 +12,8 @@ import typer
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..analysis.sweep import MOST_PASSES
+from ..analysis.sweep import MOST_PASSES, SPEED
+from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
 from ..metrics.labels import LABELS
 from ..terminal import Json, Plot, console, counting, number, print_json
@@ -45,8 +46,6 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Run every value of one parameter, or every pair of two, and print the figures."""
-    from ..analysis.sweep import SPEED
-    from ..analysis.sweep import sweep as run
     from ..base import files
 
     values = _parse(parameters)
@@ -95,24 +94,20 @@ def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
 def parse_values(name: str, text: str) -> list[float]:
     """Values from "start:stop:count", both ends included, or from "1,2,3". InputError if not so."""
     try:
-        if ":" in text:
-            start, stop, count = text.split(":")
-            first, last, steps = float(start), float(stop), int(count) - 1
-            if steps < 1:
-                raise ValueError
-            if steps >= MOST_PASSES:  # before as many are made
-                raise InputError(
-                    f"{name} has {steps + 1:,} values; {MOST_PASSES:,} passes at most can be run."
-                )
-            return [first + (last - first) * k / steps for k in range(steps + 1)]
-        return [float(value) for value in text.split(",")]
-    except InputError:
-        raise
+        if ":" not in text:
+            return [float(value) for value in text.split(",")]
+        start, stop, count = text.split(":")
+        first, last, steps = float(start), float(stop), int(count) - 1
+        if steps < 1:
+            raise ValueError
     except ValueError as error:
         raise InputError(
             f"The values of {name} must be start:stop:count with a count from 2 up, or numbers with "
             f"commas between, not '{text}'."
         ) from error
+    if steps >= MOST_PASSES:  # before as many are made
+        raise InputError(f"{name} has {steps + 1:,} values; {MOST_PASSES:,} passes at most can be run.")
+    return [first + (last - first) * k / steps for k in range(steps + 1)]
 
 
 def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None) -> None:

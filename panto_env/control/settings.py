@@ -18,7 +18,7 @@ from ..base.settings import parse, sentence, suggest
 from ..catalog import load_catenary, load_pantograph
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
-from ..plant.catenary.schema import check_spans
+from ..plant.catenary.schema import check_span_count
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
@@ -48,7 +48,7 @@ def _observation(value: Any) -> str:
 
 
 def _spans(value: Any) -> int | None:
-    return None if value is None else check_spans(value)
+    return None if value is None else check_span_count(value)
 
 
 def _distance(value: Any) -> float | None:

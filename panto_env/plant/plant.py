@@ -12,7 +12,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
-from .catenary.schema import check_spans
+from .catenary.schema import check_span_count
 from .line_condition import DrawnLine, LineCondition
 from .numerics import Numerics
 from .pantograph.build import pantographs, rest_state
@@ -45,7 +45,7 @@ class Plant:
         to be defective.
         """
         self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
-        self.spans = check_spans(catenary.spans if spans is None else spans)
+        self.spans = check_span_count(catenary.spans if spans is None else spans)
         self._conditions = tuple(conditions)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,

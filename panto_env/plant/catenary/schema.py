@@ -12,7 +12,7 @@ from ...base.settings import NonNegative, Positive, Settings
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 
 
-def check_spans(spans: Any) -> int:
+def check_span_count(spans: Any) -> int:
     """Number of spans of a line. Raises InputError where it is none."""
     if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
         raise InputError(f"spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}.")
