@@ -76,7 +76,7 @@ class Plant:
         self._advance: Callable[..., Any] | None = None
 
     def _set_variant(self, variant: int, pantograph: PantographData) -> None:
-        self.pantographs.set_variant(variant, pantograph, self.model.massless, self.time_step)
+        self.pantographs.set_variant(variant, pantograph, self.model)
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -132,8 +132,6 @@ class Plant:
         column[:, Row.STRIDE] = speed * self.time_step
         column[:, Row.NOMINAL_FORCE] = nominal_force
         column[:, [Row.FORCE, Row.CONTACT_FORCE]] = force
-        column[:, Row.GAP] = force * (strip + spring)
-        column[:, Row.STIFFNESS] = 1 / (strip + spring)
         column[:, Row.STATE :] = state
         column[:, Row.HEAD_HEIGHT] = state[0]
         column[:, Row.FRAME_HEIGHT] = state[len(state) // 2 - 1]

@@ -1,7 +1,12 @@
-"""What a kind of catenary provides: a class for Python, and four operations for kernels.
+"""What a kind of catenary provides: a class for Python, and its operations for kernels.
 
-A step of a lane goes: ``advance_wire`` once; then, for each contact point, ``look_at_contact`` and
-``apply_force``; then ``end_step`` once. Each operation has one source per class of line constants.
+A step of a lane goes: ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
+point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. Each operation has one source per
+class of line constants.
+
+A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
+the step is read there by the same weights by which the force acts there, so that the work that the force
+does on the wire is force times the change of that height, exactly, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations
@@ -32,6 +37,7 @@ class CatenaryModel(Protocol):
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: what moves, in all lanes
     massless: bool  # whether the contact wire has no mass of its own
+    contact_gain: float  # stiffness at which an explicit contact law gets unstable, inverted (m/N)
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # how far a run can go (m)
     usual_end: float  # how far a run goes unless told otherwise (m)
@@ -82,17 +88,32 @@ def advance_wire(line: Any, wire: Any, lane: int) -> None:
 
 
 @operation
-def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
-    """One contact point, between ``advance_wire`` and ``apply_force``; x: at the step's end (m).
+def place_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
+    """Place a contact point at x (m), where it is at mid-step; returns the wire's height there (m) now, and
+    at mid-step as far as the forces of this step don't count.
+    """
 
-    Returns there: the wire's height (m), its yield to 1 N of contact force over the step (m/N), and the
-    compliance of a massless spring in series (m/N, 0 if none).
+
+@operation
+def rise_at_contact(line: Any, wire: Any, lane: int, contact: int, x0: float, x1: float) -> Any:
+    """How much higher the wire is at x1 than at x0 (m) at mid-step, between ``advance_wire`` and
+    ``apply_force``; x0, x1: where the contact point is at the step's ends.
+    """
+
+
+@operation
+def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
+    """One contact point, between ``advance_wire`` and ``apply_force``, where it was placed.
+
+    Returns the wire's height at the step's end, were there no contact force in this step (m), its yield to
+    1 N of contact force over the step (m/N), and the compliance of a massless spring in series (m/N, 0 if
+    none).
     """
 
 
 @operation
 def apply_force(line: Any, wire: Any, lane: int, contact: int, x: float, force: float) -> None:
-    """Apply the contact force (N), the mean over the step, at one contact point."""
+    """Apply the contact force (N), the mean over the step, where the contact point was placed."""
 
 
 @operation

@@ -56,10 +56,14 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
+    # Masses hang on the two nearest nodes: the cubic weights would make some nodes lighter than the bare wire,
+    # or of negative mass, and waves grow there.
+    right = (links.position / dx - (first + 1))[:, None]
+    shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)
     own = np.array([[wire.mass * dx] for wire in wires])
     added = np.zeros((len(wires), nodes))
     for end in (LOWER, UPPER):
-        np.add.at(added, (links.wires[:, end, None], four), weights * links.mass[:, end, None])
+        np.add.at(added, (links.wires[:, end, None], four), shares * links.mass[:, end, None])
     np.add.at(added, (springs.wire, springs.node), springs.mass)
     mass = own + added
     settle = 1.0 + damping.alpha * step / 2
@@ -152,7 +156,9 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
         blend=aligned_zeros((lanes, nodes), real, place=42 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
         position=np.zeros((lanes, CONTACTS)),
-        force=np.zeros((lanes, CONTACTS)),
+        contact_node=np.zeros((lanes, CONTACTS), dtype=np.int64),
+        contact_weight=np.zeros((lanes, CONTACTS, 4)),
+        unmoved_height=np.zeros((lanes, CONTACTS)),
         spring_past=np.zeros((lanes, len(line.spring_node))),
         extension=np.zeros((lanes, 2, links), dtype=real),
         change=np.zeros((lanes, links), dtype=real),

@@ -6,6 +6,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.errors import InputError
+from ...interpolation import stencil
 from ...numerics import Numerics
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
@@ -57,6 +58,25 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
         if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
             return False
     return True
+
+
+def contact_gain(data: FlexibleCatenaryData, dx: float, step: float) -> float:
+    """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
+
+    With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W': the
+    larger of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1 there, an integral over
+    the waves of the grid. Waves at the grid's own limit make it infinite.
+    """
+    angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
+    near, far = stencil_weights(data.contact_wire, dx, step)
+    squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+    room = 4 - squared * (1 + 2 * data.damping.beta / step)
+    if room.min() <= 0:
+        return float(np.inf)
+    _, weights = stencil(dx * np.linspace(0.0, 0.95, 20), dx)
+    seen = np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2  # (places, waves)
+    largest = float(np.trapezoid(seen / room, angle, axis=1).max()) / np.pi
+    return step**2 / (data.contact_wire.mass * dx) * largest
 
 
 def spring_levels(stiffness: float, damping: float, step: float) -> Array:

@@ -12,7 +12,7 @@ from ...numerics import Numerics
 from ..protocol import StartPoint
 from .build import at_rest, constants, dropper_positions
 from .defects import DefectiveLine
-from .grid import time_step
+from .grid import contact_gain, time_step
 from .schema import FlexibleCatenaryData
 from .static_shape import solve
 
@@ -39,6 +39,7 @@ class FlexibleCatenary:
         self.time_step = time_step(data, numerics)
         shape = solve(data)
         self.line = constants(data, shape, spans, numerics)
+        self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
@@ -79,7 +80,6 @@ class FlexibleCatenary:
         gap = line.link_gap[min(lane, len(line.link_gap) - 1)]
         wire.extension[lane] = 0.0 - gap[: len(line.link_node)]
         wire.first_span[lane] = 0
-        wire.force[lane] = force
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""

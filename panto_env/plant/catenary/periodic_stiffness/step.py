@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from ....backend import implements, inlined
 from ...trigonometry import cosine_of_turns
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .build import PeriodicLine
 
 
@@ -12,6 +20,16 @@ from .build import PeriodicLine
 def stiffness(line, x):
     """Stiffness k (N/m) at x (m), Eq. 5 of paper 3."""
     return line.mean * (1.0 + line.variation * cosine_of_turns(line.spans_per_metre * x))
+
+
+@implements(place_contact, PeriodicLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(rise_at_contact, PeriodicLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    return 0.0
 
 
 @implements(look_at_contact, PeriodicLine)

@@ -24,6 +24,7 @@ class ThreeSpanLine(NamedTuple):
     """Constants of the line; modes are scaled to unit modal mass."""
 
     span: float  # m
+    time_step: float  # s
     shape: Array  # (points, modes): mode shapes about the central span (1/sqrt(kg))
     spacing: float  # of the points (m)
     propagate: Array  # (4, modes): exact free motion over a step: q <- q, v; v <- q, v
@@ -37,8 +38,8 @@ class ThreeSpanWire(NamedTuple):
     """What moves, in all lanes."""
 
     modal: Array  # (lanes, 2, modes): coordinates and their rates
-    mid_shape: Array  # (lanes, contacts, modes): mode shapes at mid-step, scratch
-    scratch: Array  # (lanes, 2, modes): mode shapes at the step's end, and of the projection
+    contact_shape: Array  # (lanes, contacts, modes): mode shapes where the contact points are
+    scratch: Array  # (lanes, 2, modes)
     position: Array  # (lanes, contacts): of the contact points (m)
     central_span: Index  # (lanes,): number of the central span along the line
 
@@ -47,6 +48,7 @@ class ThreeSpan:
     """Paper 2's line; the wire has mass, but neither droppers nor an end."""
 
     massless: bool = False
+    contact_gain: float = np.inf  # modes move exactly under a constant force: implicit costs nothing
     length: float = np.inf  # the line has no end
 
     def __init__(
@@ -125,6 +127,7 @@ def _constants(data: ThreeSpanData, time_step: float) -> ThreeSpanLine:
     free, forced = _propagation(frequency, data.damping_ratio, time_step)
     return ThreeSpanLine(
         span=span,
+        time_step=time_step,
         shape=mode_shapes(data, vectors, positions),
         spacing=SHAPE_SPACING,
         propagate=free,
@@ -150,7 +153,7 @@ def _propagation(frequency: Array, ratio: float, time_step: float) -> tuple[Arra
 def _at_rest(lanes: int, size: int) -> ThreeSpanWire:
     return ThreeSpanWire(
         modal=np.zeros((lanes, 2, size)),
-        mid_shape=np.zeros((lanes, CONTACTS, size)),
+        contact_shape=np.zeros((lanes, CONTACTS, size)),
         scratch=np.zeros((lanes, 2, size)),
         position=np.zeros((lanes, CONTACTS)),
         central_span=np.zeros(lanes, dtype=np.int64),

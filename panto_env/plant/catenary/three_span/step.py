@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from ....backend import implements, inlined
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .build import MARGIN, ThreeSpanLine
 
 
@@ -26,26 +34,46 @@ def _advance(line, wire, lane):
         v[m] = line.propagate[2, m] * coordinate + line.propagate[3, m] * rate
 
 
+@inlined
+def deflection(shape, q):
+    """Height (m) of the wire at a place, from its mode shapes there and the modal coordinates."""
+    height = 0.0
+    for m in range(q.size):
+        height += shape[m] * q[m]
+    return height
+
+
+@implements(place_contact, ThreeSpanLine)
+def _place(line, wire, lane, contact, x):
+    wire.position[lane, contact] = x
+    read_shape(line, wire, lane, x, wire.contact_shape[lane, contact])
+    height = deflection(wire.contact_shape[lane, contact], wire.modal[lane, 0])
+    return height, height  # of which the latter counts for nothing in a law that is all implicit
+
+
+@implements(rise_at_contact, ThreeSpanLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    q, v, shape = wire.modal[lane, 0], wire.modal[lane, 1], wire.scratch[lane, 0]
+    read_shape(line, wire, lane, x1, shape)
+    rise = deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v)
+    read_shape(line, wire, lane, x0, shape)
+    return rise - (deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v))
+
+
 @implements(look_at_contact, ThreeSpanLine)
 def _look(line, wire, lane, contact, x):
-    q, middle, end = wire.modal[lane, 0], wire.mid_shape[lane, contact], wire.scratch[lane, 0]
-    # The force acts all along the step: it is as good as one at mid-step, to the second order.
-    read_shape(line, wire, lane, 0.5 * (wire.position[lane, contact] + x), middle)
-    read_shape(line, wire, lane, x, end)
-    height, compliance = 0.0, 0.0
-    for m in range(q.size):
-        height += end[m] * q[m]
-        compliance += end[m] * line.impulse[0, m] * middle[m]
-    return height, compliance, 0.0
+    shape, compliance = wire.contact_shape[lane, contact], 0.0
+    for m in range(shape.size):
+        compliance += shape[m] * line.impulse[0, m] * shape[m]
+    return deflection(shape, wire.modal[lane, 0]), compliance, 0.0
 
 
 @implements(apply_force, ThreeSpanLine)
 def _apply(line, wire, lane, contact, x, force):
-    modal, shape = wire.modal[lane], wire.mid_shape[lane, contact]
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
     for m in range(shape.size):
         modal[0, m] += line.impulse[0, m] * shape[m] * force
         modal[1, m] += line.impulse[1, m] * shape[m] * force
-    wire.position[lane, contact] = x
 
 
 @implements(end_step, ThreeSpanLine)
