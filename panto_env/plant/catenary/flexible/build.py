@@ -56,7 +56,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
-    # Masses hang on the two nearest nodes: the cubic weights would make some nodes lighter than the bare wire,
+    # Masses hang on the two nearest nodes: the cubic weights would make some nodes lighter than bare wire,
     # or of negative mass, and waves grow there.
     right = (links.position / dx - (first + 1))[:, None]
     shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)

@@ -38,7 +38,6 @@ class PeriodicWire(NamedTuple):
 class PeriodicStiffness:
     """A massless spring, which any grid and any time step can carry."""
 
-    contact_gain: float = 0.0
     massless: bool = True
     contact_gain: float = 0.0
     wave_speed: float = np.inf  # no wave runs along a spring
