@@ -94,16 +94,17 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
     for i in range(count):
         lane = (begin + i) & NOT_NEGATIVE
         x = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 0.5)
-        free_wire, wire_yield, spring = look_at_contact(line, wire, lane, contact, x)
+        free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, contact, x)
         before, irregular = block[ROW.WIRE_BEFORE, i], block[ROW.IRREGULARITY, i]
         head, free_head = block[ROW.STATE, i], block[ROW.FREE_STATE, i]
         middle = share * 0.5 * (before + free_wire) + (1.0 - share) * block[ROW.WIRE_MIDDLE, i]
+        middle_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
         force = contact_force(
             1.0 / (strip + spring),
             0.5 * (head + free_head) - (middle + irregular),
             free_head - head - (free_wire - before) - block[ROW.RISE, i],
             damping,
-            0.5 * (share * wire_yield - contact_input),
+            middle_yield - 0.5 * contact_input,
             wire_yield - contact_input,
             run.lowest_force,
         )
@@ -111,7 +112,7 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
         block[ROW.FORCE, i] = force
         block[ROW.CONTACT_FORCE, i] = force
         block[ROW.HEAD_HEIGHT, i] = mean_head
-        block[ROW.WIRE_HEIGHT, i] = middle + irregular + (0.5 * share * wire_yield + spring) * force
+        block[ROW.WIRE_HEIGHT, i] = middle + irregular + (middle_yield + spring) * force
         apply_force(line, wire, lane, contact, x, force)
 
 

@@ -106,8 +106,8 @@ def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> 
     """One contact point, between ``advance_wire`` and ``apply_force``, where it was placed.
 
     Returns the wire's height at the step's end, were there no contact force in this step (m), its yield to
-    1 N of contact force over the step (m/N), and the compliance of a massless spring in series (m/N, 0 if
-    none).
+    1 N of contact force at the step's end and at mid-step (m/N), and the compliance of a massless spring in
+    series (m/N, 0 if none).
     """
 
 

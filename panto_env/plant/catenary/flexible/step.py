@@ -107,7 +107,7 @@ def _look(line, wire, lane, contact, x):
     for k in range(4):
         compliance += 0.5 * weights[k] * weights[k] * mobility[CONTACT, first + k]
     height = wire.unmoved_height[lane, contact] + deflection(u, d, first, weights, 0.5)
-    return height, compliance, 0.0
+    return height, compliance, 0.0, 0.0
 
 
 @implements(apply_force, FlexibleLine)

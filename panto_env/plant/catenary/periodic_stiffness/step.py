@@ -34,7 +34,7 @@ def _rise(line, wire, lane, contact, x0, x1):
 
 @implements(look_at_contact, PeriodicLine)
 def _look(line, wire, lane, contact, x):
-    return 0.0, 0.0, 1.0 / stiffness(line, x)
+    return 0.0, 0.0, 0.0, 1.0 / stiffness(line, x)
 
 
 @implements(advance_wire, PeriodicLine)

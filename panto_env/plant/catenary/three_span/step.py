@@ -43,12 +43,32 @@ def deflection(shape, q):
     return height
 
 
+@inlined
+def project(line, wire, lane):
+    """Take over the wire's shape and rates into the three spans about the next one."""
+    modal, before = wire.modal[lane], wire.scratch[lane]
+    size = modal.shape[1]
+    for k in range(2):
+        for m in range(size):
+            before[k, m] = modal[k, m]
+        for m in range(size):
+            total = 0.0
+            for j in range(size):
+                total += line.project[m, j] * before[k, j]
+            modal[k, m] = total
+    wire.central_span[lane] += 1
+
+
 @implements(place_contact, ThreeSpanLine)
 def _place(line, wire, lane, contact, x):
-    wire.position[lane, contact] = x
-    read_shape(line, wire, lane, x, wire.contact_shape[lane, contact])
-    height = deflection(wire.contact_shape[lane, contact], wire.modal[lane, 0])
-    return height, height  # of which the latter counts for nothing in a law that is all implicit
+    if contact == 0 and x >= (wire.central_span[lane] + 1) * line.span:
+        project(line, wire, lane)
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
+    read_shape(line, wire, lane, x, shape)
+    middle = 0.0
+    for m in range(shape.size):
+        middle += shape[m] * (line.half_step[0, m] * modal[0, m] + line.half_step[1, m] * modal[1, m])
+    return deflection(shape, modal[0]), middle
 
 
 @implements(rise_at_contact, ThreeSpanLine)
@@ -62,10 +82,11 @@ def _rise(line, wire, lane, contact, x0, x1):
 
 @implements(look_at_contact, ThreeSpanLine)
 def _look(line, wire, lane, contact, x):
-    shape, compliance = wire.contact_shape[lane, contact], 0.0
+    shape, at_end, at_middle = wire.contact_shape[lane, contact], 0.0, 0.0
     for m in range(shape.size):
-        compliance += shape[m] * line.impulse[0, m] * shape[m]
-    return deflection(shape, wire.modal[lane, 0]), compliance, 0.0
+        at_end += shape[m] * line.impulse[0, m] * shape[m]
+        at_middle += shape[m] * line.half_step[2, m] * shape[m]
+    return deflection(shape, wire.modal[lane, 0]), at_end, at_middle, 0.0
 
 
 @implements(apply_force, ThreeSpanLine)
@@ -78,18 +99,7 @@ def _apply(line, wire, lane, contact, x, force):
 
 @implements(end_step, ThreeSpanLine)
 def _end(line, wire, lane):
-    if wire.position[lane, 0] >= (wire.central_span[lane] + 1) * line.span:
-        modal, before = wire.modal[lane], wire.scratch[lane]
-        size = modal.shape[1]
-        for k in range(2):
-            for m in range(size):
-                before[k, m] = modal[k, m]
-            for m in range(size):
-                total = 0.0
-                for j in range(size):
-                    total += line.project[m, j] * before[k, j]
-                modal[k, m] = total
-        wire.central_span[lane] += 1
+    pass
 
 
 @implements(record_wire, ThreeSpanLine)
