@@ -10,13 +10,10 @@ import pytest
 import panto_env
 from panto_env import InputError, simulate
 from panto_env.analysis.sweep import sweep
-from panto_env.catalog import load_catenary
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.pantograph import build
 from panto_env.policies import find_policy
 
-LINE = load_catenary("en50318-2002")
-CLAMPS = LINE.droppers.model_copy(update={"contact_clamp_mass": 3.0, "messenger_clamp_mass": 3.0})
-DIVERGING = LINE.model_copy(update={"droppers": CLAMPS})
-"""Clamps so heavy that today's grid can't carry them."""
 OWN = """
 class Own:
     def __init__(self, gain=0.5):
@@ -41,13 +38,21 @@ def own(tmp_path):
     return tmp_path / "own.py"
 
 
-def test_a_run_that_diverges_gives_no_figures():
+@pytest.fixture
+def diverging(monkeypatch):
+    """Settings of a run that diverges: a stiff contact that may pull, with nothing that keeps it stable."""
+    monkeypatch.setattr(build, "STABILITY_MARGIN", np.inf)
+    stiff = load_pantograph("en50318-2002").model_copy(update={"contact_stiffness": 1e6})
+    return {"pantograph": stiff, "bilateral": True}
+
+
+def test_a_run_that_diverges_gives_no_figures(diverging):
     with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):
-        simulate(DIVERGING)
+        simulate(**diverging)
 
 
-def test_an_episode_that_diverges_ends_with_an_error():
-    env = gymnasium.make("panto_env:Pantograph-v0", catenary=DIVERGING)
+def test_an_episode_that_diverges_ends_with_an_error(diverging):
+    env = gymnasium.make("panto_env:Pantograph-v0", **diverging)
     env.reset(seed=0)
     still, ended = np.zeros(1, dtype=np.float32), False
     with pytest.raises(InputError, match="diverged"):  # noqa: PT012 - at which step is not known

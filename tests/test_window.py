@@ -6,7 +6,7 @@ from panto_env.backend import kernel
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.static_shape import solve
-from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step
+from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
 from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318 import window as windows
 
@@ -14,10 +14,9 @@ from panto_env.studies.en50318 import window as windows
 @kernel
 def wait(line, wire, x, steps):
     """Let a line swing for itself; x (m): anywhere in the window's middle."""
-    wire.position[0, 0], wire.force[0, 0] = x, 0.0
     for _ in range(steps):
+        place_contact(line, wire, 0, 0, x)
         advance_wire(line, wire, 0)
-        apply_force(line, wire, 0, 0, x, 0.0)
         end_step(line, wire, 0)
 
 

@@ -29,8 +29,8 @@ HEAD_RANGE = 0.3
 """Height of the head (m), either way, beyond which an episode ends: outside the wire's clearance."""
 LOSS_TIME = 0.5
 """Time without contact (s) after which an episode ends."""
-LARGEST_FORCE = 1e5
-"""Contact force (N) beyond which, a thousand times any real one, a computation has diverged."""
+LARGEST_DEVIATION = 2e3
+"""Mean deviation of the contact force (N) beyond which, ten times any real one, a computation has diverged."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 
@@ -206,14 +206,15 @@ class Task:
         plant = self.plant
         nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
         figures = self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
-        self._refuse_divergence(
-            lane, np.array([figures.mean, figures.max, figures.min]), plant.sample[Row.WIRE_HEIGHT, lane]
-        )
+        deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
+        self._refuse_divergence(lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
         return figures
 
-    def _refuse_divergence(self, lane: int, force: Array, height: Array) -> None:
-        """Raise InputError where a lane's contact force (N) or wire height (m) is that of no line."""
-        possible = (np.abs(force) < LARGEST_FORCE).all() and (np.abs(height) < LARGEST_HEIGHT).all()
+    def _refuse_divergence(self, lane: int, deviation: float, height: Array) -> None:
+        """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
+        is that of no line.
+        """
+        possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
         if not possible:
             plant = self.plant
             raise InputError(
@@ -226,7 +227,8 @@ class Task:
         """Record of a lane's run so far. Raises InputError where its computation diverged."""
         plant, steps = self.plant, int(self.plant.steps_done[lane])
         rows = self.samples.rows[lane, 1 : steps + 1, 0]
-        self._refuse_divergence(lane, rows[:, Row.CONTACT_FORCE], rows[:, Row.WIRE_HEIGHT])
+        deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
+        self._refuse_divergence(lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
         middle = (np.arange(steps) + 0.5) * plant.time_step
         return Trajectory(
             time=middle,

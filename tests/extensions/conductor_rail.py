@@ -16,8 +16,10 @@ from .protocol import (
     apply_force,
     end_step,
     look_at_contact,
+    place_contact,
     record_wire,
     refuse_defects,
+    rise_at_contact,
 )
 from .schema import CatenaryData
 
@@ -37,6 +39,7 @@ class RailWire(NamedTuple):
 
 class ConductorRail:
     massless = True
+    contact_gain = 0.0
     wave_speed = np.inf
     length = np.inf
 
@@ -58,9 +61,19 @@ class ConductorRail:
 KIND = CatenaryKind(ConductorRailData, ConductorRail)
 
 
+@implements(place_contact, RailLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(rise_at_contact, RailLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    return 0.0
+
+
 @implements(look_at_contact, RailLine)
 def _look(line, wire, lane, contact, x):
-    return 0.0, 0.0, line.compliance
+    return 0.0, 0.0, 0.0, line.compliance
 
 
 @implements(advance_wire, RailLine)
