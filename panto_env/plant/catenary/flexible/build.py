@@ -155,7 +155,6 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
         all_increment=increment.reshape(lanes, wires * nodes),
         blend=aligned_zeros((lanes, nodes), real, place=42 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
-        position=np.zeros((lanes, CONTACTS)),
         contact_node=np.zeros((lanes, CONTACTS), dtype=np.int64),
         contact_weight=np.zeros((lanes, CONTACTS, 4)),
         unmoved_height=np.zeros((lanes, CONTACTS)),

@@ -75,7 +75,7 @@ class FlexibleCatenary:
         line, wire = self.line, self.wire
         if self._lines_differ:
             self._write_defects(lane, drawn)
-        for array in (wire.displacement, wire.increment, wire.change, wire.position):
+        for array in (wire.displacement, wire.increment, wire.change):
             array[lane] = 0.0
         gap = line.link_gap[min(lane, len(line.link_gap) - 1)]
         wire.extension[lane] = 0.0 - gap[: len(line.link_node)]

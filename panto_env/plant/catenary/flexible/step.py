@@ -65,7 +65,7 @@ def _place(line, wire, lane, contact, x):
     u, d = wire.displacement[lane], wire.increment[lane]
     start = wire.first_span[lane] * line.span
     first, weights = locate(x - start, line.spacing, u.shape[1])
-    wire.position[lane, contact], wire.contact_node[lane, contact] = x, first
+    wire.contact_node[lane, contact] = first
     for k in range(4):
         wire.contact_weight[lane, contact, k] = weights[k]
     height = unmoved_height(line, lane, x)
