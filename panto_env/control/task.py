@@ -13,6 +13,7 @@ from ..base.errors import InputError
 from ..metrics.figures import Figures
 from ..metrics.trajectory import Trajectory
 from ..plant.line_condition import draw
+from ..plant.numerics import Runs
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
@@ -61,7 +62,7 @@ class Task:
             spans=_spans(settings),
             numerics=settings.numerics,
             actuator=settings.actuator,
-            conditions=settings.line_condition,
+            runs=_runs(settings),
             bilateral=settings.bilateral,
             varied=settings.pantograph_scatter > 0,
         )
@@ -255,6 +256,12 @@ class Task:
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
         )
+
+
+def _runs(settings: RunSettings) -> Runs:
+    """What the plant must be good for."""
+    slow, quick = settings.speed_kmh
+    return Runs((slow / 3.6, quick / 3.6), settings.control_interval, settings.line_condition)
 
 
 def _spans(settings: RunSettings) -> int | None:

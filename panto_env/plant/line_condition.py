@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -56,6 +57,12 @@ class LineCondition(Settings):
     def waves(self) -> int:
         """How many cosines it takes."""
         return len(IRREGULARITY) * (self.irregularity > 0) + (self.wear_depth > 0)
+
+    @property
+    def shortest_wave(self) -> float:
+        """Of the wire's height (m), infinite where it is even."""
+        irregularity = min(length for length, _ in IRREGULARITY) if self.irregularity > 0 else math.inf
+        return min(irregularity, self.wear_wavelength if self.wear_depth > 0 else math.inf)
 
     @property
     def defective(self) -> bool:

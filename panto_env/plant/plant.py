@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.schema import check_span_count
-from .line_condition import DrawnLine, LineCondition
-from .numerics import Numerics
+from .line_condition import DrawnLine
+from .numerics import Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples
@@ -33,26 +33,26 @@ class Plant:
         spans: int | None = None,
         numerics: Numerics | None = None,
         actuator: ActuatorSettings | None = None,
-        conditions: Sequence[LineCondition] = (LineCondition(),),
+        runs: Runs = Runs(),
         bilateral: bool = False,
         varied: bool = False,
     ) -> None:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
-        conditions: what may differ from the line as designed, one for each run. bilateral: let the
+        runs: what the plant must be good for: speeds, conditions of the line. bilateral: let the
         contact pull, as paper 3's equations do. varied: each lane may have a pantograph that differs in
         its values. Raises InputError where grid and step are not usable, or the line has not what is said
         to be defective.
         """
         self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
-        self._conditions = tuple(conditions)
+        self.runs = runs
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
             lanes=lanes,
             spans=self.spans,
             numerics=numerics or Numerics(),
-            conditions=self._conditions,
+            runs=runs,
         )
         self.time_step = self.model.time_step
         size = 2 * len(pantograph.masses)
@@ -64,7 +64,7 @@ class Plant:
         table = lane_table(CONTACTS, Row.STATE + size, lanes)
         self.run = Run(
             table=table,
-            waves=np.zeros((max(condition.waves for condition in self._conditions), 3, lanes)),
+            waves=np.zeros((max(condition.waves for condition in runs.conditions), 3, lanes)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
         # Of the first contact, which the figures are of.
@@ -115,7 +115,7 @@ class Plant:
         data = pantograph or self.pantograph
         if pantograph is not None:
             self._set_variant(variant, pantograph)
-        drawn = drawn or DrawnLine(self._conditions[0])
+        drawn = drawn or DrawnLine(self.runs.conditions[0])
         run.waves[:, :, lane] = 0.0
         run.waves[: len(drawn.waves), :, lane] = drawn.waves
         height, wire, spring = self.model.start_point

@@ -18,7 +18,7 @@ from ...backend import operation
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ..line_condition import DrawnLine, LineCondition
-from ..numerics import Numerics
+from ..numerics import Numerics, Runs
 from .schema import CatenaryData
 
 
@@ -52,9 +52,9 @@ class CatenaryModel(Protocol):
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
-        """Build the line; conditions: in which it may be, one for each run.
+        """Build the line; runs: what it is to be good for.
 
         Raises InputError where it cannot be computed so, or has not what is said to be defective.
         """

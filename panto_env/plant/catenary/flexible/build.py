@@ -11,8 +11,9 @@ from ....base.arrays import Array, Index
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
-from .grid import nodes_per_span, spring_levels, stencil_weights, time_step
+from .grid import nodes_per_span, spring_levels, stencil_weights
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
+from .resolution import Resolution
 from .schema import FlexibleCatenaryData
 from .static_shape import StaticShape
 
@@ -40,14 +41,13 @@ class Links(NamedTuple):
     mass: Array  # (links, 2): that moves with its lower and upper end (kg)
 
 
-def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans, each of a static shape.
-
-    Raises InputError where the time step is too long for the grid to be stable.
-    """
+def constants(
+    data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
+) -> FlexibleLine:
+    """Constants of an intact line of ``spans`` spans, each of a static shape, at a resolution that is stable."""
     window = min(numerics.window or spans, spans)
-    step, damping = time_step(data, numerics), data.damping
-    per_span = nodes_per_span(data, numerics.spacing, step)
+    step, damping = resolution.time_step, data.damping
+    per_span = nodes_per_span(data, resolution.spacing)
     dx = data.span_length / per_span
     nodes = window * per_span + 1 + 2 * PAD
     wires = (data.contact_wire, data.messenger_wire)

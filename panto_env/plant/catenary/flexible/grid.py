@@ -1,51 +1,16 @@
-"""Grid and time step of a flexible catenary, and the weights of its finite differences."""
+"""Finite differences of a flexible catenary: their weights, and with which grid and step they are stable."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.errors import InputError
 from ...interpolation import stencil
-from ...numerics import Numerics
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
 
-FINEST, FINE_ENOUGH = 1 / 3, 0.375
-"""Grid (m) unless told otherwise, where it is stable, and the coarsest for which the longer time step is
-taken: docs/validation.md shows what it costs."""
-LONG_STEP, SHORT_STEP = 2.5e-3, 2e-3
-"""Time steps (s) unless told otherwise."""
-
-
-def time_step(data: FlexibleCatenaryData, numerics: Numerics) -> float:
-    """Time step (s) asked for, or the longer usual one where a grid fine enough is stable with it."""
-    if numerics.time_step is not None:
-        return numerics.time_step
-    grid = numerics.spacing or FINE_ENOUGH
-    return LONG_STEP if stable(data, data.span_length / _nodes(data, grid), LONG_STEP) else SHORT_STEP
-
-
-def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
-    """Nodes per span of the grid asked for (m), or of the finest up to FINEST that is stable.
-
-    Raises InputError where the time step is too long for the grid to be stable.
-    """
-    if spacing is not None:
-        nodes = _nodes(data, spacing)
-        if not stable(data, data.span_length / nodes, step):
-            raise InputError(
-                f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m "
-                f"for line '{data.name}'; take a shorter step or a coarser grid."
-            )
-        return nodes
-    for nodes in range(_nodes(data, FINEST), 7, -1):
-        if stable(data, data.span_length / nodes, step):
-            return nodes
-    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
-
-
-def _nodes(data: FlexibleCatenaryData, spacing: float) -> int:
+def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
+    """Nodes in a span of a grid at most this coarse (m)."""
     return int(np.ceil(data.span_length / spacing - 1e-9))
 
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from ....base.arrays import Array
 from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
+from ...numerics import Numerics, Runs
 from ..protocol import StartPoint
 from .build import at_rest, constants, dropper_positions
 from .defects import DefectiveLine
-from .grid import contact_gain, time_step
+from .grid import contact_gain
+from .resolution import resolution
 from .schema import FlexibleCatenaryData
 from .static_shape import solve
 
@@ -29,16 +30,17 @@ class FlexibleCatenary:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line.
 
         Raises InputError where grid and time step are not stable together, or the line has not what a
         condition says is defective.
         """
-        self.time_step = time_step(data, numerics)
+        chosen = resolution(data, numerics, runs)
+        self.time_step = chosen.time_step
         shape = solve(data)
-        self.line = constants(data, shape, spans, numerics)
+        self.line = constants(data, shape, spans, numerics, chosen)
         self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         self.length = spans * data.span_length
@@ -48,8 +50,8 @@ class FlexibleCatenary:
         self._tension = np.tile(shape.dropper_tension, (1, spans))
         self._defective: dict[LineCondition, DefectiveLine] = {}
         self._lines_differ = False
-        if any(condition.defective for condition in conditions):
-            self._make_defective(data, spans, conditions, lanes)
+        if any(condition.defective for condition in runs.conditions):
+            self._make_defective(data, spans, runs.conditions, lanes)
         self.wire = at_rest(self.line, lanes)
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0]), 0.0, 0.0)

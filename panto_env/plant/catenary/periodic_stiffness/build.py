@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import LANES_ABREAST
 from ....base.arrays import Array
-from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
+from ...line_condition import DrawnLine
+from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, refuse_defects
 from .schema import PeriodicStiffnessData
 
@@ -50,11 +49,12 @@ class PeriodicStiffness:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line. Raises InputError where it is said to have defects."""
-        refuse_defects(data, conditions)
-        self.time_step = numerics.time_step or TIME_STEP
+        refuse_defects(data, runs.conditions)
+        self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
+        runs.check_wave(self.time_step)
         self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)
         self.wire: Any = PeriodicWire(np.zeros(lanes))
         self.usual_end = spans * data.span_length

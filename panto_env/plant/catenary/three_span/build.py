@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
+from ...line_condition import DrawnLine
+from ...numerics import Numerics, Runs
 from ...state import CONTACTS
 from ..protocol import StartPoint, refuse_defects
 from .schema import ThreeSpanData
@@ -57,14 +56,15 @@ class ThreeSpan:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line; there is no grid, and modes propagate exactly over any time step.
 
         Raises InputError where it is said to have defects.
         """
-        refuse_defects(data, conditions)
-        self.time_step = numerics.time_step or TIME_STEP
+        refuse_defects(data, runs.conditions)
+        self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
+        runs.check_wave(self.time_step)
         self.line: Any = _constants(data, self.time_step)
         self.wire: Any = _at_rest(lanes, data.modes)
         self.contact_gain = contact_gain(self.line)
