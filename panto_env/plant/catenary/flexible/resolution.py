@@ -21,14 +21,14 @@ from .schema import FlexibleCatenaryData
 
 GRIDS = ((0.72, 0.25), (0.87, 0.15), (1.0, 0.125))
 """Up to which share of the wave speed a grid (m) is fine enough."""
-NODES_HZ = 40.0
-"""How often a train must at least pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
+NODES_HZ = 60.0
+"""How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
 SLOWEST_HZ = 22.0
 """Below which (Hz) a ripple is in the filtered force."""
 FINEST_GRID = 0.1
 """Grid (m) that the slowest trains get."""
-STEPS = ((50 / 3.6, 0.25e-3), (150 / 3.6, 0.5e-3), (np.inf, 1.25e-3))
-"""Below which speed (m/s) a time step (s) is short enough."""
+SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1.25e-3))
+"""Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
 FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
@@ -78,8 +78,8 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     if deep:  # two nodes in a wave that runs ahead of the train at the rate at which it passes the waves
         ahead = min(deep) * (wave_speed - quick) / quick
         spacing = min(spacing, max(ahead / 2, GRIDS[-1][1]))
-    step = next(step for speed, step in STEPS if slow < speed)
-    return Resolution(spacing, min(step, runs.wave_step(SAMPLES_PER_WAVE)))
+    grid, step = next(fine for speed, *fine in SLOW if slow < speed)
+    return Resolution(min(spacing, grid), min(step, runs.wave_step(SAMPLES_PER_WAVE)))
 
 
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
