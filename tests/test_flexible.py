@@ -8,11 +8,12 @@ from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
 from panto_env.plant.catenary.flexible.line import CONTACT, PAD
+from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.catenary.flexible.static_shape import solve
 from panto_env.plant.catenary.flexible.wires import leapfrog
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
-from panto_env.plant.numerics import Numerics
+from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 
 from .finite_element import simulation as finite_element
@@ -32,7 +33,7 @@ def travel(line, wire, start, stride, force, heights):
 
 
 def constants_of(line, spans, numerics):
-    return constants(line, solve(line), spans, numerics)
+    return constants(line, solve(line), spans, numerics, resolution(line, numerics, Runs()))
 
 
 def undamped(line):

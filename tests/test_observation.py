@@ -80,7 +80,9 @@ class Episode:
         position = self.speed * 0.01 * np.arange(len(self.observations))
         angle = 2 * np.pi * position / LINE.span_length
         half_stride = 0.5 * self.speed * self.run.time_step
-        contact = self.last(self.run.contact_force, self.states[0, 0] / (1 / STRIP + 1 / self._stiffness(0.0)))
+        contact = self.last(
+            self.run.contact_force, self.states[0, 0] / (1 / STRIP + 1 / self._stiffness(0.0))
+        )
         names = {
             "head displacement": self.last_mean(self.states[:, 0]),
             "frame displacement": self.last_mean(self.states[:, masses - 1]),

@@ -10,7 +10,7 @@ import pytest
 import panto_env
 from panto_env import InputError, simulate
 from panto_env.analysis.sweep import sweep
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_pantograph
 from panto_env.plant.pantograph import build
 from panto_env.policies import find_policy
 

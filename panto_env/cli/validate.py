@@ -20,6 +20,10 @@ def validate(
     wear: Annotated[
         bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
     ] = False,
+    lines: Annotated[
+        bool,
+        typer.Option("--lines", help="Print what the default grid and step cost on every line and speed."),
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -31,7 +35,11 @@ def validate(
         check_plot(plot)
     with progress_console.status("validating") as status:
         validation = study.run(
-            status.update, with_convergence=convergence, with_windows=window, with_wear=wear
+            status.update,
+            with_convergence=convergence,
+            with_windows=window,
+            with_wear=wear,
+            with_lines=lines,
         )
     if plot is not None:
         save(plot_reference(validation.runs), plot)

@@ -31,7 +31,7 @@ HEAD_RANGE = 0.3
 LOSS_TIME = 0.5
 """Time without contact (s) after which an episode ends."""
 LARGEST_DEVIATION = 2e3
-"""Mean deviation of the contact force (N) beyond which, ten times any real one, a computation has diverged."""
+"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 

@@ -14,7 +14,7 @@ from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.schema import check_span_count
 from .line_condition import DrawnLine
-from .numerics import Numerics, Runs
+from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples
@@ -33,7 +33,7 @@ class Plant:
         spans: int | None = None,
         numerics: Numerics | None = None,
         actuator: ActuatorSettings | None = None,
-        runs: Runs = Runs(),
+        runs: Runs = RUNS,
         bilateral: bool = False,
         varied: bool = False,
     ) -> None:

@@ -43,8 +43,8 @@ class ConductorRail:
     wave_speed = np.inf
     length = np.inf
 
-    def __init__(self, data, *, lanes, spans, numerics, conditions):
-        refuse_defects(data, conditions)
+    def __init__(self, data, *, lanes, spans, numerics, runs):
+        refuse_defects(data, runs.conditions)
         self.time_step = numerics.time_step or 5e-3
         self.line, self.wire = RailLine(1 / data.stiffness), RailWire(np.zeros(lanes))
         self.usual_end = spans * data.span_length

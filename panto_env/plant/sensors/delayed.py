@@ -25,7 +25,9 @@ class DelayedSensors(SensorSettings):
     force_noise: NonNegative = Field(0.0, description="rms noise of the contact force (N)")
     displacement_noise: NonNegative = Field(0.0, description="rms noise of displacements (m)")
     velocity_noise: NonNegative = Field(0.0, description="rms noise of velocities (m/s)")
-    delay: NonNegative = Field(0.0, description="age of a reading (s); at least half a time step, as it is a mean over one")
+    delay: NonNegative = Field(
+        0.0, description="age of a reading (s); at least half a time step, as it is a mean over one"
+    )
 
     @property
     def noise_rms(self) -> tuple[float, ...] | None:

@@ -44,7 +44,7 @@ class Links(NamedTuple):
 def constants(
     data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
 ) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans, each of a static shape, at a resolution that is stable."""
+    """Constants of an intact line of ``spans`` spans, each of a static shape, at a stable resolution."""
     window = min(numerics.window or spans, spans)
     step, damping = resolution.time_step, data.damping
     per_span = nodes_per_span(data, resolution.spacing)

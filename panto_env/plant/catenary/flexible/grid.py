@@ -9,6 +9,7 @@ from ...interpolation import stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
 
+
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
     """Nodes in a span of a grid at most this coarse (m)."""
     return int(np.ceil(data.span_length / spacing - 1e-9))

@@ -1,9 +1,9 @@
 """Grid and time step of a flexible catenary: what is fine enough for the runs that it is built for.
 
-A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what it does at
-f Hz runs ahead as waves of (c - v) / f. Slowly, the point of contact passes a node every dx / v, and the force
-swings with it, which the filter of 20 Hz hides only while that is short. And droppers that go slack and taut
-again want a time step well below the milliseconds in which they do: what slow trains excite most.
+A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what happens at
+f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple of
+this period, which the filter of 20 Hz hides only while it is short. And droppers that go slack and taut again
+want a time step well below the milliseconds in which they do so: slow trains excite this most.
 docs/validation.md shows the figures at every speed, on every line, beside converged ones.
 """
 
