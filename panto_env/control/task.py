@@ -261,7 +261,8 @@ class Task:
 def _runs(settings: RunSettings) -> Runs:
     """What the plant must be good for."""
     slow, quick = settings.speed_kmh
-    return Runs((slow / 3.6, quick / 3.6), settings.control_interval, settings.line_condition)
+    pantograph, interval = settings.pantograph, settings.control_interval
+    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
 
 
 def _spans(settings: RunSettings) -> int | None:

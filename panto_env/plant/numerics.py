@@ -54,6 +54,7 @@ class Runs(NamedTuple):
     speeds: tuple[float, float] = (250 / 3.6, 300 / 3.6)  # lowest and highest (m/s)
     control_interval: float = 0.01  # s, of which a time step is a whole part unless given
     conditions: Sequence[LineCondition] = (LineCondition(),)
+    hard_contact: bool = False  # whether stiffer, or more damped, than a collector strip's
 
     def whole_part(self, longest: float) -> float:
         """The longest time step (s) up to ``longest`` of which the control interval is a whole number."""

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from ...base.settings import NonNegative, Positive, Settings
+
+HARD_STIFFNESS, HARD_DAMPING = 250e3, 300.0
+"""Of a contact (N/m, N s/m) beyond which it needs a finer grid: see ``PantographData.hard_contact``."""
+STIFFEST_CONTACT = 1e6
+"""Contact spring (N/m): beyond it, rounding and a moving point of contact can make a force that grows."""
+Contact = Annotated[float, Field(gt=0, le=STIFFEST_CONTACT, allow_inf_nan=False)]
 
 
 class PantographData(Settings):
@@ -26,7 +32,7 @@ class PantographData(Settings):
     aerodynamic_coefficient: NonNegative = Field(
         description="aerodynamic uplift on the lowest mass per speed squared (N/(km/h)^2)"
     )
-    contact_stiffness: Positive | Literal["rigid"] = Field(
+    contact_stiffness: Contact | Literal["rigid"] = Field(
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
     contact_damping: NonNegative = Field(0.0, description="damper beside the contact spring (N s/m)")
@@ -43,6 +49,12 @@ class PantographData(Settings):
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
         return self
+
+    @property
+    def hard_contact(self) -> bool:
+        """Whether the contact is stiffer, or more damped, than any that strips are computed with."""
+        stiffness = 0.0 if self.contact_stiffness == "rigid" else self.contact_stiffness
+        return stiffness > HARD_STIFFNESS or self.contact_damping > HARD_DAMPING
 
     def nominal_force(self, speed: float) -> float:
         """Force that lifts the pantograph (N) at a train speed (m/s)."""

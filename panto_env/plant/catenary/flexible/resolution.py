@@ -1,9 +1,9 @@
 """Grid and time step of a flexible catenary: what is fine enough for the runs that it is built for.
 
 A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what happens at
-f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple of
-this period, which the filter of 20 Hz hides only while it is short. And droppers that go slack and taut again
-want a time step well below the milliseconds in which they do so: slow trains excite this most.
+f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple
+of this period, which the filter of 20 Hz hides only while it is short. And droppers that go slack and taut
+again want a time step well below the milliseconds in which they do so: slow trains excite this most.
 docs/validation.md shows the figures at every speed, on every line, beside converged ones.
 """
 
@@ -29,6 +29,8 @@ FINEST_GRID = 0.1
 """Grid (m) that the slowest trains get."""
 SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1.25e-3))
 """Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
+HARD_CONTACT_GRID = 0.15
+"""Grid (m) that a hard contact wants."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
 FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
@@ -78,6 +80,8 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     if deep:  # two nodes in a wave that runs ahead of the train at the rate at which it passes the waves
         ahead = min(deep) * (wave_speed - quick) / quick
         spacing = min(spacing, max(ahead / 2, GRIDS[-1][1]))
+    if runs.hard_contact:
+        spacing = min(spacing, HARD_CONTACT_GRID)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
     return Resolution(min(spacing, grid), min(step, runs.wave_step(SAMPLES_PER_WAVE)))
 
