@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..base.errors import InputError
-from ..base.settings import parse, sentence, suggest
+from ..base.settings import Positive, parse, sentence, suggest
 from ..catalog import load_catenary, load_pantograph
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
@@ -124,7 +124,7 @@ class RunSettings(Numerics):
         None, description="spans of the line; by default as the catalogue has it"
     )
     # Published active pantographs are controlled at 50-100 Hz.
-    control_interval: float = Field(0.01, description="time between two actions (s)")
+    control_interval: Positive = Field(0.01, description="time between two actions (s)")
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..backend import LANES_ABREAST, bind, lane_table, pack
 from ..base.arrays import Array
-from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
+from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
@@ -85,17 +85,7 @@ class Plant:
 
     def check_speed(self, speed: float) -> None:
         """Raise InputError unless a train can run at this speed (m/s) under this line."""
-        limit = self.model.wave_speed
-        if not (np.isfinite(speed) and 0 < speed < limit):
-            bound = (
-                ""
-                if np.isinf(limit)
-                else f" and below the wave speed of the contact wire, {3.6 * limit:.0f} km/h"
-            )
-            raise InputError(
-                f"The speed must lie above 0{bound} on line '{self.catenary.name}', "
-                f"not at {3.6 * speed:g} km/h."
-            )
+        check_speeds(self.catenary.name, self.model.wave_speed, [speed])
 
     def start(
         self,

@@ -11,6 +11,7 @@ does on the wire is force times the change of that height, exactly, and no conta
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -71,6 +72,20 @@ class CatenaryKind(NamedTuple):
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
+
+
+def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
+    """Raise InputError unless trains can run at these speeds (m/s) under a line, slower than its waves (m/s)."""
+    for speed in speeds:
+        if not (math.isfinite(speed) and 0 < speed < wave_speed):
+            bound = (
+                ""
+                if math.isinf(wave_speed)
+                else f" and below the wave speed of the contact wire, {3.6 * wave_speed:.0f} km/h"
+            )
+            raise InputError(
+                f"The speed must lie above 0{bound} on line '{line}', not at {3.6 * speed:g} km/h."
+            )
 
 
 def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from ....base.arrays import Array
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
-from ..protocol import StartPoint
+from ..protocol import StartPoint, check_speeds
 from .build import at_rest, constants, dropper_positions
 from .defects import DefectiveLine
 from .grid import contact_gain
@@ -37,12 +37,13 @@ class FlexibleCatenary:
         Raises InputError where grid and time step are not stable together, or the line has not what a
         condition says is defective.
         """
+        self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+        check_speeds(data.name, self.wave_speed, runs.speeds)
         chosen = resolution(data, numerics, runs)
         self.time_step = chosen.time_step
         shape = solve(data)
         self.line = constants(data, shape, spans, numerics, chosen)
         self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
-        self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)

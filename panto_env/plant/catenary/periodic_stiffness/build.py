@@ -10,7 +10,7 @@ from ....backend import LANES_ABREAST
 from ....base.arrays import Array
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
-from ..protocol import StartPoint, refuse_defects
+from ..protocol import StartPoint, check_speeds, refuse_defects
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
@@ -53,6 +53,7 @@ class PeriodicStiffness:
     ) -> None:
         """Build the line. Raises InputError where it is said to have defects."""
         refuse_defects(data, runs.conditions)
+        check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
         self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)

@@ -10,7 +10,7 @@ from ....base.arrays import Array, Index
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ...state import CONTACTS
-from ..protocol import StartPoint, refuse_defects
+from ..protocol import StartPoint, check_speeds, refuse_defects
 from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
@@ -63,12 +63,13 @@ class ThreeSpan:
         Raises InputError where it is said to have defects.
         """
         refuse_defects(data, runs.conditions)
+        self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
+        check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
         self.line: Any = _constants(data, self.time_step)
         self.wire: Any = _at_rest(lanes, data.modes)
         self.contact_gain = contact_gain(self.line)
-        self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
         self.usual_end = spans * data.span_length
         self.supports: Array = data.span_length * np.arange(1, spans)
         self.droppers: Array = np.zeros(0)
