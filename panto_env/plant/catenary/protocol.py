@@ -75,7 +75,7 @@ class CatenaryKind(NamedTuple):
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
-    """Raise InputError unless trains can run at these speeds (m/s) under a line, slower than its waves (m/s)."""
+    """Raise InputError unless trains at these speeds (m/s) are slower than the waves of a line (m/s)."""
     for speed in speeds:
         if not (math.isfinite(speed) and 0 < speed < wave_speed):
             bound = (

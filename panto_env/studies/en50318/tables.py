@@ -43,7 +43,7 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
         for row in at_speed:
             discretisation = (
                 f"{row['spacing']:.3g}",
-                f"{1e3 * row['time_step']:g}",
+                f"{1e3 * row['time_step']:.3g}",
                 str(row["window"] or "all"),
                 row["precision"],
             )
@@ -91,7 +91,7 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
             f"{check.wavelength:g}",
             f"{1e3 * check.depth:g}",
             f"{check.spacing:.3g}",
-            f"{1e3 * check.time_step:g}",
+            f"{1e3 * check.time_step:.3g}",
             f"{check.steps:.1f}",
         )
         forces = (_spread(values, 1) for values in (check.std, check.max, check.min, check.raw_max))
