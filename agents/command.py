@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -138,12 +139,16 @@ def _print_pairs(pairs: list[Pair]) -> None:
                 label.scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
                 for column in ([pair.policy for pair in pairs_here], [pair.passive for pair in pairs_here])
             )
-            change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 else ""
+            change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 and math.isfinite(policy) else ""
             first = f"{speed:g}" if key == ROWS[0] else ""
             table.add_row(first, label.heading, number(policy), number(passive), change)
         ended_early = sum(pair.terminated for pair in pairs_here)
-        out_of_range = sum(not pair.qualified and not pair.terminated for pair in pairs_here)
+        passive_too = sum(pair.passive_ending != "" for pair in pairs_here)
+        out_of_range = len(pairs_here) - sum(
+            pair.qualified or pair.terminated or pair.passive_ending != "" for pair in pairs_here
+        )
         notes = [f"{ended_early} ended early"] * (ended_early > 0)
+        notes += [f"{passive_too} without a policy did"] * (passive_too > 0)
         notes += [f"{out_of_range} with F_m out of range"] * (out_of_range > 0)
         if notes:
             table.add_row("", f"of {len(pairs_here)} passes, " + ", ".join(notes), "", "", "")

@@ -21,8 +21,9 @@ NOT_OF_A_PASS = ("speed_kmh", "reward")
 
 @dataclass(frozen=True)
 class Pair:
-    """One pass under a policy and the same pass without; figures leave out the run-in where a run is long
-    enough.
+    """One pass under a policy and the same pass without; a pass that ended early has no figures.
+
+    Figures leave out the run-in where a run is long enough.
     """
 
     speed_kmh: float
@@ -30,11 +31,21 @@ class Pair:
     policy: Figures
     passive: Figures
     nominal_force: float  # N
-    terminated: bool  # whether the policy's pass ended early
+    ending: str  # where and why the policy's pass ended early, or ""
+    passive_ending: str  # where and why the passive one did, or ""
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the policy's pass ended early."""
+        return self.ending != ""
 
     @property
     def ratio(self) -> float:
-        """Sigma divided by that of the passive pantograph; infinite where the pass ended early."""
+        """Sigma divided by that of the passive pantograph.
+
+        Infinite where the policy's pass ended early; else nan where the passive one did: there is nothing
+        to compare with.
+        """
         return math.inf if self.terminated else self.policy.std / self.passive.std
 
     @property
@@ -47,7 +58,7 @@ class Pair:
     def qualified(self) -> bool:
         """Whether the pass reached its end with a mean force within the range."""
         low, high = self.mean_range
-        return not self.terminated and low <= self.policy.mean <= high
+        return low <= self.policy.mean <= high
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, for JSON."""
@@ -58,6 +69,8 @@ class Pair:
             "qualified": self.qualified,
             "mean_range": self.mean_range,
             "terminated": self.terminated,
+            "ending": self.ending,
+            "passive_ending": self.passive_ending,
             "policy": self.policy.as_dict(),
             "passive": self.passive.as_dict(),
         }
@@ -89,14 +102,18 @@ class Comparison:
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
     """Figures of two passes over the spans that the benchmark evaluates too."""
-    spans = None if active.terminated else evaluated_spans(passive)
+
+    def figures(run: Trajectory) -> Figures:
+        return Figures.none() if run.terminated else run.summary(evaluated_spans(run))
+
     return Pair(
         speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
-        policy=active.summary(spans),
-        passive=passive.summary(spans),
+        policy=figures(active),
+        passive=figures(passive),
         nominal_force=active.nominal_force,
-        terminated=active.terminated,
+        ending=active.ending,
+        passive_ending=passive.ending,
     )
 
 
@@ -115,6 +132,8 @@ def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
 def in_words(pairs: Sequence[Pair]) -> str:
     """The verdict as a clause."""
     ratio, qualified = verdict(pairs)
+    if any(pair.passive_ending for pair in pairs):
+        return "the passive pantograph's run ended early: there is nothing to compare with"
     if math.isinf(ratio):
         return "a run ended early"
     return f"σ {100 * (ratio - 1):+.1f} % of passive" + ("" if qualified else ", F_m out of range")

@@ -37,6 +37,9 @@ def simulate(
     tension of every dropper. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the
     full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
+    A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
+    its ``ending`` says where and why.
+
     Raises InputError for what is not valid, TypeError for an unknown argument.
     """
     check_arguments(settings, RunSettings, "simulate")

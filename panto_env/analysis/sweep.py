@@ -61,9 +61,9 @@ def sweep(
     seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
     Returns one row per pass, in the order of values, then policies: the swept values, what was run, and
-    every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
-    unknown parameter, a value that its schema refuses, and whatever else ``simulate`` refuses; all
-    values are checked before the first pass.
+    every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
+    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and whatever else
+    ``simulate`` refuses; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
@@ -166,5 +166,6 @@ def _row(one_pass: _Pass, spans: Spans | None) -> Row:
         "seed": run.seed,
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,
+        "ending": run.ending,
         **figures.as_dict(),
     }

@@ -28,7 +28,7 @@ def simulate(
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Simulate one pass along a line and print its figures."""
+    """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
     from ..analysis.simulation import simulate as run
 
     chosen = parse_spans(spans)
@@ -48,11 +48,17 @@ def simulate(
             progress=lambda share: progress.update(bar, completed=share),
             **settings,
         )
-    figures = trajectory.summary(chosen)
     if output is not None:
         trajectory.save(output)
     if plot is not None:
-        save(plot_run(trajectory, chosen), plot)
+        save(plot_run(trajectory, None if trajectory.terminated else chosen), plot)
+    if trajectory.terminated:
+        if json:
+            print_json(_facts(trajectory) | {"spans": chosen, "figures": None})
+        else:
+            console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
+        raise typer.Exit(1)
+    figures = trajectory.summary(chosen)
     if json:
         print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
         return
@@ -61,8 +67,6 @@ def simulate(
         table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
     console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
-    if trajectory.terminated:
-        console.print("[bold red]The run ended early: it left the plant's valid range.")
     console.print(table)
     kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
     console.print(
@@ -72,5 +76,5 @@ def simulate(
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:
-    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "nominal_force")
+    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "ending", "nominal_force")
     return {name: getattr(run, name) for name in names}

@@ -67,13 +67,16 @@ class Trajectory:
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
+    ending: str = ""  # where and why it did, as a sentence
 
     def summary(self, spans: Spans | None = None) -> Figures:
         """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or the whole run.
 
         Uplift is that of the supports at the ends of these spans and between. Raises InputError
-        where the run does not cover the spans.
+        where the run does not cover the spans, or ended early and no spans are named.
         """
+        if spans is None and self.terminated:
+            raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
         inside = self.inside(spans)
         begin, end = (0.0, float(self.position[-1])) if spans is None else limits(spans, self.span_length)
         force = self.contact_force[inside]
@@ -115,6 +118,8 @@ class Trajectory:
         _, end = limits(spans, self.span_length)
         if self.position[-1] + self.stride < end:
             first, last = spans
+            if self.terminated:
+                raise InputError(f"Spans {first} to {last} end at {end:g} m. {self.ending}")
             raise InputError(
                 f"spans {first} to {last} end at {end:g} m, but the run ends at "
                 f"{self.position[-1]:.1f} m; run further or choose earlier spans."

@@ -1,7 +1,8 @@
 """What a kind of catenary provides: a class for Python, and four operations for kernels.
 
 A step of a lane goes: ``advance_wire`` once; then, for each contact point, ``look_at_contact`` and
-``apply_force``; then ``end_step`` once. Each operation has one source per class of line constants.
+``apply_force``; then ``end_step`` once. Each operation has one source per class of line constants; what a
+run may end by is asked once a control step.
 """
 
 from __future__ import annotations
@@ -98,6 +99,11 @@ def apply_force(line: Any, wire: Any, lane: int, contact: int, x: float, force: 
 @operation
 def end_step(line: Any, wire: Any, lane: int) -> None:
     """End the step of one lane."""
+
+
+@operation
+def ending_by_wire(line: Any, wire: Any, lane: int) -> Any:
+    """The ``Ending`` of one lane's run by what its wire does, ``Ending.NONE`` within the valid range."""
 
 
 @operation

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...base.errors import InputError
 from ...base.settings import NonNegative, Positive, Settings
+from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 
@@ -27,6 +28,10 @@ class CatenaryData(Settings):
     description: str = Field(description="what it is and how its open values were chosen")
     span_length: Positive = Field(description="distance between supports (m)")
     spans: int = Field(ge=FEWEST_SPANS, le=MOST_SPANS, description="number of spans unless told otherwise")
+    free_uplift: Positive = Field(
+        FREE_UPLIFT,
+        description="room for the contact wire's uplift at a support, up to the steady arm's stop (m)",
+    )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
 

@@ -53,6 +53,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
     springs, links = _springs(data, masts, step), _droppers(data, shape, window)
+    room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
@@ -91,6 +92,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
         inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
         mobility=mobility,
         uplift_node=CONTACT * nodes + masts.astype(np.int64),
+        free_uplift=data.free_uplift,
         spring_node=springs.wire * nodes + springs.node,
         spring_mobility=mobility[springs.wire, springs.node],
         spring_levels=springs.levels,
@@ -101,6 +103,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
         link_linear=linear.astype(real),
         link_yield=relative.astype(real),
         link_stiffness=links.stiffness.astype(real),
+        link_room=room.astype(real),
         link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
         link_gap=np.zeros((1, len(first)), dtype=real),
     )

@@ -7,10 +7,11 @@ mass and lag in proportion to the stiffness. Forces at points then move both by 
 
 from __future__ import annotations
 
-from ....backend import implements
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
-from .line import CONTACT, FlexibleLine
-from .links import defect_row, first_link, measure_extensions, pull_links, shift_extensions
+from ....backend import NOT_NEGATIVE, implements
+from ...valid_range import ENDING
+from ..protocol import advance_wire, apply_force, end_step, ending_by_wire, look_at_contact, record_wire
+from .line import CONTACT, LOWER, UPPER, FlexibleLine
+from .links import defect_row, difference, first_link, measure_extensions, pull_links, shift_extensions
 from .wires import (
     absorb,
     anchor,
@@ -95,6 +96,20 @@ def _end(line, wire, lane):
             anchor(d[w], last, -1)
         else:
             absorb(u[w], d[w], line.absorbing[w], last, -1)
+
+
+@implements(ending_by_wire, FlexibleLine)
+def _ending(line, wire, lane):
+    u, node = wire.all_displacement[lane], line.link_node
+    for s in range(line.uplift_node.size):
+        if u[line.uplift_node[s]] > line.free_uplift:
+            return ENDING.STOP
+    # The wires are nearest to each other at a dropper: between two, the contact wire hangs.
+    for k in range(line.link_room.size):
+        lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
+        if difference(u, lower, upper, line.link_weight[k]) < -line.link_room[k]:
+            return ENDING.WIRES
+    return ENDING.NONE
 
 
 @implements(record_wire, FlexibleLine)

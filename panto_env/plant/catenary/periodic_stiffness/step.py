@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ....backend import implements, inlined
 from ...trigonometry import cosine_of_turns
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from ...valid_range import ENDING
+from ..protocol import advance_wire, apply_force, end_step, ending_by_wire, look_at_contact, record_wire
 from .build import PeriodicLine
 
 
@@ -32,6 +33,11 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, PeriodicLine)
 def _end(line, wire, lane):
     pass
+
+
+@implements(ending_by_wire, PeriodicLine)
+def _ending(line, wire, lane):
+    return ENDING.NONE  # it has neither supports nor a second wire
 
 
 @implements(record_wire, PeriodicLine)
