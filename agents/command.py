@@ -13,6 +13,7 @@ from rich.table import Table
 from panto_env.analysis.options import with_settings
 from panto_env.base.errors import InputError
 from panto_env.metrics.labels import LABELS
+from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ ROWS = (
     "effort_rate",
 )
 """Figures that `panto evaluate` prints."""
+SHOWN = (FIRST_SETTLED, FIRST_SETTLED + 1)
+"""Spans that its plot shows."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
@@ -100,23 +103,24 @@ def evaluate(
     """
     from panto_env.policies import find_policy
 
-    from .evaluation import Comparison, evaluated_spans, in_words
+    from .evaluation import Comparison, in_words
     from .policy import TrainedPolicy
     from .settings import arguments, speeds
 
     driver = find_policy(policy)
     environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
     environment = environment | settings
-    comparison = Comparison(arguments(environment), speed or speeds(environment), seeds)
+    comparison = Comparison(
+        arguments(environment), speed or speeds(environment), seeds, settings.get("distance")
+    )
     with progress_console.status("running"):
         pairs = comparison.run(driver)
     if plot is not None:
         from panto_env.analysis import plots
 
         runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
-        first_span, _ = evaluated_spans(runs[1]) or (1, 2)
         title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
-        picture = plots.plot_forces(runs, (policy, "passive"), (first_span, first_span + 1), title)
+        picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
         plots.save(picture, plot)
     if json:
         print_json({"policy": policy, "environment": environment, "passes": [p.as_dict() for p in pairs]})
@@ -127,7 +131,8 @@ def evaluate(
 
 def _print_pairs(pairs: list[Pair]) -> None:
     """Print a table with a section for each speed: means over the seeds."""
-    table = Table()
+    spans = " or ".join(sorted({pair.spans for pair in pairs} - {""})) or "none"
+    table = Table(title=f"spans {spans}")
     for heading in ("km/h", "figure", "policy", "passive", "change"):
         table.add_column(heading, justify="left" if heading == "figure" else "right")
     for speed in sorted({pair.speed_kmh for pair in pairs}):

@@ -9,25 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from panto_baselines.benchmark.run import FIRST_SPAN
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
+from panto_env.metrics import spans
 from panto_env.metrics.figures import Figures
-from panto_env.metrics.spans import last_whole_span
 
-NOT_OF_A_PASS = ("speed_kmh", "reward")
-"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward."""
+NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans")
+"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward, and
+runs until its start has died out."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One pass under a policy and the same pass without; a pass that ended early has no figures.
-
-    Figures leave out the run-in where a run is long enough.
-    """
+    """One pass under a policy and the same pass without; a pass that ended early has no figures."""
 
     speed_kmh: float
     seed: int
+    spans: str  # that the figures cover, as "10-19"; "" if there are none
     policy: Figures
     passive: Figures
     nominal_force: float  # N
@@ -65,6 +63,7 @@ class Pair:
         return {
             "speed_kmh": self.speed_kmh,
             "seed": self.seed,
+            "spans": self.spans,
             "std_change_percent": 100 * (self.ratio - 1),
             "qualified": self.qualified,
             "mean_range": self.mean_range,
@@ -83,6 +82,7 @@ class Comparison:
     arguments: Mapping[str, Any]
     speeds_kmh: Sequence[float]
     seeds: int
+    distance: float | None = None  # of a pass (m), by default until its start has died out and on
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
 
     def run(self, policy: Any) -> list[Pair]:
@@ -94,34 +94,29 @@ class Comparison:
     def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
         """Records of one pass under the policy and of the same pass without."""
         arguments = {key: value for key, value in self.arguments.items() if key not in NOT_OF_A_PASS}
-        arguments |= {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
+        arguments |= {"speed_kmh": speed_kmh, "seed": seed, "distance": self.distance}
+        arguments |= {"record_droppers": False}
         if (speed_kmh, seed) not in self._passive:
             self._passive[speed_kmh, seed] = simulate(**arguments)
         return simulate(**arguments, policy=policy), self._passive[speed_kmh, seed]
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
-    """Figures of two passes over the spans that the benchmark evaluates too."""
+    """Figures of two passes over the spans after the start."""
 
     def figures(run: Trajectory) -> Figures:
-        return Figures.none() if run.terminated else run.summary(evaluated_spans(run))
+        return Figures.none() if run.terminated else run.summary()
 
     return Pair(
         speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
+        spans=next((spans.in_words(run.spans()) for run in (active, passive) if not run.terminated), ""),
         policy=figures(active),
         passive=figures(passive),
         nominal_force=active.nominal_force,
         ending=active.ending,
         passive_ending=passive.ending,
     )
-
-
-def evaluated_spans(run: Trajectory) -> tuple[int, int] | None:
-    """First and last span after the run-in, counted from 1; None (all spans) where the run is too short."""
-    covered = float(run.position[-1] + run.position[0])  # positions are those of the steps' middles
-    last = last_whole_span(covered, run.span_length, tolerance=1e-9)
-    return (FIRST_SPAN, last) if last >= FIRST_SPAN else None
 
 
 def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:

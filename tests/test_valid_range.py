@@ -13,6 +13,7 @@ from panto_env.analysis.sweep import sweep
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import FOLDERS
+from panto_env.metrics.spans import LAST_USUAL
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
 from panto_env.plant.catenary.protocol import ending_by_wire
@@ -53,7 +54,7 @@ def test_contact_lost_for_long_ends_a_passive_run():
 
 def test_a_run_within_the_range_goes_to_its_end(reference_run):
     assert (reference_run.terminated, reference_run.ending) == (False, "")
-    assert reference_run.position[-1] == pytest.approx(540.0, abs=1.0)
+    assert reference_run.position[-1] == pytest.approx(LAST_USUAL * 60.0, abs=1.0)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +89,7 @@ def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     model = CATENARIES["flexible"].model(data, lanes=1, spans=10, numerics=numerics, conditions=(condition,))
     model.settle(0, DrawnLine(condition), 0.0)
     line, wire, answer = model.line, model.wire, np.zeros(1, dtype=np.int64)
+    wire.increment[:] = 0.01  # m in a step: 4 m/s
     middle = PAD + round(2.5 * data.span_length / line.spacing) + np.arange(-3, 4)
     for wires, moved, expected in (
         ([MESSENGER], -0.73, Ending.NONE),
@@ -101,6 +103,10 @@ def test_wires_that_touch_at_a_dropper_end_a_run(precision):
             wire.displacement[0, each, middle] = moved
         _ask(line, wire, answer)
         assert answer[0] == expected, (wires, moved)
+    wire.increment[0, MESSENGER, middle] = -0.7  # from step to step: no wire does so
+    wire.displacement[0, MESSENGER, middle] = -0.75
+    _ask(line, wire, answer)
+    assert answer[0] == Ending.DIVERGED
 
 
 def test_a_run_that_ended_early_has_no_figures_but_those_of_spans_before():

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..control import Task
 from ..control.arguments import check_arguments, parameters
-from ..control.settings import RunSettings, default, run_settings
+from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.trajectory import Trajectory
 from ..policies import Policy, find_policy
 
@@ -44,7 +44,7 @@ def simulate(
     """
     check_arguments(settings, RunSettings, "simulate")
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
-    task = Task(run_settings(given), record_droppers=record_droppers)
+    task = Task(far_enough(run_settings(given)), record_droppers=record_droppers)
     task.reset(0, np.random.default_rng(seed))
     if policy is None:
         task.run_passively()

@@ -11,6 +11,7 @@ from rich.table import Table
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..metrics import en50367
 from ..metrics.labels import LABELS
+from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory, check_run_file
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 
@@ -51,22 +52,22 @@ def simulate(
     if output is not None:
         trajectory.save(output)
     if plot is not None:
-        save(plot_run(trajectory, None if trajectory.terminated else chosen), plot)
+        save(plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
     if trajectory.terminated:
         if json:
-            print_json(_facts(trajectory) | {"spans": chosen, "figures": None})
+            print_json(_facts(trajectory) | {"spans": None, "figures": None})
         else:
             console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
         raise typer.Exit(1)
-    figures = trajectory.summary(chosen)
+    figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
     if json:
-        print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
+        print_json(_facts(trajectory) | {"spans": covered, "figures": figures.as_dict()})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
         table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
-    console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
+    console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
     console.print(table)
     kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
     console.print(

@@ -20,6 +20,9 @@ def validate(
     wear: Annotated[
         bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
     ] = False,
+    start: Annotated[
+        bool, typer.Option("--start", help="Print what the start of a run does to σ, by spans evaluated.")
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -31,7 +34,11 @@ def validate(
         check_plot(plot)
     with progress_console.status("validating") as status:
         validation = study.run(
-            status.update, with_convergence=convergence, with_windows=window, with_wear=wear
+            status.update,
+            with_convergence=convergence,
+            with_windows=window,
+            with_wear=wear,
+            with_start=start,
         )
     if plot is not None:
         save(plot_reference(validation.runs), plot)

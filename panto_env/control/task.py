@@ -216,7 +216,7 @@ class Task:
     def _refuse_divergence(self, lane: int, force: Array, height: Array) -> None:
         """Raise InputError where a lane's contact force (N) or wire height (m) is that of no line."""
         possible = (np.abs(force) < LARGEST_FORCE).all() and (np.abs(height) < LARGEST_HEIGHT).all()
-        if not possible:
+        if not possible or self.episode.ending[lane] == Ending.DIVERGED:
             plant = self.plant
             raise InputError(
                 f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "

@@ -17,7 +17,7 @@ from ..base.errors import InputError
 from ..base.files import write_whole
 from .figures import Figures, contact_loss, cost_function
 from .low_pass import low_pass
-from .spans import Spans, check_spans, limits, within
+from .spans import SpanChoice, Spans, chosen_spans, limits, within
 
 FORMAT = 1
 SERIES = (
@@ -69,16 +69,16 @@ class Trajectory:
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
     ending: str = ""  # where and why it did, as a sentence
 
-    def summary(self, spans: Spans | None = None) -> Figures:
-        """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or the whole run.
+    def summary(self, spans: SpanChoice = None) -> Figures:
+        """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or "all" the run.
 
-        Uplift is that of the supports at the ends of these spans and between. Raises InputError
-        where the run does not cover the spans, or ended early and no spans are named.
+        By default the spans are those after the start has died out. Uplift is that of the supports at the
+        ends of these spans and between. Raises InputError where the run does not cover the spans, is too
+        short for its start to die out, or ended early and no spans before are named.
         """
-        if spans is None and self.terminated:
-            raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
+        covered = self.spans(spans)
         inside = self.inside(spans)
-        begin, end = (0.0, float(self.position[-1])) if spans is None else limits(spans, self.span_length)
+        begin, end = (0.0, float(self.position[-1])) if covered is None else limits(covered, self.span_length)
         force = self.contact_force[inside]
         filtered = low_pass(self.contact_force, self.time_step)[inside]
         mean, std = float(filtered.mean()), float(filtered.std())
@@ -107,14 +107,21 @@ class Trajectory:
         """Distance from one sample to the next (m)."""
         return self.speed_kmh / 3.6 * self.time_step
 
-    def inside(self, spans: Spans | None = None) -> NDArray[np.bool_]:
-        """Which samples lie inside the spans, (n,); all by default.
+    @property
+    def distance(self) -> float:
+        """Covered from the start to the end of the last step (m)."""
+        return float(self.position[-1] + self.position[0])
 
-        Raises InputError where the run does not cover the spans.
+    def spans(self, choice: SpanChoice = None) -> Spans | None:
+        """First and last span that a choice means, by default those after the start; None: the whole run.
+
+        Raises InputError where the run does not cover them, or they are not to be had of it.
         """
+        if choice is None and self.terminated:
+            raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
+        spans = chosen_spans(choice, self.distance, self.span_length)
         if spans is None:
-            return np.ones(len(self.time), dtype=bool)
-        check_spans(spans)
+            return None
         _, end = limits(spans, self.span_length)
         if self.position[-1] + self.stride < end:
             first, last = spans
@@ -124,7 +131,14 @@ class Trajectory:
                 f"spans {first} to {last} end at {end:g} m, but the run ends at "
                 f"{self.position[-1]:.1f} m; run further or choose earlier spans."
             )
-        return within(self.position, spans, self.span_length)
+        return spans
+
+    def inside(self, spans: SpanChoice = None) -> NDArray[np.bool_]:
+        """Which samples lie inside the spans, (n,). Raises InputError as ``spans`` does."""
+        covered = self.spans(spans)
+        if covered is None:
+            return np.ones(len(self.time), dtype=bool)
+        return within(self.position, covered, self.span_length)
 
     def save(self, path: str | Path) -> None:
         """Write a Parquet file, whole or not at all. Raises InputError for a name that is not such a file's.

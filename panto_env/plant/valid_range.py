@@ -14,6 +14,10 @@ FREE_UPLIFT = 0.24
 """Room for the contact wire's uplift at a support (m), up to the steady arm's stop, where a line does not
 say: twice the 120 mm for which lines of high speed are designed (recalled)."""
 
+LARGEST_SPEED = 20.0
+"""Speed of a wire (m/s) where it leaves its range, beyond which, ten times any real one, not the wire but the
+computation has."""
+
 
 class Ending(IntEnum):
     """Why a run ended early."""
@@ -23,6 +27,7 @@ class Ending(IntEnum):
     LOSS = 2  # contact was lost for LOSS_TIME
     STOP = 3  # the contact wire reached the steady arm's stop
     WIRES = 4  # contact wire and messenger wire touched
+    DIVERGED = 5  # the computation did: there is no result
 
 
 ENDING = constants(Ending)
@@ -37,4 +42,5 @@ def reason(ending: Ending, free_uplift: float) -> str:
         Ending.STOP: "the contact wire rose to the steady arm's stop, "
         f"{1e3 * free_uplift:.0f} mm above its rest at a support",
         Ending.WIRES: "contact wire and messenger wire touched",
+        Ending.DIVERGED: "the computation diverged",
     }[ending]

@@ -8,8 +8,9 @@ from typing import Any
 
 from ...base.table import Table
 from ...metrics.trajectory import Trajectory
-from . import convergence, reference, tables, wear, window
+from . import convergence, reference, start, tables, wear, window
 from .reference import Check
+from .start import StartCheck
 from .wear import WearCheck
 from .window import WindowCheck
 
@@ -19,13 +20,14 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last three are empty where they were not asked for."""
+    """What was found; the last four are empty where they were not asked for."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
+    start: list[StartCheck]
 
     @property
     def passed(self) -> bool:
@@ -40,6 +42,7 @@ class Validation:
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
+            *([tables.start_table(self.start)] if self.start else []),
         ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -50,6 +53,7 @@ class Validation:
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
+            "start": [vars(check) for check in self.start],
         }
 
 
@@ -59,6 +63,7 @@ def run(
     with_convergence: bool = False,
     with_windows: bool = False,
     with_wear: bool = False,
+    with_start: bool = False,
 ) -> Validation:
     """Run the standard's table, and whatever else is asked for."""
     report("the reference model")
@@ -77,4 +82,8 @@ def run(
         for numerics in wear.DISCRETISATIONS:
             report(f"{condition}, {numerics}")
             worn.append(wear.check_wear(condition, numerics))
-    return Validation(runs, reference.check(runs), rows, windows, worn)
+    starts: list[StartCheck] = []
+    for speed in start.SPEEDS_KMH if with_start else ():
+        report(f"the start of runs at {speed:g} km/h")
+        starts += start.check_start(speed)
+    return Validation(runs, reference.check(runs), rows, windows, worn, starts)

@@ -11,6 +11,7 @@ from ....base.arrays import Array, Index
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
+from ...valid_range import LARGEST_SPEED
 from .grid import nodes_per_span, spring_levels, stencil_weights, time_step
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .schema import FlexibleCatenaryData
@@ -93,6 +94,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
         mobility=mobility,
         uplift_node=CONTACT * nodes + masts.astype(np.int64),
         free_uplift=data.free_uplift,
+        largest_move=LARGEST_SPEED * step,
         spring_node=springs.wire * nodes + springs.node,
         spring_mobility=mobility[springs.wire, springs.node],
         spring_levels=springs.levels,

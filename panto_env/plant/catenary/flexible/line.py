@@ -35,6 +35,7 @@ class FlexibleLine(NamedTuple):
     mobility: Array  # (wires, nodes): displacement in one step by 1 N at the node (m/N)
     uplift_node: Index  # (supports,): among all nodes, where uplift is recorded
     free_uplift: float  # room for it up to the steady arm's stop (m)
+    largest_move: float  # in a step, beyond which the computation has diverged (m)
     spring_node: Index  # (springs,): among all nodes, where a spring to the ground holds a wire
     spring_mobility: Array  # (springs,): mobility there (m/N)
     spring_levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)

@@ -100,15 +100,18 @@ def _end(line, wire, lane):
 
 @implements(ending_by_wire, FlexibleLine)
 def _ending(line, wire, lane):
-    u, node = wire.all_displacement[lane], line.link_node
+    u, d = wire.all_displacement[lane], wire.all_increment[lane]
     for s in range(line.uplift_node.size):
-        if u[line.uplift_node[s]] > line.free_uplift:
-            return ENDING.STOP
+        i = line.uplift_node[s] & NOT_NEGATIVE
+        if u[i] > line.free_uplift:
+            return ENDING.STOP if abs(d[i]) < line.largest_move else ENDING.DIVERGED
     # The wires are nearest to each other at a dropper: between two, the contact wire hangs.
+    node, weight = line.link_node, line.link_weight
     for k in range(line.link_room.size):
         lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
-        if difference(u, lower, upper, line.link_weight[k]) < -line.link_room[k]:
-            return ENDING.WIRES
+        if difference(u, lower, upper, weight[k]) < -line.link_room[k]:
+            closing = abs(difference(d, lower, upper, weight[k]))
+            return ENDING.WIRES if closing < line.largest_move else ENDING.DIVERGED
     return ENDING.NONE
 
 
