@@ -21,9 +21,8 @@ Spans: TypeAlias = tuple[int, int]
 SpanChoice: TypeAlias = Spans | Literal["all"] | None
 """The first and the last span, "all" for the whole run, or None for those after the start has died out."""
 FIRST_SETTLED = 10
-"""First span after the start has died out: the waves about the train take their time to build up, however
-softly a run starts. What is missing falls by about a fifth per span at any speed; docs/validation.md shows
-what is left."""
+"""First span after the start has died out: the waves about the train take their time to build up. What is
+missing falls by about a fifth per span at any speed; docs/validation.md shows what is left."""
 LAST_USUAL = 19
 """Last span of a run unless told otherwise, so that ten are evaluated."""
 
