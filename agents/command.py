@@ -11,7 +11,9 @@ import typer
 from rich.table import Table
 
 from panto_env.analysis.options import with_settings
+from panto_env.analysis.requirements import print_criteria
 from panto_env.base.errors import InputError
+from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
@@ -126,6 +128,11 @@ def evaluate(
         print_json({"policy": policy, "environment": environment, "passes": [p.as_dict() for p in pairs]})
         return
     _print_pairs(pairs)
+    for speed_kmh in sorted({pair.speed_kmh for pair in pairs}):
+        seeds_here = [pair.policy_compliance for pair in pairs if pair.speed_kmh == speed_kmh]
+        if all(seeds_here):
+            title = f"Requirements at {speed_kmh:g} km/h under {policy}; of several seeds the worst"
+            print_criteria(worst(seeds_here), title)
     console.print(f"mean of all: {in_words(pairs)}")
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
 from panto_env.metrics import spans
+from panto_env.metrics.criterion import Criterion
 from panto_env.metrics.figures import Figures
 
 NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans")
@@ -28,6 +29,8 @@ class Pair:
     spans: str  # that the figures cover, as "10-19"; "" if there are none
     policy: Figures
     passive: Figures
+    policy_compliance: tuple[Criterion, ...]  # with EN 50367 and EN 50119; empty where there are no figures
+    passive_compliance: tuple[Criterion, ...]
     nominal_force: float  # N
     ending: str  # where and why the policy's pass ended early, or ""
     passive_ending: str  # where and why the passive one did, or ""
@@ -72,6 +75,8 @@ class Pair:
             "passive_ending": self.passive_ending,
             "policy": self.policy.as_dict(),
             "passive": self.passive.as_dict(),
+            "policy_compliance": [criterion.as_dict() for criterion in self.policy_compliance],
+            "passive_compliance": [criterion.as_dict() for criterion in self.passive_compliance],
         }
 
 
@@ -107,12 +112,17 @@ def pair(active: Trajectory, passive: Trajectory) -> Pair:
     def figures(run: Trajectory) -> Figures:
         return Figures.none() if run.terminated else run.summary()
 
+    def compliance(run: Trajectory) -> tuple[Criterion, ...]:
+        return () if run.terminated else tuple(run.compliance())
+
     return Pair(
         speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
         spans=next((spans.in_words(run.spans()) for run in (active, passive) if not run.terminated), ""),
         policy=figures(active),
         passive=figures(passive),
+        policy_compliance=compliance(active),
+        passive_compliance=compliance(passive),
         nominal_force=active.nominal_force,
         ending=active.ending,
         passive_ending=passive.ending,

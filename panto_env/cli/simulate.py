@@ -9,7 +9,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..metrics import en50367
+from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory, check_run_file
@@ -55,13 +55,15 @@ def simulate(
         save(plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
     if trajectory.terminated:
         if json:
-            print_json(_facts(trajectory) | {"spans": None, "figures": None})
+            print_json(_facts(trajectory) | {"spans": None, "figures": None, "compliance": None})
         else:
             console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
         raise typer.Exit(1)
     figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
+    criteria = trajectory.compliance(chosen)
     if json:
-        print_json(_facts(trajectory) | {"spans": covered, "figures": figures.as_dict()})
+        told = {"spans": covered, "figures": figures.as_dict()}
+        print_json(_facts(trajectory) | told | {"compliance": [each.as_dict() for each in criteria]})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
@@ -69,11 +71,7 @@ def simulate(
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
     console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
     console.print(table)
-    kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
-    console.print(
-        "EN 50367 (as recalled):",
-        ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),
-    )
+    print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..analysis.requirements import print_criteria
 from ..studies.en50318 import study
 from ..terminal import Json, Plot, console, print_json, print_table, progress_console
 
@@ -51,6 +52,8 @@ def validate(
             "The catalogue entry en50318-2002 says which open values were chosen, and how: "
             "`panto list en50318-2002`."
         )
+        for run, criteria in zip(validation.runs, validation.compliance, strict=True):
+            print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
         for table in others:
             print_table(table)
         console.print("All figures inside." if validation.passed else "[bold red]Not all figures are inside.")

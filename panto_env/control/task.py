@@ -10,6 +10,7 @@ import numpy as np
 from ..backend import bind, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
 from ..metrics.trajectory import Trajectory
 from ..plant.line_condition import draw
@@ -255,6 +256,7 @@ class Task:
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
             ending=self.ending(lane),
+            line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(self.speed[lane])),
         )
 
     def ending(self, lane: int) -> str:

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.files import write_whole
-from .figures import Figures, contact_loss, cost_function
+from .compliance import LineFacts, compliance
+from .criterion import Criterion
+from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import SpanChoice, Spans, chosen_spans, limits, within
 
-FORMAT = 1
+FORMAT = 2
 SERIES = (
     "time",
     "position",
@@ -68,6 +70,7 @@ class Trajectory:
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
     ending: str = ""  # where and why it did, as a sentence
+    line: LineFacts = field(default_factory=LineFacts)
 
     def summary(self, spans: SpanChoice = None) -> Figures:
         """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or "all" the run.
@@ -100,6 +103,24 @@ class Trajectory:
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
             effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
             distance=float(inside.sum() * self.stride),
+        )
+
+    def compliance(self, spans: SpanChoice = None) -> list[Criterion]:
+        """What the run keeps of EN 50367 and EN 50119 over the spans, and what is told beside.
+
+        That of droppers needs their record. Raises InputError as ``summary`` does.
+        """
+        inside = self.inside(spans)
+        tension = self.dropper_force[inside]
+        train, dropper = (x // self.span_length for x in (self.position[inside], self.dropper_position))
+        return compliance(
+            self.summary(spans),
+            arcing(self.contact_force[inside], self.time_step),
+            self.line,
+            self.speed_kmh / 3.6,
+            self.span_length,
+            tension,
+            tension[train[:, None] == dropper] if tension.size else tension,
         )
 
     @property
@@ -157,6 +178,7 @@ class Trajectory:
             name: value.tolist() if isinstance(value := getattr(self, name), np.ndarray) else value
             for name in _facts()
         }
+        facts["line"] = vars(self.line)
         table = pa.table(columns).replace_schema_metadata({"panto_env": json.dumps(facts)})
         with write_whole(path) as temporary:
             pq.write_table(table, temporary)
@@ -176,6 +198,7 @@ class Trajectory:
                 raise ValueError("it has another format")
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
+            facts["line"] = LineFacts(**facts["line"])
             series = {name: table[name].to_numpy() for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),

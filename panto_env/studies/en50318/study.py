@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...base.table import Table
+from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
 from . import convergence, reference, start, tables, wear, window
 from .reference import Check
@@ -24,6 +25,7 @@ class Validation:
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
+    compliance: list[list[Criterion]]  # of each run, over the standard's spans
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
@@ -50,6 +52,10 @@ class Validation:
         return {
             "passed": self.passed,
             "checks": [check.as_dict() for check in self.checks],
+            "compliance": [
+                {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
+                for run, criteria in zip(self.runs, self.compliance, strict=True)
+            ],
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
@@ -86,4 +92,5 @@ def run(
     for speed in start.SPEEDS_KMH if with_start else ():
         report(f"the start of runs at {speed:g} km/h")
         starts += start.check_start(speed)
-    return Validation(runs, reference.check(runs), rows, windows, worn, starts)
+    compliance = [run.compliance(reference.SPANS) for run in runs]
+    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, starts)
