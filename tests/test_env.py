@@ -46,7 +46,7 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     _, infos, terminated = run_episode(env)
     assert not terminated
     run = env.unwrapped.trajectory
-    figures = run.summary()
+    figures = run.summary("all")
     sums = {key: sum(info["reward_terms"][key] for info in infos) for key in infos[0]["reward_terms"]}
     assert sums["cost_function"] == pytest.approx(figures.cost_function, rel=1e-9)
     assert sums["contact_loss"] == pytest.approx(figures.contact_loss, rel=1e-9, abs=1e-9)

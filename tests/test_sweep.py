@@ -67,35 +67,34 @@ def test_nested_value_of_a_flexible_line_takes_effect():
     line = load_catenary("en50318-2002")
     wire = line.contact_wire.model_copy(update={"tension": 25e3})
     direct = simulate(line.model_copy(update={"contact_wire": wire}), distance=240)
-    (row,) = sweep({"catenary.contact_wire.tension": [25e3]}, distance=240)
-    assert figures(row) == expected(direct, None)
-    assert row["max_uplift"] == direct.summary().max_uplift
+    (row,) = sweep({"catenary.contact_wire.tension": [25e3]}, distance=240, spans=(2, 4))
+    assert figures(row) == expected(direct, (2, 4))
+    assert row["max_uplift"] == direct.summary((2, 4)).max_uplift
 
 
 def test_speed_actuator_and_policy_parameters_take_effect():
-    rows = sweep(
-        {"speed_kmh": [200, 250], "actuator.lag": [0.0, 0.02]}, **PAPER_3, policies=["pd"], distance=300
-    )
+    rows = sweep({"speed_kmh": [200, 250], "actuator.lag": [0.0, 0.02]}, **PAPER_3, policies=["pd"])
     assert [(row["speed_kmh"], row["actuator.lag"]) for row in rows] == [
         (200, 0.0), (200, 0.02), (250, 0.0), (250, 0.02)
     ]  # fmt: skip
     for row in rows:
         lag = LaggedActuator(lag=row["actuator.lag"])
-        direct = simulate(**PAPER_3, speed_kmh=row["speed_kmh"], policy="pd", actuator=lag, distance=300)
+        direct = simulate(**PAPER_3, speed_kmh=row["speed_kmh"], policy="pd", actuator=lag)
         assert figures(row) == expected(direct, None)
-    rows = sweep({"policy.gain": [0.3]}, **PAPER_3, policies=["p", "pd:damping=100"], distance=300)
+    short = {"distance": 300, "spans": "all"}
+    rows = sweep({"policy.gain": [0.3]}, **PAPER_3, policies=["p", "pd:damping=100"], **short)
     assert [row["policy"] for row in rows] == ["p", "pd:damping=100"]
     for row, policy in zip(rows, ("p:gain=0.3", "pd:damping=100,gain=0.3"), strict=True):
-        assert figures(row) == expected(simulate(**PAPER_3, policy=policy, distance=300), None)
+        assert figures(row) == expected(simulate(**PAPER_3, policy=policy, distance=300), "all")
+        assert row["spans"] == "all"
 
 
 def test_outcome_does_not_depend_on_threads_and_progress_counts_every_pass():
     told = []
     values = {"pantograph.masses.0": [5.0, 7.5, 10.0]}
-    one = sweep(values, policies=[None, "p"], distance=180, workers=1)
-    three = sweep(
-        values, policies=[None, "p"], distance=180, workers=3, progress=lambda *done: told.append(done)
-    )
+    short = {"policies": [None, "p"], "distance": 180, "spans": "all"}
+    one = sweep(values, **short, workers=1)
+    three = sweep(values, **short, workers=3, progress=lambda *done: told.append(done))
     assert one == three
     assert told == [(k, 6) for k in range(1, 7)]
 

@@ -13,16 +13,14 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, finite, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.control import Task
-from panto_env.control.settings import run_settings
-from panto_env.metrics.spans import last_whole_span
+from panto_env.control.settings import far_enough, run_settings
+from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
 from panto_env.policies import find_policy
 
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
 from .statistics import Cell, compare
 
-FIRST_SPAN = 4
-"""First span that is evaluated by default: the three before it are the run-in from rest."""
 FORMATS = (".json", *TABLES)
 
 
@@ -95,22 +93,19 @@ def check_format(path: str | Path) -> None:
 
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
-    task = Task(
-        run_settings(
-            {
-                "catenary": line.catenary,
-                "pantograph": line.pantograph,
-                "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
-                "actuator": settings.actuator,
-                "sensors": settings.sensors,
-                "line_condition": settings.line_condition,
-                "distance": line.distance,
-                "control_interval": settings.control_interval,
-            }
-        )
-    )
+    given = {
+        "catenary": line.catenary,
+        "pantograph": line.pantograph,
+        "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
+        "actuator": settings.actuator,
+        "sensors": settings.sensors,
+        "line_condition": settings.line_condition,
+        "distance": line.distance,
+        "control_interval": settings.control_interval,
+    }
+    task = Task(far_enough(run_settings(given)))
     last = last_whole_span(task.distance, task.plant.catenary.span_length)
-    first, last = line.spans or (FIRST_SPAN, last)
+    first, last = line.spans or (FIRST_SETTLED, last)
     where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
     if not 1 <= first <= last:
         raise InputError(

@@ -51,7 +51,7 @@ class Line(Settings):
     spans: tuple[int, int] | None = Field(
         None,
         description="first and last span that the figures cover, counted from 1; by default from the "
-        "fourth, which leaves out the run-in, to the last one that every run covers completely",
+        "tenth, where the start has died out, to the last one that every run covers completely",
     )
     policies: tuple[str, ...] = Field(
         (), description="policies that run on this line only, in addition to those that run on every line"

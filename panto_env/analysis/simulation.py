@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..control import Task
 from ..control.arguments import check_arguments, parameters
-from ..control.settings import RunSettings, default, run_settings
+from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.trajectory import Trajectory
 from ..policies import Policy, find_policy
 
@@ -37,11 +37,14 @@ def simulate(
     tension of every dropper. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the
     full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
+    A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
+    its ``ending`` says where and why.
+
     Raises InputError for what is not valid, TypeError for an unknown argument.
     """
     check_arguments(settings, RunSettings, "simulate")
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
-    task = Task(run_settings(given), record_droppers=record_droppers)
+    task = Task(far_enough(run_settings(given)), record_droppers=record_droppers)
     task.reset(0, np.random.default_rng(seed))
     if policy is None:
         task.run_passively()

@@ -15,7 +15,7 @@ from ..base.settings import Settings, hint
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings
 from ..metrics.figures import Figures
-from ..metrics.spans import Spans
+from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
 from .pool import Progress, in_threads
@@ -45,7 +45,7 @@ def sweep(
     parameters: Mapping[str, Sequence[float]],
     *,
     policies: Sequence[str | Path | None] = (None,),
-    spans: Spans | None = None,
+    spans: SpanChoice = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -56,14 +56,14 @@ def sweep(
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1; the whole run by default. workers: threads, one per core by
-    default; the outcome does not depend on it. progress: called with the passes done and of all.
-    seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
+    figures cover, first and last from 1, or "all"; by default those after the start. workers: threads, one
+    per core by default; the outcome does not depend on it. progress: called with the passes done and of
+    all. seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
     Returns one row per pass, in the order of values, then policies: the swept values, what was run, and
-    every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
-    unknown parameter, a value that its schema refuses, and whatever else ``simulate`` refuses; all
-    values are checked before the first pass.
+    every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
+    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and whatever else
+    ``simulate`` refuses; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
@@ -150,7 +150,7 @@ def _prepare(
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _row(one_pass: _Pass, spans: Spans | None) -> Row:
+def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
     try:
         run = simulate(**{"record_droppers": False} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
@@ -166,5 +166,7 @@ def _row(one_pass: _Pass, spans: Spans | None) -> Row:
         "seed": run.seed,
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,
+        "ending": run.ending,
+        "spans": "" if run.terminated else in_words(run.spans(spans)),
         **figures.as_dict(),
     }

@@ -9,8 +9,9 @@ from rich.progress import Progress
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..metrics import en50367
+from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
+from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory, check_run_file
 from ..terminal import Json, Plot, console, number, print_json, progress_console
 
@@ -28,7 +29,7 @@ def simulate(
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Simulate one pass along a line and print its figures."""
+    """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
     from ..analysis.simulation import simulate as run
 
     chosen = parse_spans(spans)
@@ -48,29 +49,31 @@ def simulate(
             progress=lambda share: progress.update(bar, completed=share),
             **settings,
         )
-    figures = trajectory.summary(chosen)
     if output is not None:
         trajectory.save(output)
     if plot is not None:
-        save(plot_run(trajectory, chosen), plot)
+        save(plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
+    if trajectory.terminated:
+        if json:
+            print_json(_facts(trajectory) | {"spans": None, "figures": None, "compliance": None})
+        else:
+            console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
+        raise typer.Exit(1)
+    figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
+    criteria = trajectory.compliance(chosen)
     if json:
-        print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
+        told = {"spans": covered, "figures": figures.as_dict()}
+        print_json(_facts(trajectory) | told | {"compliance": [each.as_dict() for each in criteria]})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
         table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
-    console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
-    if trajectory.terminated:
-        console.print("[bold red]The run ended early: it left the plant's valid range.")
+    console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
     console.print(table)
-    kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
-    console.print(
-        "EN 50367 (as recalled):",
-        ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),
-    )
+    print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:
-    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "nominal_force")
+    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "ending", "nominal_force")
     return {name: getattr(run, name) for name in names}

@@ -75,7 +75,7 @@ def sweep(
     if json:
         print_json(rows)
         return
-    _print(rows, list(values), spans)
+    _print(rows, list(values))
 
 
 def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
@@ -110,10 +110,11 @@ def parse_values(name: str, text: str) -> list[float]:
     return [first + (last - first) * k / steps for k in range(steps + 1)]
 
 
-def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None) -> None:
+def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
     first = rows[0]
     at = "" if "speed_kmh" in parameters else f" at {first['speed_kmh']:g} km/h"
-    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans or 'all'}")
+    spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
+    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans}")
     for name in (*parameters, "policy"):
         heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
         table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")

@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from ..base.errors import InputError
 from ..base.settings import Positive, parse, sentence, suggest
 from ..catalog import load_catenary, load_pantograph
+from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.schema import check_span_count
@@ -118,7 +119,8 @@ class RunSettings(Numerics):
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,
-        description="distance to run (m), by default to the end of the line; a short line gets more spans",
+        description="distance to run (m); by default to the end of the line, and a pass outside an "
+        f"environment to the end of span {LAST_USUAL} at least; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
@@ -131,6 +133,17 @@ class RunSettings(Numerics):
     def numerics(self) -> Numerics:
         """How the plant is computed."""
         return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
+
+
+def far_enough(settings: RunSettings) -> RunSettings:
+    """Settings of a pass: one that was told neither distance nor spans goes on until its start has died out.
+
+    The line gets as many spans as that takes.
+    """
+    line = settings.catenary
+    if settings.distance is not None or settings.spans is not None or line.spans > LAST_USUAL:
+        return settings
+    return settings.model_copy(update={"distance": LAST_USUAL * line.span_length})
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:

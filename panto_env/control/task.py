@@ -10,6 +10,7 @@ import numpy as np
 from ..backend import bind, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
 from ..metrics.trajectory import Trajectory
 from ..plant.line_condition import draw
@@ -18,6 +19,7 @@ from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
 from ..plant.state import Row
+from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
 from .context import Context
 from .episode import Episode, Flags
 from .observation import layout
@@ -26,10 +28,6 @@ from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
 from .step import control_step, observe_start
 
-HEAD_RANGE = 0.3
-"""Height of the head (m), either way, beyond which an episode ends: outside the wire's clearance."""
-LOSS_TIME = 0.5
-"""Time without contact (s) after which an episode ends."""
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
 LARGEST_HEIGHT = 3.0
@@ -106,6 +104,7 @@ class Task:
             weights=self.settings.reward.weights,
             idle=np.zeros(lanes, dtype=np.bool_),
             terminated=np.zeros(lanes, dtype=np.bool_),
+            ending=np.zeros(lanes, dtype=np.int64),
             truncated=np.zeros(lanes, dtype=np.bool_),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
             writers=self.layout.writers,
@@ -146,6 +145,7 @@ class Task:
         column[TaskRow.DISTANCE] = end * plant.stride[lane]
         episode.action[lane] = episode.last_action[lane] = 0.0
         episode.terminated[lane] = episode.truncated[lane] = False
+        episode.ending[lane] = Ending.NONE
         plant.clear(self.samples, lane)
         sample = plant.sample[:, lane]
         self.sensors.reset(lane, sample)
@@ -196,8 +196,11 @@ class Task:
             self.episode.idle[:] = False
 
     def run_passively(self) -> None:
-        """Run all lanes, reset to one speed, to the end without actuators, in one kernel call."""
-        self.plant.advance_passively(self.end(0), self.samples)
+        """Run all lanes, just reset, to their ends without actuators."""
+        idle, ended = np.zeros_like(self._action), np.zeros(self.lanes, dtype=np.bool_)
+        while not ended.all():
+            self.step(idle, skip=ended)
+            ended |= self.episode.terminated | self.episode.truncated
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's control steps so far, the same as its trajectory's summary.
@@ -216,7 +219,7 @@ class Task:
         is that of no line.
         """
         possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
-        if not possible:
+        if not possible or self.episode.ending[lane] == Ending.DIVERGED:
             plant = self.plant
             raise InputError(
                 f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
@@ -255,6 +258,21 @@ class Task:
             policy=policy,
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
+            ending=self.ending(lane),
+            line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(self.speed[lane])),
+        )
+
+    def ending(self, lane: int) -> str:
+        """Where and why a lane's run ended early, as a sentence; empty where it did not."""
+        ending = Ending(self.episode.ending[lane])
+        if ending is Ending.NONE:
+            return ""
+        plant = self.plant
+        time = float(plant.steps_done[lane] * plant.time_step)
+        position, line = time * float(self.speed[lane]), plant.catenary
+        return (
+            f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
+            f"{time:.2f} s): {reason(ending, line.free_uplift)}."
         )
 
 

@@ -62,9 +62,10 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     At the start of the line, at rest under the nominal force.
 
     ## Episode End
-    Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m or
-    contact is lost for 0.5 s; the rest of the run is then charged as if without contact. At the end
-    `info["figures"]` holds the episode's figures, those of `Trajectory.summary()`.
+    Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
+    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the rest of
+    the run is then charged as if without contact. At the end `info["figures"]` holds the figures of the
+    whole episode.
 
     ## Arguments
     {arguments}

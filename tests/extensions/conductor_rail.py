@@ -15,6 +15,7 @@ from .protocol import (
     advance_wire,
     apply_force,
     end_step,
+    ending_by_wire,
     look_at_contact,
     place_contact,
     record_wire,
@@ -89,6 +90,11 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, RailLine)
 def _end(line, wire, lane):
     pass
+
+
+@implements(ending_by_wire, RailLine)
+def _ending(line, wire, lane):
+    return 0
 
 
 @implements(record_wire, RailLine)

@@ -2,7 +2,7 @@
 
 A step of a lane goes: ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
 point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. Each operation has one source per
-class of line constants.
+class of line constants; what a run may end by is asked once a control step.
 
 A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
 the step is read there by the same weights by which the force acts there, so that the work that the force
@@ -134,6 +134,11 @@ def apply_force(line: Any, wire: Any, lane: int, contact: int, x: float, force: 
 @operation
 def end_step(line: Any, wire: Any, lane: int) -> None:
     """End the step of one lane."""
+
+
+@operation
+def ending_by_wire(line: Any, wire: Any, lane: int) -> Any:
+    """The ``Ending`` of one lane's run by what its wire does, ``Ending.NONE`` within the valid range."""
 
 
 @operation

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...base.table import Table
+from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
-from . import convergence, lines, reference, tables, wear, window
+from . import convergence, lines, reference, start, tables, wear, window
 from .lines import LineCheck
 from .reference import Check
+from .start import StartCheck
 from .wear import WearCheck
 from .window import WindowCheck
 
@@ -20,14 +22,16 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last four are empty where they were not asked for."""
+    """What was found; the last five are empty where they were not asked for."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
+    compliance: list[list[Criterion]]  # of each run, over the standard's spans
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
     lines: list[LineCheck]
+    start: list[StartCheck]
 
     @property
     def passed(self) -> bool:
@@ -43,6 +47,7 @@ class Validation:
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
             *([tables.lines_table(self.lines)] if self.lines else []),
+            *([tables.start_table(self.start)] if self.start else []),
         ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -50,10 +55,15 @@ class Validation:
         return {
             "passed": self.passed,
             "checks": [check.as_dict() for check in self.checks],
+            "compliance": [
+                {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
+                for run, criteria in zip(self.runs, self.compliance, strict=True)
+            ],
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
             "lines": [vars(check) for check in self.lines],
+            "start": [vars(check) for check in self.start],
         }
 
 
@@ -64,6 +74,7 @@ def run(
     with_windows: bool = False,
     with_wear: bool = False,
     with_lines: bool = False,
+    with_start: bool = False,
 ) -> Validation:
     """Run the standard's table, and whatever else is asked for."""
     report("the reference model")
@@ -86,4 +97,9 @@ def run(
     for name, speed in lines.cases() if with_lines else ():
         report(f"{name} at {speed:g} km/h")
         every += lines.check_line(name, speed)
-    return Validation(runs, reference.check(runs), rows, windows, worn, every)
+    starts: list[StartCheck] = []
+    for speed in start.SPEEDS_KMH if with_start else ():
+        report(f"the start of runs at {speed:g} km/h")
+        starts += start.check_start(speed)
+    compliance = [run.compliance(reference.SPANS) for run in runs]
+    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, every, starts)

@@ -8,7 +8,7 @@ from typing import Any
 from ...base.table import Table
 from ...metrics.labels import LABELS
 from ...terminal import number
-from . import convergence, lines, reference, wear, window
+from . import convergence, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
 
@@ -140,6 +140,23 @@ def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
         ),
         rows,
         section_ends=tuple(section_ends),
+    )
+
+
+def start_table(checks: Sequence[start.StartCheck]) -> Table:
+    """What the start does to σ, by the first span evaluated."""
+    rows = []
+    for speed in dict.fromkeys(check.speed_kmh for check in checks):
+        at_speed = [check for check in checks if check.speed_kmh == speed]
+        errors = (f"{check.rms:.1f} ({check.worst:.1f})" for check in at_speed)
+        rows.append((f"{speed:g}", str(at_speed[0].lines), *errors))
+    first, last = start.SETTLED
+    spans = (f"{check.first}-{check.last}" for check in checks[: len(start.FIRST_SPANS)])
+    return Table(
+        f"Error of σ over these spans beside spans {first} to {last} (%): rms over the lines (worst)",
+        ("km/h", "lines", *spans),
+        rows,
+        text_columns=0,
     )
 
 

@@ -10,7 +10,7 @@ from ...analysis.simulation import simulate
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
 from .convergence import in_use
-from .reference import REFERENCE_MODEL
+from .reference import LINE_SPANS, REFERENCE_MODEL
 
 WORN = LINE_CONDITIONS["worn"]
 CONDITIONS = (
@@ -27,7 +27,7 @@ DISCRETISATIONS = (
 SPEED_KMH = 300.0
 SEEDS = 10
 SPANS = (4, 9)
-"""As the benchmark: after the run-in, up to the end of a run."""
+"""To the end of a run on the reference line."""
 
 Spread = tuple[float, float]
 """Mean and standard deviation over SEEDS."""
@@ -59,6 +59,7 @@ def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
             SPEED_KMH,
             seed=seed,
             line_condition=condition,
+            spans=LINE_SPANS,
             record_droppers=False,
             **used.model_dump(),
         )

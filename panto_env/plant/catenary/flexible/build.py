@@ -11,6 +11,7 @@ from ....base.arrays import Array, Index
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
+from ...valid_range import LARGEST_SPEED
 from .grid import nodes_per_span, spring_levels, stencil_weights
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .resolution import Resolution
@@ -53,6 +54,7 @@ def constants(
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
     springs, links = _springs(data, masts, step), _droppers(data, shape, window)
+    room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
@@ -95,6 +97,8 @@ def constants(
         inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
         mobility=mobility,
         uplift_node=CONTACT * nodes + masts.astype(np.int64),
+        free_uplift=data.free_uplift,
+        largest_move=LARGEST_SPEED * step,
         spring_node=springs.wire * nodes + springs.node,
         spring_mobility=mobility[springs.wire, springs.node],
         spring_levels=springs.levels,
@@ -105,6 +109,7 @@ def constants(
         link_linear=linear.astype(real),
         link_yield=relative.astype(real),
         link_stiffness=links.stiffness.astype(real),
+        link_room=room.astype(real),
         link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
         link_gap=np.zeros((1, len(first)), dtype=real),
     )

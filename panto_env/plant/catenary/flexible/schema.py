@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -74,6 +75,17 @@ class FlexibleCatenaryData(CatenaryData):
     support: Support
     steady_arm: SteadyArm
     damping: Rayleigh
+
+    def reflections(self, frequency: float) -> tuple[float, float]:
+        """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
+
+        A dropper, stiff and without mass, joins two strings of impedances Z = sqrt(T m): Z_m / (Z_c + Z_m).
+        A spring k with a mass m sends back |K| / sqrt(K^2 + (2 omega Z_c)^2), K = k - omega^2 m.
+        """
+        contact, messenger = self.contact_wire.impedance, self.messenger_wire.impedance
+        omega = 2 * math.pi * frequency
+        arm = self.steady_arm.stiffness - omega**2 * self.steady_arm.mass
+        return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)
 
     @model_validator(mode="after")
     def _droppers_inside_span(self) -> Self:

@@ -11,17 +11,19 @@ acts on it. So the wire's displacement at the ends of a step is the mean of u be
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, implements, inlined
+from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
     apply_force,
     end_step,
+    ending_by_wire,
     look_at_contact,
     place_contact,
     record_wire,
     rise_at_contact,
 )
-from .line import CONTACT, FlexibleLine
-from .links import defect_row, first_link, measure_extensions, pull_links, shift_extensions
+from .line import CONTACT, LOWER, UPPER, FlexibleLine
+from .links import defect_row, difference, first_link, measure_extensions, pull_links, shift_extensions
 from .wires import (
     absorb,
     anchor,
@@ -132,6 +134,23 @@ def _end(line, wire, lane):
             anchor(d[w], last, -1)
         else:
             absorb(u[w], d[w], line.absorbing[w], last, -1)
+
+
+@implements(ending_by_wire, FlexibleLine)
+def _ending(line, wire, lane):
+    u, d = wire.all_displacement[lane], wire.all_increment[lane]
+    for s in range(line.uplift_node.size):
+        i = line.uplift_node[s] & NOT_NEGATIVE
+        if u[i] > line.free_uplift:
+            return ENDING.STOP if abs(d[i]) < line.largest_move else ENDING.DIVERGED
+    # The wires are nearest to each other at a dropper: between two, the contact wire hangs.
+    node, weight = line.link_node, line.link_weight
+    for k in range(line.link_room.size):
+        lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
+        if difference(u, lower, upper, weight[k]) < -line.link_room[k]:
+            closing = abs(difference(d, lower, upper, weight[k]))
+            return ENDING.WIRES if closing < line.largest_move else ENDING.DIVERGED
+    return ENDING.NONE
 
 
 @implements(record_wire, FlexibleLine)

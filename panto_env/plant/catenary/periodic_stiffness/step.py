@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from ....backend import implements, inlined
 from ...trigonometry import cosine_of_turns
+from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
     apply_force,
     end_step,
+    ending_by_wire,
     look_at_contact,
     place_contact,
     record_wire,
@@ -50,6 +52,11 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, PeriodicLine)
 def _end(line, wire, lane):
     pass
+
+
+@implements(ending_by_wire, PeriodicLine)
+def _ending(line, wire, lane):
+    return ENDING.NONE  # it has neither supports nor a second wire
 
 
 @implements(record_wire, PeriodicLine)

@@ -32,6 +32,7 @@ class ThreeSpanLine(NamedTuple):
     softness: Array  # (modes,): 1 / omega^2 (s^2)
     at_support: Array  # (2, modes): mode shapes at the two supports
     project: Array  # (modes, modes): modal coordinates in the next span from those in this one
+    free_uplift: float  # room for the uplift at a support up to the steady arm's stop (m)
 
 
 class ThreeSpanWire(NamedTuple):
@@ -137,6 +138,7 @@ def _constants(data: ThreeSpanData, time_step: float) -> ThreeSpanLine:
         softness=1 / frequency**2,
         at_support=mode_shapes(data, vectors, np.array([span, 2 * span])),
         project=project,
+        free_uplift=data.free_uplift,
     )
 
 

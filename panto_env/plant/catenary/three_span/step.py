@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from ....backend import implements, inlined
+from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
     apply_force,
     end_step,
+    ending_by_wire,
     look_at_contact,
     place_contact,
     record_wire,
@@ -102,12 +104,26 @@ def _end(line, wire, lane):
     pass
 
 
+@inlined
+def support_uplift(line, wire, lane, side):
+    """Uplift (m) at the support before the central span (side 0) or behind it (1)."""
+    total = 0.0
+    for m in range(line.at_support.shape[1]):
+        total += line.at_support[side, m] * wire.modal[lane, 0, m]
+    return total
+
+
+@implements(ending_by_wire, ThreeSpanLine)
+def _ending(line, wire, lane):
+    for side in range(2):
+        if support_uplift(line, wire, lane, side) > line.free_uplift:
+            return ENDING.STOP
+    return ENDING.NONE
+
+
 @implements(record_wire, ThreeSpanLine)
 def _record(line, wire, lane, uplift, tension):
     for side in range(2):
         support = wire.central_span[lane] - 1 + side
         if 0 <= support < uplift.size:
-            total = 0.0
-            for m in range(line.at_support.shape[1]):
-                total += line.at_support[side, m] * wire.modal[lane, 0, m]
-            uplift[support] = total
+            uplift[support] = support_uplift(line, wire, lane, side)
