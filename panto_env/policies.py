@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .base import plugins
 from .base.errors import InputError
-from .base.settings import suggest
+from .base.names import suggest
 from .control.context import Context
 
 

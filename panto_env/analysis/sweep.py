@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.settings import Settings, hint
+from ..base.names import hint
+from ..base.settings import Settings
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings
 from ..metrics.figures import Figures

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from .errors import InputError
+from .explanation import explain
+from .names import suggest
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+def _number(value: Any) -> Any:
+    """The value, unless it is text or a truth value, which pydantic would take for a number."""
+    if isinstance(value, str | bytes | bool):
+        raise PydanticCustomError("float_type", "must be a number")
+    return value
+
+
+Positive = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, BeforeValidator(_number), Field(ge=0, allow_inf_nan=False)]
 
 
 class Settings(BaseModel):
@@ -38,7 +47,7 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
         try:
             return kind.model_validate(dict(value))
         except ValidationError as error:
-            raise InputError(f"{name} is not valid: {explain(error)}.") from error
+            raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
     options = [f"'{preset}'" for preset in presets]
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
@@ -57,53 +66,3 @@ def parse_kind(
             f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
         )
     return parse(kinds[chosen], value, name, presets)
-
-
-def explain(error: ValidationError) -> str:
-    """One clause per problem: the key, what was expected, what was given."""
-    parts = []
-    for problem in error.errors():
-        key, given = _key(problem), problem["input"]
-        shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
-        parts.append(f"key '{key}': {message(problem)}{shown}" if key else message(problem))
-    return "; ".join(parts)
-
-
-def sentence(error: ValidationError) -> str:
-    """What is wrong with keyword arguments, in one sentence without its full stop."""
-    parts = []
-    for problem in error.errors():
-        cause = problem.get("ctx", {}).get("error")
-        if isinstance(cause, InputError):
-            parts.append(str(cause).removesuffix("."))
-            continue
-        words = message(problem).replace("Input should be", "must be")
-        parts.append(f"{_key(problem)} {words}, not {problem['input']!r}")
-    return "; ".join(parts)
-
-
-def message(problem: ErrorDetails) -> str:
-    """What Pydantic or a validator of ours says of one problem."""
-    return problem["msg"].removeprefix("Value error, ")
-
-
-def _key(problem: ErrorDetails) -> str:
-    """The dotted key that a problem is at."""
-    return ".".join(str(part) for part in problem["loc"])
-
-
-def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A clause with the nearest known name, if any is near, and all of them."""
-    return f"{hint(name, known)}known are {', '.join(known)}"
-
-
-def hint(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A question that names the nearest known name, or nothing if none is near."""
-    near = nearest(name, known)
-    return "" if near is None else f"did you mean '{near}'? "
-
-
-def nearest(name: str, known: list[str] | tuple[str, ...]) -> str | None:
-    """The known name that is nearest to a misspelt one, if any is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return near[0] if near else None

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.files import write_whole
-from ..base.settings import suggest
+from ..base.names import suggest
 from .record import Record, equal_step
 
 NAMES = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.settings import Positive
+from ...base.ranges import Between
 from .protocol import (
     CatenaryKind,
     StartPoint,
@@ -24,7 +24,9 @@ from .schema import CatenaryData
 
 class ConductorRailData(CatenaryData):
     kind: Literal["conductor_rail"] = "conductor_rail"
-    stiffness: Positive = Field(description="stiffness under the pantograph (N/m)")
+    stiffness: Annotated[float, Between(1e3, 1e8, "N/m")] = Field(
+        description="stiffness under the pantograph (N/m)"
+    )
 
 
 class RailLine(NamedTuple):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from ...base.errors import InputError
-from ...base.settings import NonNegative, Positive, Settings
+from ...base.ranges import Between
+from ...base.settings import Settings
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
+LONGEST_SPAN = 200.0  # m
+"""Two and a half times the longest of usual lines."""
 
 
 def check_span_count(spans: Any) -> int:
@@ -25,14 +28,21 @@ class CatenaryData(Settings):
     kind: str = Field(description="which of CATENARIES it is")
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
-    span_length: Positive = Field(description="distance between supports (m)")
-    spans: int = Field(ge=FEWEST_SPANS, le=MOST_SPANS, description="number of spans unless told otherwise")
+    span_length: Annotated[float, Between(2, LONGEST_SPAN, "m")] = Field(
+        description="distance between supports (m)"
+    )
+    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(
+        description="number of spans unless told otherwise"
+    )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
 
 class Wire(Settings):
     """A tensioned wire with bending stiffness."""
 
-    mass: Positive = Field(description="mass per length (kg/m)")
-    tension: Positive = Field(description="tension (N)")
-    bending_stiffness: NonNegative = Field(description="bending stiffness EI (N m^2)")
+    # Twin wires, and one equivalent wire for all, are up to five times those of one wire.
+    mass: Annotated[float, Between(0.05, 20, "kg/m")] = Field(description="mass per length (kg/m)")
+    tension: Annotated[float, Between(500, 200e3, "N")] = Field(description="tension (N)")
+    bending_stiffness: Annotated[float, Between(0, 1e5, "N m^2")] = Field(
+        description="bending stiffness EI (N m^2)"
+    )

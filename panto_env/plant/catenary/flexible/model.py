@@ -14,7 +14,7 @@ from .build import at_rest, constants, dropper_positions
 from .defects import DefectiveLine
 from .grid import time_step
 from .schema import FlexibleCatenaryData
-from .static_shape import solve
+from .static_shape import hang
 
 
 class FlexibleCatenary:
@@ -33,11 +33,11 @@ class FlexibleCatenary:
     ) -> None:
         """Build the line.
 
-        Raises InputError where grid and time step are not stable together, or the line has not what a
-        condition says is defective.
+        Raises InputError where the line can't hang so, grid and time step are not stable together, or the
+        line has not what a condition says is defective.
         """
         self.time_step = time_step(data, numerics)
-        shape = solve(data)
+        shape = hang(data)
         self.line = constants(data, shape, spans, numerics)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         self.length = spans * data.span_length
