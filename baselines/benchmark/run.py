@@ -10,7 +10,7 @@ from typing import Any
 
 from panto_env.analysis.pool import Progress, in_processes, one_by_one
 from panto_env.base.errors import InputError
-from panto_env.base.files import TABLES, finite, write_rows, write_whole
+from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -23,7 +23,8 @@ from .statistics import Cell, compare
 
 FIRST_SPAN = 4
 """First span that is evaluated by default: the three before it are the run-in from rest."""
-FORMATS = (".json", *TABLES)
+SUFFIXES = (".json", *TABLES)
+"""Of the file that an outcome is saved to."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,8 @@ class Benchmark:
 
     def save(self, path: str | Path) -> None:
         """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet."""
-        check_format(path)
-        if Path(path).suffix != ".json":
+        check_output(path, SUFFIXES)
+        if Path(path).suffix.lower() != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
             return
         with write_whole(path) as temporary:
@@ -85,12 +86,6 @@ def run(
     else:
         rows = in_processes(jobs, workers=workers, progress=progress)
     return Benchmark(settings, spans, tuple(rows), compare(rows))
-
-
-def check_format(path: str | Path) -> None:
-    """Raise InputError unless the suffix of the file is one of a known format."""
-    if Path(path).suffix not in FORMATS:
-        raise InputError(f"{path} must end in one of {', '.join(FORMATS)}.")
 
 
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import PICTURES, check_output, write_whole
 from ..metrics.low_pass import low_pass
 from ..metrics.spans import Spans, limits
 from ..metrics.trajectory import Trajectory
@@ -17,19 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Of files that a plot can be written to."""
-
-
-def check_plot(path: str | Path) -> None:
-    """Raise InputError unless a plot can be written under this name."""
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"The plot {path} must end in one of {', '.join(SUFFIXES)}.")
-
-
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
-    check_plot(path)
+    check_output(path, PICTURES)
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
 

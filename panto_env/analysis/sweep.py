@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -13,13 +14,15 @@ from typing import Any
 from ..base.errors import InputError
 from ..base.names import hint
 from ..base.settings import Settings
+from ..control import Task
 from ..control.arguments import check_arguments
-from ..control.settings import RunSettings, default, run_settings
+from ..control.settings import RunSettings, default, run_settings, speed_range
+from ..control.task import check_memory
 from ..metrics.figures import Figures
 from ..metrics.spans import Spans
 from ..policies import find_policy
 from .parameters import change, check_name, parameter_names
-from .pool import Progress, in_threads
+from .pool import Progress, in_threads, workers_for
 from .simulation import simulate
 
 SPEED = "speed_kmh"
@@ -74,13 +77,14 @@ def sweep(
         raise InputError("A sweep takes one condition of the line, not a list of them.")
     entries: dict[str, Settings] = {family: getattr(checked, family) for family in FAMILIES[:-1]}
     entries["line_condition"] = checked.line_condition[0]
-    given = settings | {"seed": seed}
+    given = {**settings, "seed": seed}
     _check(parameters, entries, policies)
     passes = [
         _prepare(dict(zip(parameters, values, strict=True)), policy, entries, given)
         for values in product(*parameters.values())
         for policy in policies
     ]
+    _check_memory(passes, workers)
     # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
     return in_threads(
         [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
@@ -106,6 +110,36 @@ def _check(
     passes = len(policies) * math.prod(len(values) for values in parameters.values())
     if passes > MOST_PASSES:
         raise InputError(f"This sweep has {passes:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
+
+
+def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
+    """Raise InputError where the records of as many passes as run at once don't fit into memory.
+
+    The longest in time is built, not run: it takes the most.
+    """
+    longest = max(passes, key=_seconds)
+    given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
+    with _named(longest):
+        needed = Task(run_settings(given)).memory
+    at_once = workers_for(len(passes), workers)
+    check_memory(at_once * needed, f"{at_once} passes at once", ", or fewer workers")
+
+
+def _seconds(one_pass: _Pass) -> float:
+    """About how long a train is under way (s)."""
+    line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
+    length = distance or line.span_length * line.spans
+    return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
+
+
+@contextmanager
+def _named(one_pass: _Pass) -> Iterator[None]:
+    """Within the body an InputError says at which values."""
+    try:
+        yield
+    except InputError as error:
+        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
+        raise InputError(f"At {at}: {error}") from error
 
 
 def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
@@ -152,12 +186,9 @@ def _prepare(
 
 
 def _row(one_pass: _Pass, spans: Spans | None) -> Row:
-    try:
+    with _named(one_pass):
         run = simulate(**{"record_droppers": False} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
-    except InputError as error:
-        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
-        raise InputError(f"At {at}: {error}") from error
     return {
         **one_pass.values,
         "policy": one_pass.policy,

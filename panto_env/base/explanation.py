@@ -58,6 +58,8 @@ def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]
     """One complaint per key; alternatives of a union, which complain one by one, are joined."""
     found: dict[str, Complaint] = {}
     for problem in error.errors():
+        if problem["type"] == "too_short" and problem["input"] and len(error.errors()) > 1:
+            continue  # entries that are wrong are not counted; what is wrong with them is told
         one = _complaint(problem, kind)
         before = found.get(one.key)
         if before is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -15,8 +14,9 @@ from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.sweep import MOST_PASSES, SPEED
 from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
+from ..base.files import TABLES, write_rows
 from ..metrics.labels import LABELS
-from ..terminal import Json, Plot, console, counting, number, print_json
+from ..terminal import Json, Plot, console, counting, number, print_json, writable
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -41,21 +41,18 @@ def sweep(
     spans: Spans = None,
     seed: Seed = 0,
     workers: Annotated[int | None, typer.Option(help="Threads; one per core unless told otherwise.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Save the table to this .csv or .parquet file.", callback=writable(TABLES)),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Run every value of one parameter, or every pair of two, and print the figures."""
-    from ..base import files
-
     values = _parse(parameters)
-    if output is not None:
-        files.check_table(output)
     if plot is not None:
-        from ..analysis.plots import check_plot, save
+        from ..analysis.plots import save
         from ..analysis.sweep_plots import plot_sweep
-
-        check_plot(plot)
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
     with counting("passes") as progress:
@@ -69,7 +66,7 @@ def sweep(
             **settings,
         )
     if output is not None:
-        files.write_rows(rows, output)
+        write_rows(rows, output)
     if plot is not None:
         save(plot_sweep(rows, list(values)), plot)
     if json:

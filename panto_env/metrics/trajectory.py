@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import check_output, write_whole
 from .figures import Figures, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import Spans, check_spans, limits, within
 
 FORMAT = 1
+SUFFIXES = (".parquet",)
+"""Of the file that a run is saved to."""
 SERIES = (
     "time",
     "position",
@@ -32,12 +34,6 @@ SERIES = (
     "frame_force",
     "head_force",
 )
-
-
-def check_run_file(path: str | Path) -> None:
-    """Raise InputError unless the name of a file is that of a run, a Parquet file."""
-    if Path(path).suffix != ".parquet":
-        raise InputError(f"A run is saved as Parquet: {path} must end in .parquet.")
 
 
 @dataclass(frozen=True)
@@ -126,7 +122,7 @@ class Trajectory:
 
         One column per series, and one per support and per dropper, by number.
         """
-        check_run_file(path)
+        check_output(path, SUFFIXES)
         import pyarrow as pa
         import pyarrow.parquet as pq
 
