@@ -99,7 +99,7 @@ def evaluate(
     """
     from panto_env.policies import find_policy
 
-    from .evaluation import Comparison, evaluated_spans, in_words
+    from .evaluation import Comparison, evaluated_spans, in_words, verdict
     from .policy import TrainedPolicy
     from .settings import arguments, speeds
 
@@ -118,7 +118,10 @@ def evaluate(
         picture = plots.plot_forces(runs, (policy, "passive"), (first_span, first_span + 1), title)
         plots.save(picture, plot)
     if json:
-        print_json({"policy": policy, "environment": environment, "passes": [p.as_dict() for p in pairs]})
+        ratio, qualified = verdict(pairs)
+        run = {"policy": policy, "environment": environment, "settings": comparison.settings}
+        found = {"ratio": ratio, "qualified": qualified}
+        print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
         return
     _print_pairs(pairs)
     console.print(f"mean of all: {in_words(pairs)}")

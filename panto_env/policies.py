@@ -64,6 +64,13 @@ def find_policy(source: Any) -> Policy:
     )
 
 
+def with_parameters(source: str, parameters: str) -> str:
+    """A policy's name with more parameters, "key=value,...", behind those that it may have."""
+    name = source.partition(":")[0]
+    colons = 2 if name.endswith(".py") else 1  # of which the last is before the parameters
+    return f"{source}{',' if source.count(':') >= colons else ':'}{parameters}"
+
+
 def policy_names() -> list[str]:
     """Names of all installed policies."""
     return list(plugins.installed(plugins.POLICIES))
@@ -122,7 +129,7 @@ def _policy_from_file(source: str, path: Path, text: str) -> Policy:
     """Policy of the class that ``text``, "Name" or "Name:key=value,...", names in a Python file."""
     name, _, parameters = text.partition(":")
     if not name:
-        raise InputError(f"Policy '{source}' must name a class in the file, as {source}:Name.")
+        raise InputError(f"Policy '{source}' must name a class in the file, as {path}:Name.")
     if not path.is_file():
         raise InputError(f"The Python file {path} does not exist; check the path.")
     content = _run_file(path.resolve(), path.stat().st_mtime_ns)

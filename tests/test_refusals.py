@@ -191,7 +191,7 @@ def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypa
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
     needed = Task(run_settings({"distance": 540.0})).memory
     monkeypatch.setattr("panto_env.control.task.memory", lambda: 1.5 * needed / MEMORY_SHARE)
-    with pytest.raises(InputError, match=r"The record of 2 passes at once would take 0.0 GB.* or fewer workers"):
+    with pytest.raises(InputError, match=r"The record of 2 passes at once would take .*, or fewer workers"):
         sweep({"pantograph.masses.0": [7.0, 8.0]}, distance=540.0, workers=2)
 
 
@@ -247,3 +247,66 @@ def test_a_folder_that_is_asked_for_is_made(tmp_path):
 def test_the_command_says_its_version(tmp_path):
     done = panto("--version", folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"panto-env {panto_env.__version__}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["simulate", "--spans", "²-3"], "--spans must read first-last, as 5-6, not '²-3'"),
+        (
+            ["simulate", "--distance", "0.1"],
+            "at least the 0.8333 m that a train covers in one control interval",
+        ),
+        (["simulate", "--distance", "60", "--control-interval", "5"], "at least the 416.7 m"),
+        (["simulate", "--distance", "1e9"], "distance must be at most 59,940 m on line 'en50318-2002'"),
+        (["simulate", "--line-spans", "2"], "A line's spans must be a whole number from 3 to 1000, not 2"),
+        (["simulate", "--policy", "own.py:"], "must name a class in the file, as own.py:Name"),
+        (["sweep", "speed_kmh=300:300:5"], "speed_kmh has the value 300 twice"),
+        (
+            ["sweep", "policy.gain=-1", "--policy", "own.py:Own"],
+            r"At policy.gain = -1: .*own.py:Own:gain=-1.0'",
+        ),
+        (["benchmark", "--config", "c.toml"], "key 'lines.0.spans.1' is missing"),
+        (
+            ["benchmark", "--config", "d.toml"],
+            r"key 'seeds' must be a whole number from 1 to 100,000, or a list",
+        ),
+        (["benchmark", "--config", "e.toml"], "This benchmark has 360,000 passes; 100,000 at most"),
+        (["benchmark", "--config", "f.toml"], r"'seed' is not known: did you mean 'seeds'\.$"),
+        (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, as \[250\]\.$"),
+        (["benchmark", "--config", "none.toml"], "The file none.toml does not exist"),
+        (["list", "p.toml"], "p.toml is not a valid entry: key 'masses' must hold at most 8 values"),
+    ],
+)
+def test_it_is_said_in_one_sentence_what_is_wrong(arguments, message, own, monkeypatch):
+    monkeypatch.chdir(own.parent)
+    configs = {
+        "c": "[[lines]]\nspans = [1]",
+        "d": "seeds = -1",
+        "e": "seeds = 90_000\npolicies = ['p']",
+        "f": "seed = 3",
+        "g": "[[lines]]\nspeeds_kmh = 250",
+    }
+    for name, text in configs.items():
+        (own.parent / f"{name}.toml").write_text(text)
+    dampers = "dampings = [1, 1, 1, 1, 1, 1, 1, 1, 1]\nstiffnesses = [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
+    (own.parent / "p.toml").write_text(
+        "kind = 'pantograph'\ndescription = ''\nmasses = [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
+        f"contact_stiffness = 5e4\nstatic_force = 70\naerodynamic_coefficient = 0\n{dampers}"
+    )
+    with pytest.raises(InputError, match=message) as caught:
+        command(*arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, None])
+def test_a_seed_is_a_whole_number_from_0_up(seed):
+    with pytest.raises(InputError, match="seed must be a whole number from 0 up"):
+        simulate(seed=seed, distance=60.0)
+
+
+def test_a_sweep_s_line_may_have_more_spans():
+    given = {"distance": 700.0, "record_droppers": False}
+    (row,) = sweep({"speed_kmh": [300.0]}, line_spans=14, distance=700.0)
+    assert row["std"] == simulate(spans=14, **given).summary().std
+    assert row["std"] != sweep({"speed_kmh": [300.0]}, line_spans=20, distance=600.0)[0]["std"]

@@ -187,7 +187,7 @@ def test_command_writes_the_rows_it_prints(tmp_path):
     )  # fmt: skip
     result = panto(*arguments, "--output", tmp_path / "s.parquet", "--plot", tmp_path / "s.png", "--json")
     assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = json.loads(result.stdout)["rows"]
     written = pyarrow.parquet.read_table(tmp_path / "s.parquet").to_pylist()
     assert [figures(row) for row in told] == [figures(row) for row in written]
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")

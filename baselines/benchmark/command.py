@@ -30,7 +30,7 @@ def benchmark(
         Path | None, typer.Option(help="TOML file; other options take precedence over it.")
     ] = None,
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
-    seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     output: Annotated[
         str | None,

@@ -8,10 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from panto_env.analysis.pool import Progress, in_processes, one_by_one
+from panto_env.analysis.pool import Progress, check_passes, in_processes, one_by_one
 from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
 from panto_env.base.machine import cores
+from panto_env.base.version import __version__
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.spans import last_whole_span
@@ -40,6 +41,7 @@ class Benchmark:
         """Everything, ready for JSON: nan becomes None."""
         table: dict[str, Any] = finite(
             {
+                "version": __version__,
                 "settings": self.settings.model_dump(mode="json"),
                 "spans": self.spans,
                 "cells": [asdict(cell) for cell in self.cells],
@@ -71,6 +73,8 @@ def run(
     workers = cores() if workers is None else workers
     if workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
+    passes = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
+    check_passes(passes * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy)
     spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)

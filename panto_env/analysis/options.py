@@ -20,7 +20,7 @@ OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 SIMPLE = (bool, int, float, str)
 
 Spans = Annotated[str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")]
-Seed = Annotated[int, typer.Option(help="Seed of irregularity and noise.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
 Command = Callable[..., None]
 
 
@@ -63,8 +63,8 @@ def parse_spans(text: str | None) -> tuple[int, int] | None:
     """Spans from "5-6". Raises InputError where the text is not two whole numbers."""
     if text is None:
         return None
-    first, dash, last = text.partition("-")
-    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
+    first, dash, last = (part.strip() for part in text.partition("-"))
+    if not (dash and first.isdecimal() and last.isdecimal()):
         raise InputError(f"--spans must read first-last, as 5-6, not '{text}'.")
     return int(first), int(last)
 

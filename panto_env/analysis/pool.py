@@ -19,7 +19,15 @@ Job = Callable[[], T]
 Progress = Callable[[int, int], None]
 """Called with the number of jobs done and of all."""
 
+MOST_PASSES = 100_000
+"""That a sweep or a benchmark may have: an hour and more, on two cores."""
 LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+def check_passes(count: int, what: str) -> None:
+    """Raise InputError where there are more passes than anyone would wait for."""
+    if count > MOST_PASSES:
+        raise InputError(f"{what} has {count:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
 
 
 def in_processes(

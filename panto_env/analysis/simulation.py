@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import reprlib
 from collections.abc import Callable
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,8 @@ def simulate(
     Raises InputError for what is not valid, TypeError for an unknown argument.
     """
     check_arguments(settings, RunSettings, "simulate")
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise InputError(f"seed must be a whole number from 0 up, not {seed!r}.")
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
     task = Task(run_settings(given), record_droppers=record_droppers)
     task.reset(0, np.random.default_rng(seed))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,18 +21,19 @@ from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..control.task import check_memory
 from ..metrics.figures import Figures
 from ..metrics.spans import Spans
-from ..policies import find_policy
+from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_names
-from .pool import Progress, in_threads, workers_for
+from .pool import Progress, check_passes, in_threads, workers_for
 from .simulation import simulate
 
 SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
 MOST_PARAMETERS = 2
-MOST_PASSES = 100_000
 
 Row = dict[str, Any]
+DISCRETISATION = ("time_step", "spacing", "window")
+"""Settings that a value may change by itself, and a row therefore tells."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, as ``pantograph.masses.0``."""
 
@@ -50,6 +52,7 @@ def sweep(
     *,
     policies: Sequence[str | Path | None] = (None,),
     spans: Spans | None = None,
+    line_spans: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -60,7 +63,8 @@ def sweep(
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1; the whole run by default. workers: threads, one per core by
+    figures cover, first and last from 1; the whole run by default. line_spans: ``spans`` of ``simulate``, how
+    many the line has. workers: threads, one per core by
     default; the outcome does not depend on it. progress: called with the passes done and of all.
     seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
@@ -72,6 +76,7 @@ def sweep(
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     check_arguments(settings, RunSettings, "sweep")
+    settings["spans"] = line_spans
     checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
@@ -107,9 +112,10 @@ def _check(
         _check_name(name, entries)
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
-    passes = len(policies) * math.prod(len(values) for values in parameters.values())
-    if passes > MOST_PASSES:
-        raise InputError(f"This sweep has {passes:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
+        twice = next((value for value, count in Counter(values).items() if count > 1), None)
+        if twice is not None:
+            raise InputError(f"{name} has the value {twice:g} twice; give each once.")
+    check_passes(len(policies) * math.prod(len(values) for values in parameters.values()), "This sweep")
 
 
 def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
@@ -178,7 +184,7 @@ def _prepare(
     if of_policy:
         if source is None:
             raise InputError(f"The passive pantograph has no {' or '.join(values)}; name a policy.")
-        source = f"{source}{',' if ':' in source else ':'}{','.join(of_policy)}"
+        source = with_parameters(source, ",".join(of_policy))
     if source is not None:
         find_policy(source)
     label = "passive" if policy is None else str(policy)
@@ -196,6 +202,7 @@ def _row(one_pass: _Pass, spans: Spans | None) -> Row:
         "pantograph": run.pantograph,
         "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
+        **{name: run.settings[name] for name in DISCRETISATION},
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,
         **figures.as_dict(),

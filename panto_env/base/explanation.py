@@ -73,8 +73,9 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
     key, given = ".".join(map(str, place)), reprlib.repr(problem["input"])
     match problem["type"]:
         case "missing":
-            field = fields[str(place[-1])]
-            return Complaint(key, f"is missing: {field.description or _table_of(field)}", "", False)
+            field = fields.get(str(place[-1]))  # none where a list is too short
+            words = f": {field.description or _table_of(field)}" if field is not None else ""
+            return Complaint(key, f"is missing{words}", "", False)
         case "extra_forbidden":
             known = [name for name in fields if name != "sources"]
             near = nearest(str(place[-1]), known)

@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from .errors import InputError
 from .explanation import explain
+from .inline import parse_inline
 from .names import suggest
 
 
@@ -34,23 +35,40 @@ S = TypeVar("S", bound=Settings)
 
 
 def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None = None) -> S:
-    """Settings from an instance, a table of its keys, or the name of a preset.
+    """Settings from an instance, a table of its keys, or a preset: "worn", or "worn:wear_depth=1e-3,...".
 
     Raises InputError, naming the argument and the key, where the value is not valid.
     """
     presets = presets or {}
     if isinstance(value, kind):
         return value
-    if isinstance(value, str) and value in presets:
-        return presets[value]
     if isinstance(value, Mapping):
-        try:
-            return kind.model_validate(dict(value))
-        except ValidationError as error:
-            raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
+        return _validated(kind, value, name)
+    if isinstance(value, str):
+        preset, _, changes = value.partition(":")
+        if preset in presets:
+            return _changed(presets[preset], changes, name)
     options = [f"'{preset}'" for preset in presets]
+    if presets:
+        options[-1] += f" (with values, as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
+
+
+def _changed(preset: S, changes: str, name: str) -> S:
+    """A preset with values of "key=value,..."."""
+    try:
+        given = parse_inline(changes)
+    except InputError as error:
+        raise InputError(f"{name} is not valid: {error}") from error
+    return _validated(type(preset), preset.model_dump() | given, name) if given else preset
+
+
+def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:
+    try:
+        return kind.model_validate(dict(table))
+    except ValidationError as error:
+        raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
 
 
 def parse_kind(

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from .. import __version__
 from ..base import plugins
 from ..base.errors import InputError
+from ..base.version import __version__
 
 
 def main() -> None:

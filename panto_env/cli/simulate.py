@@ -53,7 +53,8 @@ def simulate(
     if plot is not None:
         save(plot_run(trajectory, chosen), plot)
     if json:
-        print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
+        facts = _facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()}
+        print_json(facts | {"en50367": en50367.checks(figures, trajectory.speed_kmh / 3.6)})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
@@ -71,5 +72,14 @@ def simulate(
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:
-    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "nominal_force")
+    names = (
+        "catenary",
+        "pantograph",
+        "speed_kmh",
+        "policy",
+        "seed",
+        "terminated",
+        "nominal_force",
+        "settings",
+    )
     return {name: getattr(run, name) for name in names}

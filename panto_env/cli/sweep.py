@@ -11,10 +11,14 @@ import typer
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..analysis.sweep import MOST_PASSES, SPEED
+from ..analysis.pool import MOST_PASSES
+from ..analysis.sweep import SPEED
 from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
 from ..base.files import TABLES, write_rows
+from ..base.version import __version__
+from ..control.identity import plain
+from ..control.settings import run_settings
 from ..metrics.labels import LABELS
 from ..terminal import Json, Plot, console, counting, number, print_json, writable
 
@@ -55,11 +59,13 @@ def sweep(
         from ..analysis.sweep_plots import plot_sweep
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
+    line_spans = settings.pop("spans", None)
     with counting("passes") as progress:
         rows = run(
             values,
             policies=policy or (None,),
             spans=parse_spans(spans),
+            line_spans=line_spans,
             seed=seed,
             workers=workers,
             progress=progress,
@@ -70,7 +76,9 @@ def sweep(
     if plot is not None:
         save(plot_sweep(rows, list(values)), plot)
     if json:
-        print_json(rows)
+        used = plain(run_settings(settings | {"spans": line_spans}))
+        told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
+        print_json(told | {"rows": rows})
         return
     _print(rows, list(values), spans)
 

@@ -99,18 +99,20 @@ class RunSettings(Numerics):
         description="train speed (km/h): a number, or a range of two to draw from",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
-        "ideal", validate_default=True, description='actuator: "ideal", "realistic", or a table of its values'
+        "ideal",
+        validate_default=True,
+        description='actuator: "ideal", "realistic", one with values as "realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", or a table of their values',
+        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn", or a table; '
-        "of a list one is drawn per run",
+        description='condition of the line: "new", "fair", "worn", one with values and defects as '
+        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; of a list one is drawn per run',
     )
     pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"

@@ -13,6 +13,7 @@ from ..base.errors import InputError
 from ..base.machine import memory
 from ..metrics.figures import Figures
 from ..metrics.trajectory import Trajectory
+from ..plant.catenary.schema import MOST_SPANS
 from ..plant.line_condition import draw
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
@@ -20,6 +21,7 @@ from ..plant.sensors import Noise
 from ..plant.state import CONTACTS, SAMPLE_ROWS, Row
 from .context import Context
 from .episode import Episode, Flags
+from .identity import identity
 from .observation import layout
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
@@ -79,6 +81,12 @@ class Task:
         self.control_interval = settings.control_interval
         self.control_steps = _whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)
+        stride = self.speed_range[1] * self.control_interval
+        if self.distance < stride - 1e-9:
+            raise InputError(
+                f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
+                f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
+            )
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.episode = self._episode()
@@ -258,6 +266,7 @@ class Task:
             span_length=plant.catenary.span_length,
             time_step=plant.time_step,
             nominal_force=float(plant.nominal_force[lane]),
+            settings=identity(self.settings, plant, self.distance),
             policy=policy,
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
@@ -282,7 +291,13 @@ def _spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    return max(line.spans, math.ceil(settings.distance / line.span_length) + 1)
+    wanted = math.ceil(settings.distance / line.span_length) + 1
+    if wanted > MOST_SPANS:
+        longest = (MOST_SPANS - 1) * line.span_length
+        raise InputError(
+            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
+        )
+    return max(line.spans, wanted)
 
 
 def _whole_steps(control_interval: float, time_step: float) -> int:

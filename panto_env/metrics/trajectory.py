@@ -6,8 +6,10 @@ import dataclasses
 import json
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +62,7 @@ class Trajectory:
     span_length: float  # m
     time_step: float  # s
     nominal_force: float  # static and aerodynamic uplift (N)
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # that identify the run, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range

@@ -39,6 +39,7 @@ class RailWire(NamedTuple):
 
 class ConductorRail:
     massless = True
+    grid = {}  # noqa: RUF012 - nothing is added to it
     wave_speed = np.inf
     length = np.inf
 

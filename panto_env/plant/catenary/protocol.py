@@ -6,7 +6,7 @@ A step of a lane goes: ``advance_wire`` once; then, for each contact point, ``lo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
@@ -32,6 +32,7 @@ class CatenaryModel(Protocol):
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: what moves, in all lanes
     massless: bool  # whether the contact wire has no mass of its own
+    grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # how far a run can go (m)
     usual_end: float  # how far a run goes unless told otherwise (m)

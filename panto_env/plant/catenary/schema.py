@@ -18,7 +18,9 @@ LONGEST_SPAN = 200.0  # m
 def check_span_count(spans: Any) -> int:
     """Number of spans of a line. Raises InputError where it is none."""
     if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
-        raise InputError(f"spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}.")
+        raise InputError(
+            f"A line's spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}."
+        )
     return spans
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class FlexibleCatenary:
         shape = hang(data)
         self.line = constants(data, shape, spans, numerics)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+        self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)

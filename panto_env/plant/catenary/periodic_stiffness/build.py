@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,7 @@ class PeriodicStiffness:
     """A massless spring, which any grid and any time step can carry."""
 
     massless: bool = True
+    grid: Mapping[str, float] = {}
     wave_speed: float = np.inf  # no wave runs along a spring
     length: float = np.inf  # the line has no end
 
