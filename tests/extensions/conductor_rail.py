@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.settings import Positive
+from ...base.ranges import Between
 from .protocol import (
     CatenaryKind,
     StartPoint,
@@ -27,7 +27,9 @@ from .schema import CatenaryData
 
 class ConductorRailData(CatenaryData):
     kind: Literal["conductor_rail"] = "conductor_rail"
-    stiffness: Positive = Field(description="stiffness under the pantograph (N/m)")
+    stiffness: Annotated[float, Between(1e3, 1e8, "N/m")] = Field(
+        description="stiffness under the pantograph (N/m)"
+    )
 
 
 class RailLine(NamedTuple):
@@ -41,6 +43,7 @@ class RailWire(NamedTuple):
 class ConductorRail:
     massless = True
     contact_gain = 0.0
+    grid = {}  # noqa: RUF012 - nothing is added to it
     wave_speed = np.inf
     length = np.inf
 

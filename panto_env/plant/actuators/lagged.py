@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements
 from ...base.arrays import Array
-from ...base.settings import NonNegative, Positive
+from ...base.ranges import Between
 from ..state import CONTACTS, Place
 from .base import ActuatorSettings, drive
 
@@ -18,9 +18,13 @@ class LaggedActuator(ActuatorSettings):
     """Force that follows its command late."""
 
     kind: Literal["lagged"] = "lagged"
-    delay: NonNegative = Field(0.0, description="pure delay (s)")
-    lag: NonNegative = Field(0.0, description="time constant of the first-order lag (s)")
-    rate_limit: Positive | None = Field(None, description="largest change of force (N/s)")
+    delay: Annotated[float, Between(0, 1, "s")] = Field(0.0, description="pure delay (s)")
+    lag: Annotated[float, Between(0, 10, "s")] = Field(
+        0.0, description="time constant of the first-order lag (s)"
+    )
+    rate_limit: Annotated[float, Between(1, 1e8, "N/s")] | None = Field(
+        None, description="largest change of force (N/s)"
+    )
 
     def arrays(self, time_step: float, lanes: int) -> LaggedArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""

@@ -12,7 +12,7 @@ does on the wire is force times the change of that height, exactly, and no conta
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
@@ -39,6 +39,7 @@ class CatenaryModel(Protocol):
     wire: Any  # named tuple of arrays: what moves, in all lanes
     massless: bool  # whether the contact wire has no mass of its own
     contact_gain: float  # stiffness at which an explicit contact law gets unstable, inverted (m/N)
+    grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # how far a run can go (m)
     usual_end: float  # how far a run goes unless told otherwise (m)

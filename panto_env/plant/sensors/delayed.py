@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements, inlined, lane_table
 from ...base.arrays import Array
-from ...base.settings import NonNegative
+from ...base.ranges import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
 
@@ -22,10 +22,16 @@ class DelayedSensors(SensorSettings):
     """What is added to the readings of contact force, displacement and velocity."""
 
     kind: Literal["delayed"] = "delayed"
-    force_noise: NonNegative = Field(0.0, description="rms noise of the contact force (N)")
-    displacement_noise: NonNegative = Field(0.0, description="rms noise of displacements (m)")
-    velocity_noise: NonNegative = Field(0.0, description="rms noise of velocities (m/s)")
-    delay: NonNegative = Field(
+    force_noise: Annotated[float, Between(0, 1000, "N")] = Field(
+        0.0, description="rms noise of the contact force (N)"
+    )
+    displacement_noise: Annotated[float, Between(0, 0.1, "m")] = Field(
+        0.0, description="rms noise of displacements (m)"
+    )
+    velocity_noise: Annotated[float, Between(0, 10, "m/s")] = Field(
+        0.0, description="rms noise of velocities (m/s)"
+    )
+    delay: Annotated[float, Between(0, 1, "s")] = Field(
         0.0, description="age of a reading (s); at least half a time step, as it is a mean over one"
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....backend import CACHE_LINE, aligned_zeros
 from ....base.arrays import Array, Index
+from ....base.errors import InputError
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
@@ -19,6 +20,8 @@ from .schema import FlexibleCatenaryData
 from .static_shape import StaticShape
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
+MOST_NODES = 1_000_000
+"""Of a wire on its grid: more would take the memory of a machine, and a run of them days."""
 QUIET = 1e-25
 """Load (m per step) that keeps wires at rest away from subnormal numbers, which are slow; it moves a wire by
 less than 1e-15 m."""
@@ -45,12 +48,20 @@ class Links(NamedTuple):
 def constants(
     data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
 ) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans, each of a static shape, at a stable resolution."""
+    """Constants of an intact line of ``spans`` spans, each of a static shape, at a stable resolution.
+
+    Raises InputError where the nodes are too many.
+    """
     window = min(numerics.window or spans, spans)
     step, damping = resolution.time_step, data.damping
     per_span = nodes_per_span(data, resolution.spacing)
     dx = data.span_length / per_span
     nodes = window * per_span + 1 + 2 * PAD
+    if nodes > MOST_NODES:
+        raise InputError(
+            f"A grid of {dx:g} m over {window} spans of line '{data.name}' has {nodes:,} nodes a wire; "
+            f"{MOST_NODES:,} at most can be computed, so take a coarser spacing or a smaller window."
+        )
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
     springs, links = _springs(data, masts, step), _droppers(data, shape, window)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from .defects import DefectiveLine
 from .grid import contact_gain
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
-from .static_shape import solve
+from .static_shape import hang
 
 
 class FlexibleCatenary:
@@ -34,16 +34,17 @@ class FlexibleCatenary:
     ) -> None:
         """Build the line.
 
-        Raises InputError where grid and time step are not stable together, or the line has not what a
-        condition says is defective.
+        Raises InputError where the line can't hang so, grid and time step are not stable together, or the
+        line has not what a condition says is defective.
         """
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         check_speeds(data.name, self.wave_speed, runs.speeds)
         chosen = resolution(data, numerics, runs)
         self.time_step = chosen.time_step
-        shape = solve(data)
+        shape = hang(data)
         self.line = constants(data, shape, spans, numerics, chosen)
         self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
+        self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,7 @@ class PeriodicStiffness:
 
     massless: bool = True
     contact_gain: float = 0.0
+    grid: Mapping[str, float] = {}
     wave_speed: float = np.inf  # no wave runs along a spring
     length: float = np.inf  # the line has no end
 

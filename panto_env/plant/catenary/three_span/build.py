@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +49,7 @@ class ThreeSpan:
     """Paper 2's line; the wire has mass, but neither droppers nor an end."""
 
     massless: bool = False
+    grid: Mapping[str, float] = {}
     length: float = np.inf  # the line has no end
 
     def __init__(
