@@ -3,22 +3,39 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+import warnings
+from typing import Annotated, TextIO
 
 import typer
 
 from ..base import plugins
-from ..base.errors import InputError
+from ..base.errors import AccuracyWarning, InputError
 from ..base.version import __version__
 
 
 def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
+    warnings.showwarning = _show_warning
     try:
         make_app()()
     except InputError as error:
         print(f"panto: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Write our own warnings without the place in our sources, which tells the user nothing."""
+    if issubclass(category, AccuracyWarning):
+        print(f"panto: warning: {message}", file=sys.stderr)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def make_app() -> typer.Typer:

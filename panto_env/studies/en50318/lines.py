@@ -45,7 +45,7 @@ class LineCheck:
 
 def cases() -> Iterator[tuple[str, float]]:
     """Lines and speeds (km/h)."""
-    for name in available("catenaries"):
+    for name in available("catenary"):
         line = load_catenary(name)
         if not isinstance(line, FlexibleCatenaryData):
             continue

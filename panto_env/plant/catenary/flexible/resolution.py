@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....base.errors import InputError
+from ....base.errors import AccuracyWarning, InputError
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
@@ -65,6 +65,7 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
             f"At {3.6 * runs.speeds[0]:.3g} km/h a train passes the nodes of a grid of {found.spacing:.3g} m "
             f"{passed:.2g} times a second: a ripple of about 1 N at this frequency, which no line has, is in "
             "the contact force.",
+            AccuracyWarning,
             stacklevel=2,
         )
     return found
@@ -125,6 +126,7 @@ def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, wanted: Resol
     warnings.warn(
         f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
         f"line '{data.name}' needs at {speeds} ({wanted.spacing:.3g} m, {1e3 * wanted.time_step:.3g} ms): "
-        f"the standard deviation may be wrong by about {error:.0f} %, other figures by more.",
+        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
+        AccuracyWarning,
         stacklevel=2,
     )
