@@ -152,7 +152,7 @@ def _prepare(
 
 def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
     try:
-        run = simulate(**{"record_droppers": False} | one_pass.arguments)
+        run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
     except InputError as error:
         at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())

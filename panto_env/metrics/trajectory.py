@@ -65,7 +65,8 @@ class Trajectory:
     speed_kmh: float
     span_length: float  # m
     time_step: float  # s
-    nominal_force: float  # static and aerodynamic uplift (N)
+    nominal_force: float  # static force and aerodynamic uplift, as applied (N)
+    target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range

@@ -22,6 +22,11 @@ class PantographData(Settings):
     dampings: tuple[NonNegative, ...] = Field(
         description="dampers below each mass, the last to the ground (N s/m)"
     )
+    force: Literal["applied", "mean"] = Field(
+        "applied",
+        description="whether static force and aerodynamic uplift are applied as they are, or state the mean "
+        "contact force, for which the static force is trimmed: applied or mean",
+    )
     static_force: NonNegative = Field(description="lifting force on the lowest mass (N)")
     aerodynamic_coefficient: NonNegative = Field(
         description="aerodynamic uplift on the lowest mass per speed squared (N/(km/h)^2)"
