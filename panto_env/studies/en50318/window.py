@@ -41,7 +41,6 @@ def check_windows(
     catenary: str, pantograph: str, speed_kmh: float, windows: Sequence[int] = WINDOWS
 ) -> list[WindowCheck]:
     """Windows on a line of LINE_SPANS spans beside the whole line, over COMPARED."""
-
     # The same force under every window, also of a pantograph whose mean force is prescribed.
     panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})
 
