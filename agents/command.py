@@ -105,7 +105,7 @@ def evaluate(
     """
     from panto_env.policies import find_policy
 
-    from .evaluation import Comparison, in_words
+    from .evaluation import Comparison, in_words, verdict
     from .policy import TrainedPolicy
     from .settings import arguments, speeds
 
@@ -125,7 +125,10 @@ def evaluate(
         picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
         plots.save(picture, plot)
     if json:
-        print_json({"policy": policy, "environment": environment, "passes": [p.as_dict() for p in pairs]})
+        ratio, qualified = verdict(pairs)
+        run = {"policy": policy, "environment": environment, "settings": comparison.settings}
+        found = {"ratio": ratio, "qualified": qualified}
+        print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
         return
     _print_pairs(pairs)
     for speed_kmh in sorted({pair.speed_kmh for pair in pairs}):

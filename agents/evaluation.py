@@ -90,6 +90,12 @@ class Comparison:
     distance: float | None = None  # of a pass (m), by default until its start has died out and on
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
 
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What identifies the passes that have been run, but for speed and seed: plain data."""
+        run = next(iter(self._passive.values()))
+        return {name: value for name, value in run.settings.items() if name != "speed_kmh"}
+
     def run(self, policy: Any) -> list[Pair]:
         """Pairs at every speed and seed. Raises InputError where the policy does not fit the task."""
         return [

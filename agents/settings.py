@@ -10,7 +10,8 @@ from pydantic import Field, SerializeAsAny
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
-from panto_env.base.settings import Positive, Settings, parse, suggest
+from panto_env.base.names import suggest
+from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS

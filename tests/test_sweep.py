@@ -131,7 +131,11 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
         ({"catenary.mean_stiffness": [1]}, {}, "Unknown parameter 'catenary.mean_stiffness'"),
         ({"speed": [300]}, {}, r"did you mean 'speed_kmh'\?"),
         ({"policy": [300]}, {}, "Unknown parameter 'policy'"),
-        ({"pantograph.masses.0": [7.0, -7.0]}, {}, r"pantograph.masses.0 can't be -7: .* greater than 0"),
+        (
+            {"pantograph.masses.0": [7.0, -7.0]},
+            {},
+            r"pantograph.masses.0 can't be -7: must be a number from 0.1 to 200 kg",
+        ),
         ({"pantograph.masses.0": [float("nan")]}, {}, "can't be nan"),
         ({"pantograph.masses.0": []}, {}, "no values of pantograph.masses.0"),
         ({"catenary.spans": [12.5]}, {}, "catenary.spans can't be 12.5"),
@@ -182,7 +186,7 @@ def test_command_writes_the_rows_it_prints(tmp_path):
     )  # fmt: skip
     result = panto(*arguments, "--output", tmp_path / "s.parquet", "--plot", tmp_path / "s.png", "--json")
     assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = json.loads(result.stdout)["rows"]
     written = pyarrow.parquet.read_table(tmp_path / "s.parquet").to_pylist()
     assert [figures(row) for row in told] == [figures(row) for row in written]
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")

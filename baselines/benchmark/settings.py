@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
+from panto_env.analysis.pool import MOST_PASSES
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
@@ -93,8 +94,11 @@ class BenchmarkSettings(Settings):
     @field_validator("seeds", mode="before")
     @classmethod
     def _from_a_number_of_seeds(cls, value: Any) -> Any:
-        is_number = isinstance(value, int) and not isinstance(value, bool)
-        return tuple(range(value)) if is_number else value
+        if isinstance(value, int | float | str):
+            if not (isinstance(value, int) and 1 <= value <= MOST_PASSES and not isinstance(value, bool)):
+                raise ValueError(f"must be a whole number from 1 to {MOST_PASSES:,}, or a list of seeds")
+            return tuple(range(value))
+        return value
 
     @field_validator("policies", "seeds")
     @classmethod

@@ -27,7 +27,7 @@ Spans = Annotated[
         f"died out, from {FIRST_SETTLED} on."
     ),
 ]
-Seed = Annotated[int, typer.Option(help="Seed of irregularity and noise.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
 Command = Callable[..., None]
 
 
@@ -72,8 +72,8 @@ def parse_spans(text: str | None) -> SpanChoice:
         return None
     if text == "all":
         return "all"
-    first, dash, last = text.partition("-")
-    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
+    first, dash, last = (part.strip() for part in text.partition("-"))
+    if not (dash and first.isdecimal() and last.isdecimal()):
         raise InputError(f"--spans must read first-last, as 5-6, or all, not '{text}'.")
     spans = int(first), int(last)
     check_spans(spans)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import PICTURES, check_output, write_whole
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.spans import SpanChoice, Spans, in_words, limits, within
@@ -21,20 +20,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Of files that a plot can be written to."""
 SUPPORTS = "position (m); grey lines: supports"
-
-
-def check_plot(path: str | Path) -> None:
-    """Raise InputError unless a plot can be written under this name."""
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"The plot {path} must end in one of {', '.join(SUFFIXES)}.")
 
 
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
-    check_plot(path)
+    check_output(path, PICTURES)
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
 

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from .errors import InputError
+from .explanation import explain
+from .inline import parse_inline
+from .names import suggest
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+def _number(value: Any) -> Any:
+    """The value, unless it is text or a truth value, which pydantic would take for a number."""
+    if isinstance(value, str | bytes | bool):
+        raise PydanticCustomError("float_type", "must be a number")
+    return value
+
+
+Positive = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, BeforeValidator(_number), Field(ge=0, allow_inf_nan=False)]
 
 
 class Settings(BaseModel):
@@ -25,23 +35,40 @@ S = TypeVar("S", bound=Settings)
 
 
 def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None = None) -> S:
-    """Settings from an instance, a table of its keys, or the name of a preset.
+    """Settings from an instance, a table of its keys, or a preset: "worn", or "worn:wear_depth=1e-3,...".
 
     Raises InputError, naming the argument and the key, where the value is not valid.
     """
     presets = presets or {}
     if isinstance(value, kind):
         return value
-    if isinstance(value, str) and value in presets:
-        return presets[value]
     if isinstance(value, Mapping):
-        try:
-            return kind.model_validate(dict(value))
-        except ValidationError as error:
-            raise InputError(f"{name} is not valid: {explain(error)}.") from error
+        return _validated(kind, value, name)
+    if isinstance(value, str):
+        preset, _, changes = value.partition(":")
+        if preset in presets:
+            return _changed(presets[preset], changes, name)
     options = [f"'{preset}'" for preset in presets]
+    if presets:
+        options[-1] += f" (with values, as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
+
+
+def _changed(preset: S, changes: str, name: str) -> S:
+    """A preset with values of "key=value,..."."""
+    try:
+        given = parse_inline(changes)
+    except InputError as error:
+        raise InputError(f"{name} is not valid: {error}") from error
+    return _validated(type(preset), preset.model_dump() | given, name) if given else preset
+
+
+def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:
+    try:
+        return kind.model_validate(dict(table))
+    except ValidationError as error:
+        raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
 
 
 def parse_kind(
@@ -57,53 +84,3 @@ def parse_kind(
             f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
         )
     return parse(kinds[chosen], value, name, presets)
-
-
-def explain(error: ValidationError) -> str:
-    """One clause per problem: the key, what was expected, what was given."""
-    parts = []
-    for problem in error.errors():
-        key, given = _key(problem), problem["input"]
-        shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
-        parts.append(f"key '{key}': {message(problem)}{shown}" if key else message(problem))
-    return "; ".join(parts)
-
-
-def sentence(error: ValidationError) -> str:
-    """What is wrong with keyword arguments, in one sentence without its full stop."""
-    parts = []
-    for problem in error.errors():
-        cause = problem.get("ctx", {}).get("error")
-        if isinstance(cause, InputError):
-            parts.append(str(cause).removesuffix("."))
-            continue
-        words = message(problem).replace("Input should be", "must be")
-        parts.append(f"{_key(problem)} {words}, not {problem['input']!r}")
-    return "; ".join(parts)
-
-
-def message(problem: ErrorDetails) -> str:
-    """What Pydantic or a validator of ours says of one problem."""
-    return problem["msg"].removeprefix("Value error, ")
-
-
-def _key(problem: ErrorDetails) -> str:
-    """The dotted key that a problem is at."""
-    return ".".join(str(part) for part in problem["loc"])
-
-
-def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A clause with the nearest known name, if any is near, and all of them."""
-    return f"{hint(name, known)}known are {', '.join(known)}"
-
-
-def hint(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A question that names the nearest known name, or nothing if none is near."""
-    near = nearest(name, known)
-    return "" if near is None else f"did you mean '{near}'? "
-
-
-def nearest(name: str, known: list[str] | tuple[str, ...]) -> str | None:
-    """The known name that is nearest to a misspelt one, if any is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return near[0] if near else None

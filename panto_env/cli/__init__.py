@@ -7,13 +7,22 @@ from typing import Annotated
 
 import typer
 
-from .. import __version__
 from ..base import plugins
 from ..base.errors import InputError
+from ..base.version import __version__
 
 
 def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
+    try:
+        make_app()()
+    except InputError as error:
+        print(f"panto: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def make_app() -> typer.Typer:
+    """The command with all its sub-commands, those of installed packages too."""
     from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
@@ -32,13 +41,9 @@ def main() -> None:
     app.command()(identify.identify)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
-    try:
-        for name, point in plugins.installed(plugins.COMMANDS).items():
-            app.command(name)(plugins.load(point))
-        app()
-    except InputError as error:
-        print(f"panto: {error}", file=sys.stderr)
-        sys.exit(2)
+    for name, point in plugins.installed(plugins.COMMANDS).items():
+        app.command(name)(plugins.load(point))
+    return app
 
 
 def _show_version(wanted: bool) -> None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..base.errors import InputError
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..identification.pantograph_file import SUFFIXES
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console, writable
 
 if TYPE_CHECKING:
     from ..base.arrays import Array
@@ -53,7 +54,10 @@ def identify(
     static_force: Annotated[
         float | None, typer.Option(help="Lifting force of the pantograph written (N), else the mean force.")
     ] = None,
-    output: Annotated[Path | None, typer.Option(help="Write the pantograph to this TOML file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Write the pantograph to this TOML file.", callback=writable(SUFFIXES)),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -63,9 +67,7 @@ def identify(
     full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
     known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])])}
     if plot is not None:
-        from ..analysis.plots import check_plot, save
-
-        check_plot(plot)
+        from ..analysis.plots import save
     record = identification.read_record(file, dict(_pairs(unit or [])))
     with progress_console.status("identifying"):
         identified = identification.identify(record, known, band=band, free_offset=free_offset)

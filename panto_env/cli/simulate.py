@@ -13,8 +13,8 @@ from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
-from ..metrics.trajectory import Trajectory, check_run_file
-from ..terminal import Json, Plot, console, number, print_json, progress_console
+from ..metrics.trajectory import SUFFIXES, Trajectory
+from ..terminal import Json, Plot, console, number, print_json, progress_console, writable
 
 
 @with_settings(left_out=("observation",))
@@ -26,7 +26,10 @@ def simulate(
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    output: Annotated[str | None, typer.Option(help="Save the run to this Parquet file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Save the run to this Parquet file (.parquet).", callback=writable(SUFFIXES)),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -34,12 +37,8 @@ def simulate(
     from ..analysis.simulation import simulate as run
 
     chosen = parse_spans(spans)
-    if output is not None:
-        check_run_file(output)
     if plot is not None:
-        from ..analysis.plots import check_plot, plot_run, save
-
-        check_plot(plot)
+        from ..analysis.plots import plot_run, save
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
@@ -92,5 +91,6 @@ def _facts(run: Trajectory) -> dict[str, Any]:
         "ending",
         "nominal_force",
         "target_mean",
+        "settings",
     )
     return {name: getattr(run, name) for name in names}

@@ -21,6 +21,10 @@ def validate(
     wear: Annotated[
         bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
     ] = False,
+    lines: Annotated[
+        bool,
+        typer.Option("--lines", help="Print what the default grid and step cost on every line and speed."),
+    ] = False,
     start: Annotated[
         bool, typer.Option("--start", help="Print what the start of a run does to σ, by spans evaluated.")
     ] = False,
@@ -29,16 +33,15 @@ def validate(
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
     if plot is not None:
-        from ..analysis.plots import check_plot, save
+        from ..analysis.plots import save
         from ..studies.en50318.plots import plot_reference
-
-        check_plot(plot)
     with progress_console.status("validating") as status:
         validation = study.run(
             status.update,
             with_convergence=convergence,
             with_windows=window,
             with_wear=wear,
+            with_lines=lines,
             with_start=start,
         )
     if plot is not None:

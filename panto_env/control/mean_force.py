@@ -142,6 +142,7 @@ def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path:
 
 
 def _write(file: Path, force: float) -> None:
+    file.parent.mkdir(exist_ok=True)
     with write_whole(file) as temporary:
         temporary.write_text(json.dumps({"static_force": force, "check": _check(file, force)}))
 

@@ -14,7 +14,10 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..base.errors import InputError
-from ..base.settings import parse, sentence, suggest
+from ..base.explanation import sentence
+from ..base.names import suggest
+from ..base.ranges import Between
+from ..base.settings import parse
 from ..catalog import load_catenary, load_pantograph
 from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
@@ -82,6 +85,8 @@ def speed_range(speed_kmh: Any) -> tuple[float, float]:
     """Lowest and highest speed (km/h) of a number or a range; InputError where it is neither."""
     values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
     try:
+        if any(isinstance(value, str | bool) for value in values):  # float would take them
+            raise TypeError
         low, high = (float(value) for value in values)
     except (TypeError, ValueError) as error:
         raise InputError(
@@ -109,18 +114,20 @@ class RunSettings(Numerics):
         description="train speed (km/h): a number, or a range of two to draw from",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
-        "ideal", validate_default=True, description='actuator: "ideal", "realistic", or a table of its values'
+        "ideal",
+        validate_default=True,
+        description='actuator: "ideal", "realistic", one with values as "realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", or a table of their values',
+        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn", or a table; '
-        "of a list one is drawn per run",
+        description='condition of the line: "new", "fair", "worn", one with values and defects as '
+        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; of a list one is drawn per run',
     )
     mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
         None,
@@ -145,7 +152,9 @@ class RunSettings(Numerics):
         None, description="spans of the line; by default as the catalogue has it"
     )
     # Published active pantographs are controlled at 50-100 Hz.
-    control_interval: float = Field(0.01, description="time between two actions (s)")
+    control_interval: Annotated[float, Between(1e-4, 10, "s")] = Field(
+        0.01, description="time between two actions (s)"
+    )
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property
@@ -191,7 +200,7 @@ def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
     try:
         return kind.model_validate(dict(given))
     except ValidationError as error:
-        raise InputError(f"{sentence(error)}.") from error
+        raise InputError(f"{sentence(error, kind)}.") from error
 
 
 def check_names(given: Mapping[str, Any], what: str) -> None:

@@ -10,18 +10,22 @@ import numpy as np
 from ..backend import bind, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.machine import memory
 from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
+from ..plant.catenary.schema import MOST_SPANS
 from ..plant.line_condition import draw
+from ..plant.numerics import Runs
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
-from ..plant.state import Row
+from ..plant.state import CONTACTS, SAMPLE_ROWS, Row
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
 from .context import Context
 from .episode import Episode, Flags
+from .identity import identity
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .observation import layout
 from .running_figures import running_figures
@@ -29,8 +33,12 @@ from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
 from .step import control_step, observe_start
 
-LARGEST_FORCE = 1e5
-"""Contact force (N) beyond which, a thousand times any real one, a computation has diverged."""
+LARGEST_DEVIATION = 2e3
+"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
+COPIES = 2
+"""How often a record lies in memory: as it is written, and as a trajectory."""
+MEMORY_SHARE = 0.7
+"""Of the machine's memory that records may take."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 
@@ -47,7 +55,7 @@ class Task:
         record_droppers: bool = False,
         trim: Trim | None = None,
     ) -> None:
-        """Build the plant and the arrays of an episode.
+        """Build the plant and the arrays of an episode; ``memory`` says what its record takes (bytes).
 
         keep_samples: keep those of a whole episode, for ``trajectory``; record_droppers: with the tension
         of every dropper. trim: static force, where a mean force is to be met; by default that of the line and
@@ -63,7 +71,7 @@ class Task:
             spans=_spans(settings),
             numerics=settings.numerics,
             actuator=settings.actuator,
-            conditions=settings.line_condition,
+            runs=_runs(settings),
             bilateral=settings.bilateral,
             varied=settings.pantograph_scatter > 0,
         )
@@ -76,6 +84,12 @@ class Task:
         self.control_interval = settings.control_interval
         self.control_steps = _whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)
+        stride = self.speed_range[1] * self.control_interval
+        if self.distance < stride - 1e-9:
+            raise InputError(
+                f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
+                f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
+            )
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
@@ -89,6 +103,10 @@ class Task:
         self._record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
+        columns = CONTACTS * SAMPLE_ROWS + len(plant.model.supports)
+        columns += len(plant.model.droppers) if record_droppers else 0
+        self.memory = COPIES * lanes * rows * columns * np.dtype(float).itemsize
+        check_memory(self.memory, f"{rows - 1:,} time steps with {len(plant.model.supports)} supports")
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
         self._threads = lane_threads(lanes, plant.lanes_abreast)
@@ -223,14 +241,15 @@ class Task:
         plant = self.plant
         nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
         figures = self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
-        self._refuse_divergence(
-            lane, np.array([figures.mean, figures.max, figures.min]), plant.sample[Row.WIRE_HEIGHT, lane]
-        )
+        deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
+        self._refuse_divergence(lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
         return figures
 
-    def _refuse_divergence(self, lane: int, force: Array, height: Array) -> None:
-        """Raise InputError where a lane's contact force (N) or wire height (m) is that of no line."""
-        possible = (np.abs(force) < LARGEST_FORCE).all() and (np.abs(height) < LARGEST_HEIGHT).all()
+    def _refuse_divergence(self, lane: int, deviation: float, height: Array) -> None:
+        """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
+        is that of no line.
+        """
+        possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
         if not possible or self.episode.ending[lane] == Ending.DIVERGED:
             plant = self.plant
             raise InputError(
@@ -248,7 +267,8 @@ class Task:
         """Record of a lane's run so far. Raises InputError where its computation diverged."""
         plant, steps = self.plant, int(self.plant.steps_done[lane])
         rows = self.samples.rows[lane, 1 : steps + 1, 0]
-        self._refuse_divergence(lane, rows[:, Row.CONTACT_FORCE], rows[:, Row.WIRE_HEIGHT])
+        deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
+        self._refuse_divergence(lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
         middle = (np.arange(steps) + 0.5) * plant.time_step
         return Trajectory(
             time=middle,
@@ -272,6 +292,7 @@ class Task:
             time_step=plant.time_step,
             nominal_force=float(plant.nominal_force[lane]),
             target_mean=self.target_mean(lane),
+            settings=identity(self.settings, plant, self.distance),
             policy=policy,
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
@@ -313,12 +334,38 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
     return mean
 
 
+def _runs(settings: RunSettings) -> Runs:
+    """What the plant must be good for."""
+    slow, quick = settings.speed_kmh
+    pantograph, interval = settings.pantograph, settings.control_interval
+    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
+
+
+def check_memory(needed: float, what: str, remedy: str = "") -> None:
+    """Raise InputError unless the machine has the memory (bytes) for the record of a run, or of several.
+
+    remedy: what else helps, beginning with ", or".
+    """
+    if needed > MEMORY_SHARE * memory():
+        raise InputError(
+            f"The record of {what} would take {needed / 1e9:,.1f} GB, and this machine has "
+            f"{memory() / 1e9:,.1f} GB of memory; take a shorter distance, fewer spans, a higher speed or a "
+            f"longer time step{remedy}."
+        )
+
+
 def _spans(settings: RunSettings) -> int | None:
     """Spans of the line: a line too short for the distance asked for gets more, unless told how many."""
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    return max(line.spans, math.ceil(settings.distance / line.span_length) + 1)
+    wanted = math.ceil(settings.distance / line.span_length) + 1
+    if wanted > MOST_SPANS:
+        longest = (MOST_SPANS - 1) * line.span_length
+        raise InputError(
+            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
+        )
+    return max(line.spans, wanted)
 
 
 def _whole_steps(control_interval: float, time_step: float) -> int:

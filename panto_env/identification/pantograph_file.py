@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 
 from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import check_output, write_whole
 from .fit import Fit
+
+SUFFIXES = (".toml",)
+"""Of the file that a pantograph is written to."""
 
 
 def write_pantograph(
@@ -18,9 +21,7 @@ def write_pantograph(
     record: name of the record, for the sources. static_force: lifting force (N), and where it is from.
     Raises InputError for a file that is not .toml, and for parameters that no pantograph can have.
     """
-    path = Path(path)
-    if path.suffix != ".toml":
-        raise InputError(f"The pantograph file {path} must end in .toml.")
+    check_output(path, SUFFIXES)
     p = fit.parameters
     impossible = [name for name, value in p.items() if not (value > 0 if name[0] == "m" else value >= 0)]
     if impossible:

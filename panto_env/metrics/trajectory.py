@@ -6,15 +6,17 @@ import dataclasses
 import json
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import check_output, write_whole
 from .compliance import LineFacts, compliance
 from .criterion import Criterion
 from .figures import Figures, arcing, contact_loss, cost_function
@@ -22,6 +24,8 @@ from .low_pass import low_pass
 from .spans import SpanChoice, Spans, chosen_spans, limits, within
 
 FORMAT = 2
+SUFFIXES = (".parquet",)
+"""Of the file that a run is saved to."""
 SERIES = (
     "time",
     "position",
@@ -34,12 +38,6 @@ SERIES = (
     "frame_force",
     "head_force",
 )
-
-
-def check_run_file(path: str | Path) -> None:
-    """Raise InputError unless the name of a file is that of a run, a Parquet file."""
-    if Path(path).suffix != ".parquet":
-        raise InputError(f"A run is saved as Parquet: {path} must end in .parquet.")
 
 
 @dataclass(frozen=True)
@@ -67,6 +65,7 @@ class Trajectory:
     time_step: float  # s
     nominal_force: float  # static force and aerodynamic uplift, as applied (N)
     target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # that identify the run, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
@@ -167,7 +166,7 @@ class Trajectory:
 
         One column per series, and one per support and per dropper, by number.
         """
-        check_run_file(path)
+        check_output(path, SUFFIXES)
         import pyarrow as pa
         import pyarrow.parquet as pq
 

@@ -9,7 +9,8 @@ from typing import Any
 from ...base.table import Table
 from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
-from . import convergence, reference, start, tables, wear, window
+from . import convergence, lines, reference, start, tables, wear, window
+from .lines import LineCheck
 from .reference import Check
 from .start import StartCheck
 from .wear import WearCheck
@@ -21,7 +22,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last four are empty where they were not asked for."""
+    """What was found; the last five are empty where they were not asked for."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
@@ -29,6 +30,7 @@ class Validation:
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
+    lines: list[LineCheck]
     start: list[StartCheck]
 
     @property
@@ -44,6 +46,7 @@ class Validation:
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
+            *([tables.lines_table(self.lines)] if self.lines else []),
             *([tables.start_table(self.start)] if self.start else []),
         ]
 
@@ -59,6 +62,7 @@ class Validation:
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
+            "lines": [vars(check) for check in self.lines],
             "start": [vars(check) for check in self.start],
         }
 
@@ -69,6 +73,7 @@ def run(
     with_convergence: bool = False,
     with_windows: bool = False,
     with_wear: bool = False,
+    with_lines: bool = False,
     with_start: bool = False,
 ) -> Validation:
     """Run the standard's table, and whatever else is asked for."""
@@ -88,9 +93,13 @@ def run(
         for numerics in wear.DISCRETISATIONS:
             report(f"{condition}, {numerics}")
             worn.append(wear.check_wear(condition, numerics))
+    every: list[LineCheck] = []
+    for name, speed in lines.cases() if with_lines else ():
+        report(f"{name} at {speed:g} km/h")
+        every += lines.check_line(name, speed)
     starts: list[StartCheck] = []
     for speed in start.SPEEDS_KMH if with_start else ():
         report(f"the start of runs at {speed:g} km/h")
         starts += start.check_start(speed)
     compliance = [run.compliance(reference.SPANS) for run in runs]
-    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, starts)
+    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, every, starts)

@@ -172,7 +172,7 @@ def _speeds(results: Results) -> Table:
 
 
 def _fine(results: Results) -> Table:
-    numerics = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    numerics = {False: "as usual", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
     rows = [
         (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
         for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)

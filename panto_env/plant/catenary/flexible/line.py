@@ -60,8 +60,9 @@ class FlexibleWire(NamedTuple):
     all_increment: Array  # (lanes, all nodes): the same memory as ``increment``
     blend: Array  # (lanes, nodes): what the stencil acts on, scratch (m)
     first_span: Index  # (lanes,): spans that the window has travelled
-    position: Array  # (lanes, contacts): of the contact points (m)
-    force: Array  # (lanes, contacts): contact force over the last step (N)
+    contact_node: Index  # (lanes, contacts): first of the four nodes about a contact point
+    contact_weight: Array  # (lanes, contacts, 4): of these nodes
+    unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, springs): increment before the step, scratch (m)
     # Extensions are about static, less the gap of a link that is slack there.
     extension: Array  # (lanes, 2 times, links): before the step and at its start (m)

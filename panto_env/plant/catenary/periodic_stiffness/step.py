@@ -5,7 +5,16 @@ from __future__ import annotations
 from ....backend import implements, inlined
 from ...trigonometry import cosine_of_turns
 from ...valid_range import ENDING
-from ..protocol import advance_wire, apply_force, end_step, ending_by_wire, look_at_contact, record_wire
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    ending_by_wire,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .build import PeriodicLine
 
 
@@ -15,9 +24,19 @@ def stiffness(line, x):
     return line.mean * (1.0 + line.variation * cosine_of_turns(line.spans_per_metre * x))
 
 
+@implements(place_contact, PeriodicLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(rise_at_contact, PeriodicLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    return 0.0
+
+
 @implements(look_at_contact, PeriodicLine)
 def _look(line, wire, lane, contact, x):
-    return 0.0, 0.0, 1.0 / stiffness(line, x)
+    return 0.0, 0.0, 0.0, 1.0 / stiffness(line, x)
 
 
 @implements(advance_wire, PeriodicLine)
