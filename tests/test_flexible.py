@@ -147,7 +147,8 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, 
 def test_agrees_with_finite_elements(speed):
     """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
-    run = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4, **WHOLE)
+    fine = {"spacing": 0.125, "time_step": 2.5e-4, "distance": 361.0} | WHOLE
+    run = simulate("en50318-2002", "en50318-2002", speed, **fine)
     ours = run.summary((5, 6))
     other = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
     theirs = finite_element.figures(other, line.span_length)
@@ -171,18 +172,20 @@ def test_agrees_with_finite_elements(speed):
     ],
 )
 def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
-    data, panto = load_catenary(line), load_pantograph(pantograph)
-    ours = simulate(line, pantograph, speed, spacing=0.125, time_step=1.25e-4, **WHOLE).summary((5, 6))
-    other = finite_element.simulate(
-        data, panto, speed, element=0.25, time_step=2.5e-4, distance=6.1 * data.span_length
-    )
+    data = load_catenary(line)
+    panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
+    distance = 6.1 * data.span_length
+    fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
+    ours = simulate(line, panto, speed, **fine).summary((5, 6))
+    other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
     assert ours.std == pytest.approx(finite_element.figures(other, data.span_length).std, rel=0.02)
 
 
 @pytest.mark.parametrize("speed", [250.0, 300.0])
 def test_default_grid_and_step_are_converged(speed):
-    run = simulate("en50318-2002", "en50318-2002", speed)
-    fine = simulate("en50318-2002", "en50318-2002", speed, spacing=0.125, time_step=2.5e-4, **WHOLE)
+    given = ("en50318-2002", "en50318-2002", speed)
+    run = simulate(*given, distance=361.0)
+    fine = simulate(*given, distance=361.0, spacing=0.125, time_step=2.5e-4, **WHOLE)
     assert run.summary((5, 6)).std == pytest.approx(fine.summary((5, 6)).std, rel=0.01)
 
 
@@ -190,7 +193,7 @@ def test_default_grid_and_step_are_converged(speed):
 def test_at_350_kmh_the_default_is_converged_and_the_fast_grid_nearly(accuracy, error):
     """As docs/validation.md says: waves ahead of the train are short there."""
     ours, fine = (
-        simulate(speed_kmh=350.0, record_droppers=False, **each).summary((5, 6)).std
+        simulate(speed_kmh=350.0, distance=361.0, **each).summary((5, 6)).std
         for each in ({"accuracy": accuracy}, {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE)
     )
     assert ours == pytest.approx(fine, rel=error)

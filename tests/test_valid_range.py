@@ -18,7 +18,7 @@ from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
 from panto_env.plant.catenary.protocol import ending_by_wire
 from panto_env.plant.line_condition import DrawnLine, LineCondition
-from panto_env.plant.numerics import Numerics
+from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.valid_range import FREE_UPLIFT, Ending
 
 PANTO = Path(sys.executable).with_name("panto")
@@ -84,10 +84,10 @@ def _ask(line, wire, answer):
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     """Mid-span the dropper is 0.741 m long: the messenger may sink by so much, and no more."""
-    data, condition = load_catenary("benchmark-2015"), LineCondition()
+    data = load_catenary("benchmark-2015")
     numerics = Numerics(window=5, precision=precision)
-    model = CATENARIES["flexible"].model(data, lanes=1, spans=10, numerics=numerics, conditions=(condition,))
-    model.settle(0, DrawnLine(condition), 0.0)
+    model = CATENARIES["flexible"].model(data, lanes=1, spans=10, numerics=numerics, runs=Runs())
+    model.settle(0, DrawnLine(LineCondition()), 0.0)
     line, wire, answer = model.line, model.wire, np.zeros(1, dtype=np.int64)
     wire.increment[:] = 0.01  # m in a step: 4 m/s
     middle = PAD + round(2.5 * data.span_length / line.spacing) + np.arange(-3, 4)

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..control import Task
+from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
+from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..policies import Policy, errors_name, find_policy
 
@@ -29,14 +30,16 @@ def simulate(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
     record_droppers: bool = True,
+    evaluated: SpanChoice = None,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
 
     policy: None, a name ("pd"), a model file, or an object with reset and act, which is called by its
     ``name`` if it has one, else by its class. seed: of the line's irregularity and the sensors' noise.
-    progress: called with the share done. record_droppers: keep the tension of every dropper. catenary,
-    pantograph, speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
+    progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
+    spans over which a mean force is met, as ``Trajectory.summary`` takes them. catenary, pantograph,
+    speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
     ``help(panto_env.envs.PantographEnv)``.
 
     A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
@@ -48,7 +51,9 @@ def simulate(
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed must be a whole number from 0 up, not {seed!r}.")
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
-    task = Task(far_enough(run_settings(given)), record_droppers=record_droppers)
+    checked = far_enough(run_settings(given))
+    trim = trim_of_pass(checked, seed, evaluated, passive_mean)
+    task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, np.random.default_rng(seed))
     if policy is None:
         task.run_passively()

@@ -193,7 +193,7 @@ def _prepare(
 
 def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
     with _named(one_pass):
-        run = simulate(**{"record_droppers": False} | one_pass.arguments)
+        run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
     return {
         **one_pass.values,

@@ -9,6 +9,7 @@ With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
 from .block import LANES_ABREAST, new_block, new_blocks
+from .cache import cache_folder
 from .compile import JIT, constants, inlined, kernel, python_function, subroutine
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, floor
@@ -24,6 +25,7 @@ __all__ = [
     "LaneThreads",
     "aligned_zeros",
     "bind",
+    "cache_folder",
     "constants",
     "floor",
     "implements",

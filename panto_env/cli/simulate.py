@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -45,6 +46,7 @@ def simulate(
         trajectory = run(
             policy=policy,
             seed=seed,
+            evaluated=chosen,
             progress=lambda share: progress.update(bar, completed=share),
             **settings,
         )
@@ -69,6 +71,11 @@ def simulate(
         table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
     console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
+    if not math.isnan(trajectory.target_mean):
+        console.print(
+            f"Applied force {trajectory.nominal_force:.1f} N, trimmed for a passive mean of "
+            f"{trajectory.target_mean:.1f} N."
+        )
     console.print(table)
     print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
 
@@ -83,6 +90,7 @@ def _facts(run: Trajectory) -> dict[str, Any]:
         "terminated",
         "ending",
         "nominal_force",
+        "target_mean",
         "settings",
     )
     return {name: getattr(run, name) for name in names}

@@ -67,6 +67,20 @@ def _scatter(value: Any) -> float:
     return value
 
 
+def _mean_force(value: Any) -> float | str | None:
+    if value is None:
+        return None
+    if isinstance(value, str) and value == "en50367":
+        return "en50367"
+    try:
+        force = float(value)
+    except (TypeError, ValueError):
+        force = math.nan
+    if isinstance(value, bool) or not (math.isfinite(force) and force > 0):
+        raise InputError(f"mean_force must be a positive number (N) or 'en50367', not {value!r}.")
+    return force
+
+
 def speed_range(speed_kmh: Any) -> tuple[float, float]:
     """Lowest and highest speed (km/h) of a number or a range; InputError where it is neither."""
     values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
@@ -114,6 +128,11 @@ class RunSettings(Numerics):
         validate_default=True,
         description='condition of the line: "new", "fair", "worn", one with values and defects as '
         '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; of a list one is drawn per run',
+    )
+    mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
+        None,
+        description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
+        "standard's largest; by default as the pantograph says: its force applied, or met by the mean",
     )
     pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"

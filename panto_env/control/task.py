@@ -13,6 +13,7 @@ from ..base.errors import InputError
 from ..base.machine import memory
 from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
+from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.line_condition import draw
@@ -25,6 +26,7 @@ from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
 from .context import Context
 from .episode import Episode, Flags
 from .identity import identity
+from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .observation import layout
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
@@ -51,11 +53,13 @@ class Task:
         lanes: int = 1,
         keep_samples: bool = True,
         record_droppers: bool = False,
+        trim: Trim | None = None,
     ) -> None:
         """Build the plant and the arrays of an episode; ``memory`` says what its record takes (bytes).
 
         keep_samples: keep those of a whole episode, for ``trajectory``; record_droppers: with the tension
-        of every dropper. Raises InputError for what is not valid together.
+        of every dropper. trim: static force, where a mean force is to be met; by default that of the line and
+        the pantograph as designed. Raises InputError for what is not valid together.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
@@ -88,6 +92,7 @@ class Task:
             )
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
+        self.trim = trim
         self.episode = self._episode()
         self.reward = self.episode.table[TaskRow.REWARD, :lanes]
         self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, :lanes]
@@ -153,7 +158,8 @@ class Task:
         speed = low if low == high else float(random.uniform(low, high))
         plant, episode, scatter = self.plant, self.episode, self.settings.pantograph_scatter
         line = draw(self.settings.line_condition, random, len(plant.model.droppers))
-        plant.start(lane, speed, line, with_scatter(plant.pantograph, scatter, random) if scatter else None)
+        own = with_scatter(plant.pantograph, scatter, random) if scatter else None
+        plant.start(lane, speed, line, own, self._static_force(speed))
         self.speed[lane] = speed
         end = self._steps(speed)
         column = episode.table[:, lane]
@@ -173,6 +179,14 @@ class Task:
             self._noise.start(lane, random)
             self._noise.write(self.sensors.noise, np.array([lane]))
         self._observe_start(lane, lane + 1)
+
+    def _static_force(self, speed: float) -> float | None:
+        """Static force (N) at a speed (m/s) where a mean force is to be met, else None."""
+        if target_mean(self.settings, speed) is None:
+            return None
+        if self.trim is None:
+            self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
+        return self.trim.static_force(speed)
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -244,6 +258,11 @@ class Task:
                 f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
             )
 
+    def target_mean(self, lane: int) -> float:
+        """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
+        target = target_mean(self.settings, float(self.speed[lane]))
+        return math.nan if target is None else target
+
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
         """Record of a lane's run so far. Raises InputError where its computation diverged."""
         plant, steps = self.plant, int(self.plant.steps_done[lane])
@@ -272,6 +291,7 @@ class Task:
             span_length=plant.catenary.span_length,
             time_step=plant.time_step,
             nominal_force=float(plant.nominal_force[lane]),
+            target_mean=self.target_mean(lane),
             settings=identity(self.settings, plant, self.distance),
             policy=policy,
             seed=seed,
@@ -292,6 +312,26 @@ class Task:
             f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
             f"{time:.2f} s): {reason(ending, line.free_uplift)}."
         )
+
+
+def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
+    """Mean force of a pass without a policy, over the spans, as a function of the static force."""
+    task = Task(settings)
+
+    def mean(force: float) -> float:
+        task.trim = Trim((0.0,), (force,))
+        task.reset(0, np.random.default_rng(seed))
+        task.run_passively()
+        run = task.trajectory(0)
+        if run.terminated:
+            raise InputError(
+                f"A mean force of {run.target_mean:.1f} N cannot be met by '{run.pantograph}' on "
+                f"'{run.catenary}' at {run.speed_kmh:g} km/h. With {force:.1f} N of static force: "
+                f"{run.ending}"
+            )
+        return run.summary(spans).mean
+
+    return mean
 
 
 def _runs(settings: RunSettings) -> Runs:

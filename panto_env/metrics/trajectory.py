@@ -63,7 +63,8 @@ class Trajectory:
     speed_kmh: float
     span_length: float  # m
     time_step: float  # s
-    nominal_force: float  # static and aerodynamic uplift (N)
+    nominal_force: float  # static force and aerodynamic uplift, as applied (N)
+    target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
     settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # that identify the run, plain data
     policy: str = "passive"
     seed: int = 0

@@ -93,12 +93,13 @@ class Plant:
         speed: float,
         drawn: DrawnLine | None = None,
         pantograph: PantographData | None = None,
+        static_force: float | None = None,
     ) -> None:
         """Put a lane at the start of the line, at rest under the nominal force.
 
         speed: of the train (m/s), not beyond the waves of the wire. drawn: what is random about its
         line, as ``line_condition.draw`` gives it. pantograph: the lane's own, where they are varied.
-        Raises InputError for a bad speed.
+        static_force: instead of the pantograph's (N). Raises InputError for a bad speed.
         """
         self.check_speed(speed)
         run, variant = self.run, int(self.pantographs.variant[lane])
@@ -112,7 +113,8 @@ class Plant:
         height += float(run.waves[:, 0, lane] @ np.cos(2 * np.pi * run.waves[:, 2, lane]))
         strip = float(self.pantographs.strip_compliance[variant])
         compliance = strip + wire + spring
-        nominal_force = data.nominal_force(speed)
+        trimmed = 0.0 if static_force is None else static_force - data.static_force
+        nominal_force = data.nominal_force(speed) + trimmed
         state = rest_state(data, nominal_force, height, compliance)
         force = float(state[0] - height) / compliance
         self.model.settle(lane, drawn, force)

@@ -33,6 +33,11 @@ class PantographData(Settings):
     dampings: tuple[Damper, ...] = Field(
         description="dampers below each mass, the last to the ground (N s/m)"
     )
+    force: Literal["applied", "mean"] = Field(
+        "applied",
+        description="whether static force and aerodynamic uplift are applied as they are, or state the mean "
+        "contact force, for which the static force is trimmed: applied or mean",
+    )
     static_force: Annotated[float, Between(0, 1000, "N")] = Field(
         description="lifting force on the lowest mass (N)"
     )
