@@ -23,6 +23,7 @@ from .cases import (
     SHOWN_SPEEDS,
     SPANS,
     SPEEDS,
+    USUAL,
     Case,
     control,
     sampled,
@@ -172,7 +173,10 @@ def _speeds(results: Results) -> Table:
 
 
 def _fine(results: Results) -> Table:
-    numerics = {False: "as usual", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    numerics = {
+        fine: f"{1e3 * each['time_step']:g} ms, {each['spacing']:g} m"
+        for fine, each in ((False, USUAL), (True, FINE))
+    }
     rows = [
         (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
         for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)
