@@ -173,10 +173,8 @@ def _speeds(results: Results) -> Table:
 
 
 def _fine(results: Results) -> Table:
-    numerics = {
-        fine: f"{1e3 * each['time_step']:g} ms, {each['spacing']:g} m"
-        for fine, each in ((False, USUAL), (True, FINE))
-    }
+    grids = ((False, USUAL), (True, FINE))
+    numerics = {fine: f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m" for fine, grid in grids}
     rows = [
         (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
         for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)
