@@ -19,7 +19,7 @@ from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 
-GRIDS = ((0.72, 0.25), (0.87, 0.15), (1.0, 0.125))
+GRIDS = ((0.735, 0.25), (0.87, 0.15), (1.0, 0.125))
 """Up to which share of the wave speed a grid (m) is fine enough."""
 NODES_HZ = 60.0
 """How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
