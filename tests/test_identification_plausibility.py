@@ -153,3 +153,9 @@ def test_a_file_in_other_units_is_refused_with_the_heading_in_mind(tmp_path):
     path.write_text(path.read_text().replace("time (s)", "time (ms)").replace("(mm)", "(m)"))
     with pytest.raises(InputError, match="seconds in a column of ms"):
         identify(read_record(path), KNOWN)
+
+
+@pytest.mark.parametrize("band", ["nan", "-1", "0"])
+def test_a_band_is_a_frequency(panto, band):
+    with pytest.raises(InputError, match="The band must be a frequency above 0 Hz"):
+        panto(RECORD, "--band", band)

@@ -48,6 +48,16 @@ class Lost(Own):
 """
 
 
+TRAINING = """
+algorithm = "ppo"
+total_steps = 1000
+checkpoint_steps = 100
+lanes = 2
+environment = { id = "Pantograph-v0" }
+evaluation = { interval_steps = 100 }
+"""
+
+
 def panto(*arguments, folder):
     command = [sys.executable, "-c", "from panto_env.cli import main; main()", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder)
@@ -275,6 +285,11 @@ def test_the_command_says_its_version(tmp_path):
         (["benchmark", "--config", "f.toml"], r"'seed' is not known: did you mean 'seeds'\.$"),
         (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, as \[250\]\.$"),
         (["benchmark", "--config", "none.toml"], "The file none.toml does not exist"),
+        (["train", "h.toml"], r"h.toml: unknown algorithm \['ppo'\]: did you mean 'ppo'"),
+        (["train", "i.toml"], r"i.toml: \[environment\]: unknown id 3: known are Pantograph-v0"),
+        (["train", "j.toml"], "key 'lanes' must be less than or equal to 65536"),
+        (["train", "k.toml"], r"lanes x n_steps = 200,000,000 must be at most 50,000,000"),
+        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 180,000 passes; 100,000 at most"),
         (["list", "p.toml"], "p.toml is not a valid entry: key 'masses' must hold at most 8 values"),
     ],
 )
@@ -286,6 +301,10 @@ def test_it_is_said_in_one_sentence_what_is_wrong(arguments, message, own, monke
         "e": "seeds = 90_000\npolicies = ['p']",
         "f": "seed = 3",
         "g": "[[lines]]\nspeeds_kmh = 250",
+        "h": TRAINING.replace('"ppo"', '["ppo"]'),
+        "i": TRAINING.replace('"Pantograph-v0"', "3"),
+        "j": TRAINING.replace("lanes = 2", "lanes = 100_000_000"),
+        "k": TRAINING + "[hyperparameters]\nn_steps = 100_000_000\n",
     }
     for name, text in configs.items():
         (own.parent / f"{name}.toml").write_text(text)
