@@ -17,8 +17,8 @@ from panto_env.base.settings import parse
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
 from panto_env.control import Task
+from panto_env.control.memory import SHARE
 from panto_env.control.settings import run_settings
-from panto_env.control.task import MEMORY_SHARE
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome
 from panto_env.studies import write as write_study
@@ -192,7 +192,7 @@ LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 
 
 def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monkeypatch):
-    monkeypatch.setattr("panto_env.control.task.memory", lambda: 16e9)
+    monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
     with pytest.raises(InputError, match=r"4,248,000 time steps with 999 supports would take 68.4 GB, and"):
         simulate(**LONG, record_droppers=False)
 
@@ -200,7 +200,7 @@ def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monke
 def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypatch):
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
     needed = Task(run_settings({"distance": 540.0})).memory
-    monkeypatch.setattr("panto_env.control.task.memory", lambda: 1.5 * needed / MEMORY_SHARE)
+    monkeypatch.setattr("panto_env.base.machine.memory", lambda: 1.5 * needed / SHARE)
     with pytest.raises(InputError, match=r"The record of 2 passes at once would take .*, or fewer workers"):
         sweep({"pantograph.masses.0": [7.0, 8.0]}, distance=540.0, workers=2)
 
