@@ -142,7 +142,7 @@ def test_no_pantograph_is_written_from_a_model_that_explains_nothing(tmp_path):
     fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, values, 0.01 * values, 10.0, 10.0)
     told = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
     path = tmp_path / "mine.toml"
-    with pytest.raises(InputError, match="does not explain the motion of y_p3 .fitting performance -"):
+    with pytest.raises(InputError, match=r"does not explain the motion of y_p3 .fitting performance -"):
         write_pantograph(fit, path, matches=matches(OTHER, fit.parameters), **told)
     assert not path.exists()
     write_pantograph(fit, path, matches=matches(RECORD, fit.parameters), **told)
