@@ -103,6 +103,7 @@ def evaluate(
 
     Options that are left out are as in the model's training.
     """
+    from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy
 
     from .evaluation import Comparison, in_words, verdict
@@ -112,9 +113,9 @@ def evaluate(
     driver = find_policy(policy)
     environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
     environment = environment | settings
-    comparison = Comparison(
-        arguments(environment), speed or speeds(environment), seeds, settings.get("distance")
-    )
+    chosen = speed or speeds(environment)
+    check_passes(2 * seeds * len(chosen), "This evaluation")
+    comparison = Comparison(arguments(environment), chosen, seeds, settings.get("distance"))
     with progress_console.status("running"):
         pairs = comparison.run(driver)
     if plot is not None:

@@ -23,6 +23,10 @@ from .sac import SAC
 ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}
 
 
+MOST_LANES = 65_536
+"""Of which each has a line of its own in memory."""
+
+
 class Evaluation(Settings):
     """How often the policy, without its exploration, is compared with the passive pantograph."""
 
@@ -39,7 +43,9 @@ class Training(Settings):
     algorithm: str = Field(description="one of ALGORITHMS")
     seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all random numbers")
     total_steps: Count = Field(description="environment steps, summed over all lanes")
-    lanes: Count = Field(8, description="environments stepped together")
+    lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
+        8, description="environments stepped together"
+    )
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
     evaluation: Evaluation
@@ -62,8 +68,8 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     Raises InputError where the id or the name of an argument is unknown.
     """
     name = environment.get("id")
-    if name not in IDS:
-        raise InputError(f"[environment]: unknown id {name!r}: {suggest(str(name), list(IDS))}")
+    if not isinstance(name, str) or name not in IDS:
+        raise InputError(f"unknown id {name!r}: {suggest(str(name), list(IDS))}.")
     own = {key: value for key, value in environment.items() if key != "id"}
     _check_keys(own, tuple(fields()), "[environment]")
     return {**IDS[name], **own}
@@ -92,9 +98,9 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
     try:
         _check_keys(table, tuple(Training.model_fields), "the top level")
         algorithm = table.get("algorithm")
-        if algorithm not in ALGORITHMS:
+        if not isinstance(algorithm, str) or algorithm not in ALGORITHMS:
             raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
-        algorithm_type = ALGORITHMS[str(algorithm)]
+        algorithm_type = ALGORITHMS[algorithm]
         for key, expected in (("hyperparameters", algorithm_type), ("evaluation", Evaluation)):
             if isinstance(table.get(key), Mapping):
                 _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")

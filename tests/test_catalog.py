@@ -389,7 +389,7 @@ BAD: list[tuple[str, str, str, str, str]] = [
         "5e4",
         "-1",
         "contact_stiffness",
-        "must be a number from 1,000 to 1e+08 N/m or 'rigid' (given: -1)",
+        "must be a number from 1,000 to 1e+06 N/m or 'rigid' (given: -1)",
     ),
     ("pantograph", "5e4", "'rigid'\ncontact_damping = 1", "contact_damping", "must be 0"),
     ("pantograph", '"pantograph"', '"flexible"', "kind", "must be 'pantograph'"),

@@ -13,16 +13,20 @@ from panto_env.cli import make_app
 from panto_env.identification import (
     EXPERIMENTS,
     FREQUENCY_SWEEP,
+    IDENTIFIED,
     MEASURED,
     OUTPUT_ERROR,
     PRINTED,
+    Fit,
     add_noise,
     clean_record,
     excited_band,
     fit_output_error,
     identify,
+    matches,
     parameters_of,
     read_record,
+    write_pantograph,
     write_record,
 )
 from panto_env.identification.plausibility import check_record
@@ -123,14 +127,31 @@ def test_marks_are_printed_and_in_the_json(panto):
     assert set(told["fits"]["equation-error"]["impossible"]) == {"c1T", "c2", "m3"}
 
 
-def test_no_pantograph_is_written_from_a_model_that_explains_nothing(panto, tmp_path):
-    """The frame of another rig: its motion has nothing to do with this plate's."""
-    time = RECORD.time
-    other = 0.05 + 0.5e-3 * np.sin(2 * np.pi * 0.77 * time + 1.0) + 0.5e-3 * np.sin(2 * np.pi * 3.1 * time)
-    with pytest.raises(
-        InputError, match=r"(does not explain the motion of y_p3|found .*: no pantograph has)"
-    ):
-        panto(replace(RECORD, support=other), "--output", "mine.toml", "--method", "low-passed")
+OTHER = replace(
+    RECORD,
+    support=0.05
+    + 0.5e-3 * np.sin(2 * np.pi * 0.77 * RECORD.time + 1.0)
+    + 0.5e-3 * np.sin(2 * np.pi * 3.1 * RECORD.time),
+)
+"""With the frame of another rig: its motion has nothing to do with this plate's."""
+
+
+def test_no_pantograph_is_written_from_a_model_that_explains_nothing(tmp_path):
+    """All its values are possible: they are the true ones."""
+    values = np.array([TRUTH[name] for name in IDENTIFIED])
+    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, values, 0.01 * values, 10.0, 10.0)
+    told = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
+    path = tmp_path / "mine.toml"
+    with pytest.raises(InputError, match=r"does not explain the motion of y_p3 .fitting performance -"):
+        write_pantograph(fit, path, matches=matches(OTHER, fit.parameters), **told)
+    assert not path.exists()
+    write_pantograph(fit, path, matches=matches(RECORD, fit.parameters), **told)
+    assert load_pantograph(str(path)).masses == (5.0, TRUTH["m3"])
+
+
+def test_the_command_writes_none_of_a_frame_of_another_rig(panto, tmp_path):
+    with pytest.raises(InputError, match=r"so none is written"):
+        panto(OTHER, "--output", "mine.toml", "--method", "low-passed")
     assert not (tmp_path / "mine.toml").exists()
 
 
@@ -153,3 +174,9 @@ def test_a_file_in_other_units_is_refused_with_the_heading_in_mind(tmp_path):
     path.write_text(path.read_text().replace("time (s)", "time (ms)").replace("(mm)", "(m)"))
     with pytest.raises(InputError, match="seconds in a column of ms"):
         identify(read_record(path), KNOWN)
+
+
+@pytest.mark.parametrize("band", ["nan", "-1", "0"])
+def test_a_band_is_a_frequency(panto, band):
+    with pytest.raises(InputError, match="The band must be a frequency above 0 Hz"):
+        panto(RECORD, "--band", band)

@@ -17,8 +17,8 @@ from panto_env.base.settings import parse
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.control import Task
+from panto_env.control.memory import SHARE
 from panto_env.control.settings import run_settings
-from panto_env.control.task import MEMORY_SHARE
 from panto_env.plant.pantograph import build
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome
@@ -42,6 +42,16 @@ class Broken(Own):
 class Lost(Own):
     def reset(self, context):
         context.layout.index("contact farce")
+"""
+
+
+TRAINING = """
+algorithm = "ppo"
+total_steps = 1000
+checkpoint_steps = 100
+lanes = 2
+environment = { id = "Pantograph-v0" }
+evaluation = { interval_steps = 100 }
 """
 
 
@@ -187,7 +197,7 @@ LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 
 
 def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monkeypatch):
-    monkeypatch.setattr("panto_env.control.task.memory", lambda: 16e9)
+    monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
     with pytest.raises(InputError, match=r"4,248,000 time steps with 999 supports would take 68.4 GB, and"):
         simulate(**LONG, record_droppers=False)
 
@@ -195,7 +205,7 @@ def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monke
 def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypatch):
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
     needed = Task(run_settings({"distance": 540.0})).memory
-    monkeypatch.setattr("panto_env.control.task.memory", lambda: 1.5 * needed / MEMORY_SHARE)
+    monkeypatch.setattr("panto_env.base.machine.memory", lambda: 1.5 * needed / SHARE)
     with pytest.raises(InputError, match=r"The record of 2 passes at once would take .*, or fewer workers"):
         sweep({"pantograph.masses.0": [7.0, 8.0]}, distance=540.0, workers=2)
 
@@ -280,6 +290,11 @@ def test_the_command_says_its_version(tmp_path):
         (["benchmark", "--config", "f.toml"], r"'seed' is not known: did you mean 'seeds'\.$"),
         (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, as \[250\]\.$"),
         (["benchmark", "--config", "none.toml"], "The file none.toml does not exist"),
+        (["train", "h.toml"], r"h.toml: unknown algorithm \['ppo'\]: did you mean 'ppo'"),
+        (["train", "i.toml"], r"i.toml: \[environment\]: unknown id 3: known are Pantograph-v0"),
+        (["train", "j.toml"], "key 'lanes' must be less than or equal to 65536"),
+        (["train", "k.toml"], r"lanes x n_steps = 200,000,000 must be at most 50,000,000"),
+        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 180,000 passes; 100,000 at most"),
         (["list", "p.toml"], "p.toml is not a valid entry: key 'masses' must hold at most 8 values"),
     ],
 )
@@ -291,6 +306,10 @@ def test_it_is_said_in_one_sentence_what_is_wrong(arguments, message, own, monke
         "e": "seeds = 90_000\npolicies = ['p']",
         "f": "seed = 3",
         "g": "[[lines]]\nspeeds_kmh = 250",
+        "h": TRAINING.replace('"ppo"', '["ppo"]'),
+        "i": TRAINING.replace('"Pantograph-v0"', "3"),
+        "j": TRAINING.replace("lanes = 2", "lanes = 100_000_000"),
+        "k": TRAINING + "[hyperparameters]\nn_steps = 100_000_000\n",
     }
     for name, text in configs.items():
         (own.parent / f"{name}.toml").write_text(text)

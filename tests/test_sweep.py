@@ -143,6 +143,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
         ({"catenary.contact_wire.tension": [-1.0]}, {}, "catenary.contact_wire.tension can't be -1"),
         ({"speed_kmh": [300, 600]}, {}, "At speed_kmh = 600: The speed must lie above 0"),
         ({"speed_kmh": [300]}, {"spans": (5, 90)}, "At speed_kmh = 300: spans 5 to 90"),
+        ({"actuator.lag": [0, 0.1]}, {}, "actuator.lag changes nothing without a policy"),
         ({"policy.gain": [1]}, {}, "The passive pantograph has no policy.gain"),
         ({"policy.gian": [1]}, {"policies": ["p"]}, "'gian'"),
         ({"speed_kmh": [300]}, {"policies": []}, "no policy to run"),

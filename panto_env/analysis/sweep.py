@@ -17,8 +17,8 @@ from ..base.names import hint
 from ..base.settings import Settings
 from ..control import Task
 from ..control.arguments import check_arguments
+from ..control.memory import check_memory
 from ..control.settings import RunSettings, default, run_settings, speed_range
-from ..control.task import check_memory
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy, with_parameters
@@ -34,6 +34,8 @@ MOST_PARAMETERS = 2
 Row = dict[str, Any]
 DISCRETISATION = ("time_step", "spacing", "window")
 """Settings that a value may change by itself, and a row therefore tells."""
+SEEN_BY_POLICIES = ("actuator", "sensors")
+"""Families that the passive pantograph does without."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, as ``pantograph.masses.0``."""
 
@@ -112,6 +114,9 @@ def _check(
         _check_name(name, entries)
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
+        family = name.partition(".")[0]
+        if family in SEEN_BY_POLICIES and all(policy is None for policy in policies):
+            raise InputError(f"{name} changes nothing without a policy; name one.")
         twice = next((value for value, count in Counter(values).items() if count > 1), None)
         if twice is not None:
             raise InputError(f"{name} has the value {twice:g} twice; give each once.")

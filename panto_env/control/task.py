@@ -10,7 +10,6 @@ import numpy as np
 from ..backend import bind, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.machine import memory
 from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
@@ -21,12 +20,13 @@ from ..plant.numerics import Runs
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
-from ..plant.state import CONTACTS, SAMPLE_ROWS, Row
+from ..plant.state import Row
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
 from .context import Context
 from .episode import Episode, Flags
 from .identity import identity
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
+from .memory import check_memory, record_size
 from .observation import layout
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
@@ -35,10 +35,6 @@ from .step import control_step, observe_start
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
-COPIES = 2
-"""How often a record lies in memory: as it is written, and as a trajectory."""
-MEMORY_SHARE = 0.7
-"""Of the machine's memory that records may take."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 
@@ -103,10 +99,9 @@ class Task:
         self._record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
-        columns = CONTACTS * SAMPLE_ROWS + len(plant.model.supports)
-        columns += len(plant.model.droppers) if record_droppers else 0
-        self.memory = COPIES * lanes * rows * columns * np.dtype(float).itemsize
-        check_memory(self.memory, f"{rows - 1:,} time steps with {len(plant.model.supports)} supports")
+        supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
+        self.memory = record_size(lanes, rows - 1, supports, droppers)
+        check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
         self._threads = lane_threads(lanes, plant.lanes_abreast)
@@ -339,19 +334,6 @@ def _runs(settings: RunSettings) -> Runs:
     slow, quick = settings.speed_kmh
     pantograph, interval = settings.pantograph, settings.control_interval
     return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
-
-
-def check_memory(needed: float, what: str, remedy: str = "") -> None:
-    """Raise InputError unless the machine has the memory (bytes) for the record of a run, or of several.
-
-    remedy: what else helps, beginning with ", or".
-    """
-    if needed > MEMORY_SHARE * memory():
-        raise InputError(
-            f"The record of {what} would take {needed / 1e9:,.1f} GB, and this machine has "
-            f"{memory() / 1e9:,.1f} GB of memory; take a shorter distance, fewer spans, a higher speed or a "
-            f"longer time step{remedy}."
-        )
 
 
 def _spans(settings: RunSettings) -> int | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,6 +39,8 @@ def identify(
     Raises InputError, with the likely mistake, for a record or known values that can't be those of a rig.
     """
     check_record(record, check_known(known))
+    if band is not None and not (math.isfinite(band) and band > 0):
+        raise InputError(f"The band must be a frequency above 0 Hz, not {band:g}.")
     band = excited_band(record) if band is None else band
     runs: dict[str, Callable[[], Fit]] = {
         PRINTED: lambda: fit_equation_error(record, known, free_offset=free_offset),
