@@ -207,7 +207,7 @@ def test_shipped_benchmarks_load(path: Path) -> None:
         ("seeds = ", "is not valid TOML"),
         ("seed = 3", "key 'seed'"),
         ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.0.speeds_kmh.0'"),
-        (None, "could not be read"),
+        (None, "does not exist"),
     ],
 )
 def test_a_bad_file_is_named_with_its_key(tmp_path: Path, text: str | None, words: str) -> None:
