@@ -198,7 +198,9 @@ LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 
 def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
-    with pytest.raises(InputError, match=r"84,960,000 time steps with 999 supports would take 1,368.9 GB, and"):
+    with pytest.raises(
+        InputError, match=r"84,960,000 time steps with 999 supports would take 1,368.9 GB, and"
+    ):
         simulate(**LONG, record_droppers=False)
 
 
