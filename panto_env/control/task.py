@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import bind, lane_table, lane_threads, pack
+from ..backend import bind, copy_whole, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.figures import Figures
@@ -33,6 +33,9 @@ LARGEST_FORCE = 1e5
 """Contact force (N) beyond which, a thousand times any real one, a computation has diverged."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
+
+BOUND_ANEW = ("reward", "terms", "_action", "_threads", "_control_step", "_observe_start")
+"""Attributes that ``Task._bind`` makes of the others."""
 
 
 class Task:
@@ -77,8 +80,6 @@ class Task:
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.episode = self._episode()
-        self.reward = self.episode.table[TaskRow.REWARD, :lanes]
-        self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, :lanes]
         self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes)
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
@@ -88,11 +89,32 @@ class Task:
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
-        self._threads = lane_threads(lanes, plant.lanes_abreast)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    def _bind(self) -> None:
+        """Look at the arrays by name, and bind the kernels to them."""
+        self.reward = self.episode.table[TaskRow.REWARD, : self.lanes]
+        self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, : self.lanes]
         self._action = self.episode.action
-        packed = pack(*plant.arrays, self.sensors, self.samples, self.episode, self.running)
+        self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
+        packed = pack(*self.plant.arrays, *self._arrays)
         self._control_step = bind(control_step, packed, 0, 1)
         self._observe_start = bind(observe_start, packed, 0, 1)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
 
     def _episode(self) -> Episode:
         lanes, actions, time_step = self.lanes, len(self.actuator.places), self.plant.time_step

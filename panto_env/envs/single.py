@@ -27,6 +27,9 @@ CONTACT_FORCE, HEAD, WIRE = int(Row.CONTACT_FORCE), int(Row.HEAD_HEIGHT), int(Ro
 FRAME_FORCE, HEAD_FORCE = int(Row.FRAME_FORCE), int(Row.HEAD_FORCE)
 STEP, STRIDE = int(Row.STEP), int(Row.STRIDE)
 
+SEEN = ("_shape", "_observation", "_plant_column", "_reward_and_terms", "_terminated", "_truncated")
+"""Attributes that ``PantographEnv._watch`` takes from the task."""
+
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A pantograph under a catenary, whose contact force an actuator is to keep steady.
@@ -71,6 +74,10 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     `reset(options=...)` takes the same for one episode, but those that change a space.
 
+    ## Copies
+    `copy.deepcopy` and `pickle` take the environment as it is, in the middle of an episode too; the copy goes
+    on bit for bit as the original would, as tree search and worker processes need.
+
     ## Version History
     * v0: first version.
     """
@@ -82,7 +89,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, EnvironmentSettings)
         self.render_mode = settings.render_mode
-        self._given = given
+        self._settings = settings
         self._usual = Task(settings)
         self._watch(self._usual)
         self._running = False
@@ -121,11 +128,19 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._reward_and_terms = episode.table[TaskRow.REWARD : EPISODE_ROWS, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to see anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in SEEN}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._watch(self.task)
+
     def _episode_task(self, options: dict[str, Any]) -> Task:
         check_names(options, "option")
         if not options:
             return self._usual
-        task = Task(read_settings(self._given | options, EnvironmentSettings))
+        task = Task(read_settings(dict(self._settings) | options, EnvironmentSettings))
         if task.layout != self._usual.layout or task.actuator.places != self._usual.actuator.places:
             raise InputError(
                 f"The options {', '.join(options)} would change the observation or action space; "
