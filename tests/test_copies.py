@@ -115,6 +115,17 @@ def test_episode_with_options_goes_on_and_ends_with_them():
     assert twin.unwrapped.trajectory.speed_kmh == pytest.approx(300)
 
 
+def test_lanes_begun_with_options_go_on_in_a_copy():
+    envs = gymnasium.make_vec("PantographStiffness-v0", 3, distance=40.0)
+    envs.reset(seed=0)
+    envs.reset(options={"speed_kmh": 200, "reset_mask": np.array([False, True, False])})
+    twin = copy.deepcopy(envs)
+    answers = run(twin, 80)
+    np.testing.assert_equal(answers, run(envs, 80))
+    assert answers[0][4]["speed_kmh"].tolist() == pytest.approx([300, 200, 300])
+    assert answers[-1][4]["speed_kmh"].tolist() == pytest.approx([300, 300, 300])
+
+
 def test_copy_needs_no_file_of_the_user(tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text((panto_env.catalog.loader.FOLDERS["catenary"] / "periodic-stiffness.toml").read_text())
@@ -136,7 +147,7 @@ def test_tasks_and_plants_are_copied_too():
         task.step(action)
         twin.step(action)
     np.testing.assert_array_equal(twin.episode.observation, task.episode.observation)
-    np.testing.assert_array_equal(twin.terms, task.terms)
+    np.testing.assert_array_equal(twin.reward_and_terms, task.reward_and_terms)
     np.testing.assert_equal(twin.figures(1).as_dict(), task.figures(1).as_dict())
     settings = run_settings({})
     plant = Plant(settings.catenary, settings.pantograph, lanes=2)

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Mapping
 from typing import Annotated, Any, Self, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
@@ -40,7 +41,7 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
         return presets[value]
     if isinstance(value, Mapping):
         try:
-            return kind.model_validate(dict(value))
+            return kind.model_validate(plain(value))
         except ValidationError as error:
             raise InputError(f"{name} is not valid: {explain(error)}.") from error
     options = [f"'{preset}'" for preset in presets]
@@ -61,6 +62,17 @@ def parse_kind(
             f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
         )
     return parse(kinds[chosen], value, name, presets)
+
+
+def plain(value: Any) -> Any:
+    """A value with NumPy's numbers as Python's own, in tables and lists too."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    return value
 
 
 def explain(error: ValidationError) -> str:

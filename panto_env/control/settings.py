@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..base.errors import InputError
-from ..base.settings import parse, sentence, suggest
+from ..base.settings import parse, plain, sentence, suggest
 from ..catalog import load_catenary, load_pantograph
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
@@ -157,7 +157,7 @@ def run_settings(given: Mapping[str, Any]) -> RunSettings:
 def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
     """As ``run_settings``, of a class of settings that has more."""
     try:
-        return kind.model_validate(dict(given))
+        return kind.model_validate(plain(given))
     except ValidationError as error:
         raise InputError(f"{sentence(error)}.") from error
 

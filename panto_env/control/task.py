@@ -34,7 +34,7 @@ LARGEST_FORCE = 1e5
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 
-BOUND_ANEW = ("reward", "terms", "_action", "_threads", "_control_step", "_observe_start")
+BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_step", "_observe_start")
 """Attributes that ``Task._bind`` makes of the others."""
 
 
@@ -99,8 +99,7 @@ class Task:
 
     def _bind(self) -> None:
         """Look at the arrays by name, and bind the kernels to them."""
-        self.reward = self.episode.table[TaskRow.REWARD, : self.lanes]
-        self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, : self.lanes]
+        self.reward_and_terms = self.episode.table[TaskRow.REWARD : EPISODE_ROWS, : self.lanes]
         self._action = self.episode.action
         self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
         packed = pack(*self.plant.arrays, *self._arrays)
@@ -152,6 +151,11 @@ class Task:
         possible = self.plant.model.length / stride + 1e-9
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
+    @property
+    def most_control_steps(self) -> int:
+        """Control steps of an episode at the lowest speed: the longest that there are."""
+        return self._steps(self.speed_range[0]) // self.control_steps
+
     def reset(self, lane: int, random: np.random.Generator) -> None:
         """Start an episode in one lane: draw its speed, its line and its pantograph."""
         low, high = self.speed_range
@@ -201,13 +205,14 @@ class Task:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
         Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
-        Results are in ``episode`` (observation, terminated, truncated), ``reward`` and ``terms``.
+        Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
         """
+        self._action[...] = action
+        stepped = self._all_lanes
         if skip is not None:
             self.episode.idle[:] = skip
-        self._action[:] = action
+            stepped = np.flatnonzero(~skip)
         if self._noise is not None:
-            stepped = self._all_lanes if skip is None else np.flatnonzero(~skip)
             self._noise.write(self.sensors.noise, stepped)
         if self._threads is None:
             self._control_step(0, self.lanes)
