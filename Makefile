@@ -77,12 +77,13 @@ rllib:
 	$(RLLIB)/bin/pip install -qq 'ray[rllib]==2.60.0' pytest --editable .
 	$(RLLIB)/bin/pytest tests/test_rllib.py
 
-# TorchRL, Tianshou, skrl and Minari on the environments.
+# TorchRL, Tianshou, skrl and Minari on the environments; Tianshou wants an older filelock.
 LIBRARIES := .venv-libraries
 libraries:
 	$(PYTHON) -m venv $(LIBRARIES)
-	$(LIBRARIES)/bin/pip install -qq --constraint constraints.txt torch
-	$(LIBRARIES)/bin/pip install -qq --constraint constraints.txt torchrl==0.14.1 tianshou==2.0.1 skrl==2.1.1 \
+	grep -v '^filelock==' constraints.txt > $(LIBRARIES)/constraints.txt
+	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torch
+	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torchrl==0.14.1 tianshou==2.0.1 skrl==2.1.1 \
 	  'minari[create,hdf5]==0.5.4' pytest --editable .
 	$(LIBRARIES)/bin/pytest tests/test_libraries.py
 

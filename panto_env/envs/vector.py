@@ -25,9 +25,12 @@ from .infos import lane_figures, lane_infos
 from .lanes import Answer, Lanes
 from .settings import VectorSettings
 from .single import checked
+from .stable_baselines import NamedToStableBaselines
 
 
-class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class PantographVectorEnv(
+    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]], metaclass=NamedToStableBaselines
+):
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
@@ -41,6 +44,8 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
     `infos` holds what the single environment's does, in the form of Gymnasium's vector environments: arrays
     with a value per lane, and under "_key" which lanes have it. Lanes whose episodes end have "figures"; with
     "SameStep" these and all else that they ended with are in "final_info", beside "final_obs".
+
+    Stable-Baselines3 takes it inside `panto_agents.vec_env.PantographVecEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
