@@ -142,7 +142,7 @@ class PantographVectorEnv(
         answer = self._lanes.answer()
         observation, terminated, truncated = answer.observation, answer.terminated, answer.truncated
         if self._limit is not None:
-            self._steps += True if waiting is None else ~waiting
+            self._steps += 1 if waiting is None else ~waiting
             truncated |= self._steps >= self._limit
         self._ended = terminated | truncated
         self._any_ended = bool(np.count_nonzero(self._ended))  # sooner than ``any``
