@@ -41,7 +41,7 @@ REPORTED_FACTS = ("steps", "ratio", "qualified")
 
 
 def train(
-    config: Annotated[Path, typer.Argument(help="Training, a TOML file such as configs/ppo.toml.")],
+    config: Annotated[Path, typer.Argument(help="Training: a TOML file, or a name such as ppo or sac.")],
     output: Annotated[
         Path | None, typer.Option(help="Folder of the run; runs/NAME-ALGORITHM-seedK by default.")
     ] = None,

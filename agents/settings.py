@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
+from panto_configs import find
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
@@ -82,15 +83,15 @@ def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
 
 
 def load_training(path: str | Path, **changes: Any) -> Training:
-    """Read a training from a TOML file; ``changes`` (seed, total_steps) replace the file's unless None.
+    """Read a training from a TOML file, given by its path or by a name of ``configs/``.
+
+    ``changes`` (seed, total_steps) replace the file's unless None.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    if not Path(path).exists():
-        raise InputError(f"The training file {path} does not exist; give a TOML file's path.")
-    table = read_toml(path)
+    file = find(path, "training")
     replacements = {key: value for key, value in changes.items() if value is not None}
-    return parse_training(table | replacements, str(path))
+    return parse_training(read_toml(file) | replacements, str(path))
 
 
 def parse_training(table: Mapping[str, Any], name: str) -> Training:

@@ -27,7 +27,8 @@ def benchmark(
         typer.Argument(help="Names, with parameters (p:gain=0.5) or without, or model files."),
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="TOML file; other options take precedence over it.")
+        Path | None,
+        typer.Option(help="TOML file, or a name such as benchmark; other options take precedence over it."),
     ] = None,
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,

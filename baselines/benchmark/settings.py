@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
+from panto_configs import find
 from panto_env.analysis.pool import MOST_PASSES
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
@@ -125,8 +126,10 @@ def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def load_benchmark(path: str | Path) -> BenchmarkSettings:
-    """Read a TOML file of ``BenchmarkSettings``; paths in it are relative to the working folder.
+    """Read a TOML file of ``BenchmarkSettings``, given by its path or by a name of ``configs/``.
+
+    Paths in it are relative to the working folder.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    return parse(BenchmarkSettings, read_toml(path), str(path))
+    return parse(BenchmarkSettings, read_toml(find(path, "benchmark")), str(path))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
@@ -29,6 +30,10 @@ class Settings(BaseModel):
     """Frozen, validated data; an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        """Itself: what never changes need not be copied, and a copy of an environment should be quick."""
+        return self
 
 
 S = TypeVar("S", bound=Settings)
@@ -66,7 +71,7 @@ def _changed(preset: S, changes: str, name: str) -> S:
 
 def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:
     try:
-        return kind.model_validate(dict(table))
+        return kind.model_validate(plain(table))
     except ValidationError as error:
         raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
 
@@ -84,3 +89,14 @@ def parse_kind(
             f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
         )
     return parse(kinds[chosen], value, name, presets)
+
+
+def plain(value: Any) -> Any:
+    """A value with NumPy's numbers as Python's own, in tables and lists too."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    return value

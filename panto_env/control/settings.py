@@ -17,7 +17,7 @@ from ..base.errors import InputError
 from ..base.explanation import sentence
 from ..base.names import suggest
 from ..base.ranges import Between
-from ..base.settings import parse
+from ..base.settings import parse, plain
 from ..catalog import load_catenary, load_pantograph
 from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
@@ -198,7 +198,7 @@ def run_settings(given: Mapping[str, Any]) -> RunSettings:
 def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
     """As ``run_settings``, of a class of settings that has more."""
     try:
-        return kind.model_validate(dict(given))
+        return kind.model_validate(plain(given))
     except ValidationError as error:
         raise InputError(f"{sentence(error, kind)}.") from error
 

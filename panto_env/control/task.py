@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import bind, lane_table, lane_threads, pack
+from ..backend import bind, copy_whole, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.compliance import LineFacts
@@ -37,6 +37,9 @@ LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
+
+BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_step", "_observe_start")
+"""Attributes that ``Task._bind`` makes of the others."""
 
 
 class Task:
@@ -90,8 +93,6 @@ class Task:
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
         self.episode = self._episode()
-        self.reward = self.episode.table[TaskRow.REWARD, :lanes]
-        self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, :lanes]
         self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes)
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
@@ -104,11 +105,31 @@ class Task:
         check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
-        self._threads = lane_threads(lanes, plant.lanes_abreast)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    def _bind(self) -> None:
+        """Look at the arrays by name, and bind the kernels to them."""
+        self.reward_and_terms = self.episode.table[TaskRow.REWARD : EPISODE_ROWS, : self.lanes]
         self._action = self.episode.action
-        packed = pack(*plant.arrays, self.sensors, self.samples, self.episode, self.running)
+        self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
+        packed = pack(*self.plant.arrays, *self._arrays)
         self._control_step = bind(control_step, packed, 0, 1)
         self._observe_start = bind(observe_start, packed, 0, 1)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
 
     def _episode(self) -> Episode:
         lanes, actions, time_step = self.lanes, len(self.actuator.places), self.plant.time_step
@@ -146,6 +167,11 @@ class Task:
         wanted = math.ceil(self.distance / stride - 1e-9)
         possible = self.plant.model.length / stride + 1e-9
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
+
+    @property
+    def most_control_steps(self) -> int:
+        """Control steps of an episode at the lowest speed: the longest that there are."""
+        return self._steps(self.speed_range[0]) // self.control_steps
 
     def reset(self, lane: int, random: np.random.Generator) -> None:
         """Start an episode in one lane: draw its speed, its line and its pantograph."""
@@ -206,13 +232,14 @@ class Task:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
         Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
-        Results are in ``episode`` (observation, terminated, truncated), ``reward`` and ``terms``.
+        Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
         """
+        self._action[...] = action
+        stepped = self._all_lanes
         if skip is not None:
             self.episode.idle[:] = skip
-        self._action[:] = action
+            stepped = np.flatnonzero(~skip)
         if self._noise is not None:
-            stepped = self._all_lanes if skip is None else np.flatnonzero(~skip)
             self._noise.write(self.sensors.noise, stepped)
         if self._threads is None:
             self._control_step(0, self.lanes)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import LANES_ABREAST, bind, lane_table, pack
+from ..backend import LANES_ABREAST, bind, copy_whole, lane_table, pack
 from ..base.arrays import Array
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
@@ -19,6 +19,9 @@ from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples
 from .step import advance
+
+SEEN = ("steps_done", "stride", "contact_force", "nominal_force", "sample", "_advance")
+"""Attributes that ``Plant._look`` makes of the others."""
 
 
 class Plant:
@@ -61,19 +64,32 @@ class Plant:
             self.pantographs.variant[:] = np.arange(lanes)
         self._set_variant(0, pantograph)
         self.actuators = (actuator or actuator_settings("ideal")).arrays(self.time_step, lanes)
-        table = lane_table(CONTACTS, Row.STATE + size, lanes)
         self.run = Run(
-            table=table,
+            table=lane_table(CONTACTS, Row.STATE + size, lanes),
             waves=np.zeros((max(condition.waves for condition in runs.conditions), 3, lanes)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
+        self.lanes_abreast = LANES_ABREAST.get(type(self.model.line), 1)
+        copy_whole(*self.arrays)
+        self._look()
+
+    def _look(self) -> None:
+        """Look at the arrays by name; no kernel is bound to them as yet."""
         # Of the first contact, which the figures are of.
-        own = table[0, :, :lanes]
+        own = self.run.table[0, :, : self.lanes]
         self.steps_done, self.stride = own[Row.STEP], own[Row.STRIDE]
         self.contact_force, self.nominal_force = own[Row.FORCE], own[Row.NOMINAL_FORCE]
         self.sample = own[:SAMPLE_ROWS]  # of the last step
-        self.lanes_abreast = LANES_ABREAST.get(type(self.model.line), 1)
         self._advance: Callable[..., Any] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to see anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in SEEN}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self.arrays)
+        self._look()
 
     def _set_variant(self, variant: int, pantograph: PantographData) -> None:
         self.pantographs.set_variant(variant, pantograph, self.model)
