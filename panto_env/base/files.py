@@ -92,7 +92,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise InputError(f"The file {path} does not exist; check the path.") from error
+        raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:
