@@ -37,11 +37,11 @@ class FlexibleCatenary:
         Raises InputError where the line can't hang so, grid and time step are not stable together, or the
         line has not what a condition says is defective.
         """
+        shape = hang(data)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         check_speeds(data.name, self.wave_speed, runs.speeds)
         chosen = resolution(data, numerics, runs)
         self.time_step = chosen.time_step
-        shape = hang(data)
         self.line = constants(data, shape, spans, numerics, chosen)
         self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
