@@ -85,7 +85,7 @@ def test_tables_say_which_spans_are_evaluated():
     assert json.loads(shown("simulate", *light, "--json"))["spans"] == [10, 19]
     table = shown("sweep", "speed_kmh=250,300", *light)
     assert "spans 10-19" in table.splitlines()[0]
-    rows = json.loads(shown("sweep", "speed_kmh=250,300", *light, "--json"))
+    rows = json.loads(shown("sweep", "speed_kmh=250,300", *light, "--json"))["rows"]
     assert [row["spans"] for row in rows] == ["10-19", "10-19"]
     evaluated = shown("evaluate", "p", *light, "--speed", "250")
     assert "spans 10-19" in evaluated.splitlines()[0]

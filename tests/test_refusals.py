@@ -144,7 +144,11 @@ def test_a_policy_that_fails_is_named_with_the_line(own):
 )
 def test_it_is_named_alike_wherever_it_runs(own, name, message):
     line = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0}
-    given = {"policies": [f"{own}:{name}"], "lines": [line | {"speeds_kmh": [300]}], "seeds": 1}
+    given = {
+        "policies": [f"{own}:{name}"],
+        "lines": [line | {"speeds_kmh": [300], "spans": (2, 6)}],
+        "seeds": 1,
+    }
     with pytest.raises(InputError, match=message):
         benchmark.run(parse(BenchmarkSettings, given, "the benchmark"), workers=1)
     with pytest.raises(InputError, match=message):
@@ -257,7 +261,7 @@ def test_the_command_says_its_version(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["simulate", "--spans", "²-3"], "--spans must read first-last, as 5-6, not '²-3'"),
+        (["simulate", "--spans", "²-3"], "--spans must read first-last, as 5-6, or all, not '²-3'"),
         (
             ["simulate", "--distance", "0.1"],
             "at least the 0.8333 m that a train covers in one control interval",
