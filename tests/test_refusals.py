@@ -153,8 +153,12 @@ def test_a_policy_that_fails_is_named_with_the_line(own):
     ],
 )
 def test_it_is_named_alike_wherever_it_runs(own, name, message):
-    line = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 600.0}
-    given = {"policies": [f"{own}:{name}"], "lines": [line | {"speeds_kmh": [300]}], "seeds": 1}
+    line = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0}
+    given = {
+        "policies": [f"{own}:{name}"],
+        "lines": [line | {"speeds_kmh": [300], "spans": (2, 6)}],
+        "seeds": 1,
+    }
     with pytest.raises(InputError, match=message):
         benchmark.run(parse(BenchmarkSettings, given, "the benchmark"), workers=1)
     with pytest.raises(InputError, match=message):
