@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs coverage mutants same oldest ptx rllib clean
+.PHONY: demo test lint proofs coverage mutants same oldest ptx rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -59,7 +59,7 @@ oldest:
 	$(PYTHON) -m venv $(OLDEST)
 	grep -vE '^(gymnasium|numba|llvmlite|numpy|scipy)==' constraints.txt > $(OLDEST)/constraints.txt
 	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt $(OLDEST_ONES) pytest --editable .
-	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py
+	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_vector_rules.py
 
 # The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.
 PTX := .venv-ptx
@@ -77,5 +77,15 @@ rllib:
 	$(RLLIB)/bin/pip install -qq 'ray[rllib]==2.60.0' pytest --editable .
 	$(RLLIB)/bin/pytest tests/test_rllib.py
 
+# TorchRL, Tianshou, skrl and Minari on the environments; Tianshou wants an older filelock.
+LIBRARIES := .venv-libraries
+libraries:
+	$(PYTHON) -m venv $(LIBRARIES)
+	grep -v '^filelock==' constraints.txt > $(LIBRARIES)/constraints.txt
+	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torch
+	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torchrl==0.14.1 tianshou==2.0.1 skrl==2.1.1 \
+	  'minari[create,hdf5]==0.5.4' pytest --editable .
+	$(LIBRARIES)/bin/pytest tests/test_libraries.py
+
 clean:
-	rm -rf $(VENV) $(OLDEST) $(PTX) $(RLLIB) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) $(PTX) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

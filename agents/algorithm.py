@@ -12,6 +12,8 @@ from panto_env.base.settings import Positive, Settings
 from .actor import Actor
 
 Count = Annotated[int, Field(gt=0, strict=True)]
+MOST_KEPT = 50_000_000
+"""Steps of environments that may be kept in memory: about 10 GB."""
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
 

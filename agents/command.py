@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,8 +11,11 @@ import typer
 from rich.table import Table
 
 from panto_env.analysis.options import with_settings
+from panto_env.analysis.requirements import print_criteria
 from panto_env.base.errors import InputError
+from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
+from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
 
 if TYPE_CHECKING:
@@ -30,12 +34,14 @@ ROWS = (
     "effort_rate",
 )
 """Figures that `panto evaluate` prints."""
+SHOWN = (FIRST_SETTLED, FIRST_SETTLED + 1)
+"""Spans that its plot shows."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
 
 def train(
-    config: Annotated[Path, typer.Argument(help="Training, a TOML file such as configs/ppo.toml.")],
+    config: Annotated[Path, typer.Argument(help="Training: a TOML file, or a name such as ppo or sac.")],
     output: Annotated[
         Path | None, typer.Option(help="Folder of the run; runs/NAME-ALGORITHM-seedK by default.")
     ] = None,
@@ -97,36 +103,47 @@ def evaluate(
 
     Options that are left out are as in the model's training.
     """
+    from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy
 
-    from .evaluation import Comparison, evaluated_spans, in_words
+    from .evaluation import Comparison, in_words, verdict
     from .policy import TrainedPolicy
     from .settings import arguments, speeds
 
     driver = find_policy(policy)
     environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
     environment = environment | settings
-    comparison = Comparison(arguments(environment), speed or speeds(environment), seeds)
+    chosen = speed or speeds(environment)
+    check_passes(2 * seeds * len(chosen), "This evaluation")
+    comparison = Comparison(arguments(environment), chosen, seeds, settings.get("distance"))
     with progress_console.status("running"):
         pairs = comparison.run(driver)
     if plot is not None:
         from panto_env.analysis import plots
 
         runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
-        first_span, _ = evaluated_spans(runs[1]) or (1, 2)
         title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
-        picture = plots.plot_forces(runs, (policy, "passive"), (first_span, first_span + 1), title)
+        picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
         plots.save(picture, plot)
     if json:
-        print_json({"policy": policy, "environment": environment, "passes": [p.as_dict() for p in pairs]})
+        ratio, qualified = verdict(pairs)
+        run = {"policy": policy, "environment": environment, "settings": comparison.settings}
+        found = {"ratio": ratio, "qualified": qualified}
+        print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
         return
     _print_pairs(pairs)
+    for speed_kmh in sorted({pair.speed_kmh for pair in pairs}):
+        seeds_here = [pair.policy_compliance for pair in pairs if pair.speed_kmh == speed_kmh]
+        if all(seeds_here):
+            title = f"Requirements at {speed_kmh:g} km/h under {policy}; of several seeds the worst"
+            print_criteria(worst(seeds_here), title)
     console.print(f"mean of all: {in_words(pairs)}")
 
 
 def _print_pairs(pairs: list[Pair]) -> None:
     """Print a table with a section for each speed: means over the seeds."""
-    table = Table()
+    spans = " or ".join(sorted({pair.spans for pair in pairs} - {""})) or "none"
+    table = Table(title=f"spans {spans}")
     for heading in ("km/h", "figure", "policy", "passive", "change"):
         table.add_column(heading, justify="left" if heading == "figure" else "right")
     for speed in sorted({pair.speed_kmh for pair in pairs}):
@@ -138,12 +155,16 @@ def _print_pairs(pairs: list[Pair]) -> None:
                 label.scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
                 for column in ([pair.policy for pair in pairs_here], [pair.passive for pair in pairs_here])
             )
-            change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 else ""
+            change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 and math.isfinite(policy) else ""
             first = f"{speed:g}" if key == ROWS[0] else ""
             table.add_row(first, label.heading, number(policy), number(passive), change)
         ended_early = sum(pair.terminated for pair in pairs_here)
-        out_of_range = sum(not pair.qualified and not pair.terminated for pair in pairs_here)
+        passive_too = sum(pair.passive_ending != "" for pair in pairs_here)
+        out_of_range = len(pairs_here) - sum(
+            pair.qualified or pair.terminated or pair.passive_ending != "" for pair in pairs_here
+        )
         notes = [f"{ended_early} ended early"] * (ended_early > 0)
+        notes += [f"{passive_too} without a policy did"] * (passive_too > 0)
         notes += [f"{out_of_range} with F_m out of range"] * (out_of_range > 0)
         if notes:
             table.add_row("", f"of {len(pairs_here)} passes, " + ", ".join(notes), "", "", "")

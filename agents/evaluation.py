@@ -9,32 +9,44 @@ from typing import Any
 
 import numpy as np
 
-from panto_baselines.benchmark.run import FIRST_SPAN
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
+from panto_env.metrics import spans
+from panto_env.metrics.criterion import Criterion
 from panto_env.metrics.figures import Figures
-from panto_env.metrics.spans import last_whole_span
 
-NOT_OF_A_PASS = ("speed_kmh", "reward")
-"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward."""
+NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans")
+"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward, and
+runs until its start has died out."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One pass under a policy and the same pass without; figures leave out the run-in where a run is long
-    enough.
-    """
+    """One pass under a policy and the same pass without; a pass that ended early has no figures."""
 
     speed_kmh: float
     seed: int
+    spans: str  # that the figures cover, as "10-19"; "" if there are none
     policy: Figures
     passive: Figures
+    policy_compliance: tuple[Criterion, ...]  # with EN 50367 and EN 50119; empty where there are no figures
+    passive_compliance: tuple[Criterion, ...]
     nominal_force: float  # N
-    terminated: bool  # whether the policy's pass ended early
+    ending: str  # where and why the policy's pass ended early, or ""
+    passive_ending: str  # where and why the passive one did, or ""
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the policy's pass ended early."""
+        return self.ending != ""
 
     @property
     def ratio(self) -> float:
-        """Sigma divided by that of the passive pantograph; infinite where the pass ended early."""
+        """Sigma divided by that of the passive pantograph.
+
+        Infinite where the policy's pass ended early; else nan where the passive one did: there is nothing
+        to compare with.
+        """
         return math.inf if self.terminated else self.policy.std / self.passive.std
 
     @property
@@ -47,19 +59,24 @@ class Pair:
     def qualified(self) -> bool:
         """Whether the pass reached its end with a mean force within the range."""
         low, high = self.mean_range
-        return not self.terminated and low <= self.policy.mean <= high
+        return low <= self.policy.mean <= high
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, for JSON."""
         return {
             "speed_kmh": self.speed_kmh,
             "seed": self.seed,
+            "spans": self.spans,
             "std_change_percent": 100 * (self.ratio - 1),
             "qualified": self.qualified,
             "mean_range": self.mean_range,
             "terminated": self.terminated,
+            "ending": self.ending,
+            "passive_ending": self.passive_ending,
             "policy": self.policy.as_dict(),
             "passive": self.passive.as_dict(),
+            "policy_compliance": [criterion.as_dict() for criterion in self.policy_compliance],
+            "passive_compliance": [criterion.as_dict() for criterion in self.passive_compliance],
         }
 
 
@@ -70,7 +87,14 @@ class Comparison:
     arguments: Mapping[str, Any]
     speeds_kmh: Sequence[float]
     seeds: int
+    distance: float | None = None  # of a pass (m), by default until its start has died out and on
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What identifies the passes that have been run, but for speed and seed: plain data."""
+        run = next(iter(self._passive.values()))
+        return {name: value for name, value in run.settings.items() if name != "speed_kmh"}
 
     def run(self, policy: Any) -> list[Pair]:
         """Pairs at every speed and seed. Raises InputError where the policy does not fit the task."""
@@ -81,30 +105,34 @@ class Comparison:
     def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
         """Records of one pass under the policy and of the same pass without."""
         arguments = {key: value for key, value in self.arguments.items() if key not in NOT_OF_A_PASS}
-        arguments |= {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
+        arguments |= {"speed_kmh": speed_kmh, "seed": seed, "distance": self.distance}
+        arguments |= {"record_droppers": False}
         if (speed_kmh, seed) not in self._passive:
             self._passive[speed_kmh, seed] = simulate(**arguments)
         return simulate(**arguments, policy=policy), self._passive[speed_kmh, seed]
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
-    """Figures of two passes over the spans that the benchmark evaluates too."""
-    spans = None if active.terminated else evaluated_spans(passive)
+    """Figures of two passes over the spans after the start."""
+
+    def figures(run: Trajectory) -> Figures:
+        return Figures.none() if run.terminated else run.summary()
+
+    def compliance(run: Trajectory) -> tuple[Criterion, ...]:
+        return () if run.terminated else tuple(run.compliance())
+
     return Pair(
         speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
-        policy=active.summary(spans),
-        passive=passive.summary(spans),
+        spans=next((spans.in_words(run.spans()) for run in (active, passive) if not run.terminated), ""),
+        policy=figures(active),
+        passive=figures(passive),
+        policy_compliance=compliance(active),
+        passive_compliance=compliance(passive),
         nominal_force=active.nominal_force,
-        terminated=active.terminated,
+        ending=active.ending,
+        passive_ending=passive.ending,
     )
-
-
-def evaluated_spans(run: Trajectory) -> tuple[int, int] | None:
-    """First and last span after the run-in, counted from 1; None (all spans) where the run is too short."""
-    covered = float(run.position[-1] + run.position[0])  # positions are those of the steps' middles
-    last = last_whole_span(covered, run.span_length, tolerance=1e-9)
-    return (FIRST_SPAN, last) if last >= FIRST_SPAN else None
 
 
 def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
@@ -115,6 +143,8 @@ def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
 def in_words(pairs: Sequence[Pair]) -> str:
     """The verdict as a clause."""
     ratio, qualified = verdict(pairs)
+    if any(pair.passive_ending for pair in pairs):
+        return "the passive pantograph's run ended early: there is nothing to compare with"
     if math.isinf(ratio):
         return "a run ended early"
     return f"σ {100 * (ratio - 1):+.1f} % of passive" + ("" if qualified else ", F_m out of range")

@@ -17,10 +17,10 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ValidationError
 
-from panto_env import __version__
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_whole
 from panto_env.base.settings import Settings
+from panto_env.base.version import __version__
 from panto_env.control.context import Context
 
 from .actor import Actor

@@ -10,7 +10,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive
 
 from .actor import Actor
-from .algorithm import Algorithm, Count, Share
+from .algorithm import MOST_KEPT, Algorithm, Count, Share
 
 
 class PPO(Algorithm):
@@ -27,7 +27,12 @@ class PPO(Algorithm):
     log_std_init: float = Field(-1.0, description="log of the action's first standard deviation")
 
     def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where minibatches do not divide the steps of an update evenly."""
+        """Raise InputError where minibatches do not divide the steps of an update evenly, or are too many."""
+        if lanes * self.n_steps > MOST_KEPT:
+            raise InputError(
+                f"lanes x n_steps = {lanes * self.n_steps:,} must be at most {MOST_KEPT:,}: so many steps "
+                "are kept in memory"
+            )
         if lanes * self.n_steps % self.batch_size or lanes * self.n_steps == 1:
             raise InputError(
                 f"lanes x n_steps = {lanes * self.n_steps} must be a multiple of batch_size = "

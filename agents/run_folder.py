@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.base.errors import InputError
-from panto_env.base.files import write_whole
+from panto_env.base.files import make_folder, write_whole
 
 from .evaluation import Pair
 from .model_file import read_model
@@ -80,6 +80,7 @@ class RunFolder:
         return parse_training(table, str(self.settings))
 
     def _write_settings(self, training: Training) -> None:
+        make_folder(self.checkpoints)
         with write_whole(self.settings) as temporary:
             temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
 

@@ -10,14 +10,16 @@ from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative
 
 from .actor import Actor
-from .algorithm import Algorithm, Count, Share
+from .algorithm import MOST_KEPT, Algorithm, Count, Share
 
 
 class SAC(Algorithm):
     """Hyperparameters of SAC."""
 
     activation: Literal["tanh", "relu"] = Field("relu", description="of the hidden layers")
-    buffer_size: Count = Field(200_000, description="transitions that the replay buffer holds")
+    buffer_size: Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)] = Field(
+        200_000, description="transitions that the replay buffer holds"
+    )
     learning_starts: Annotated[int, Field(ge=0, strict=True)] = Field(
         2_000, description="steps with random actions before learning starts"
     )

@@ -8,9 +8,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
+from panto_configs import find
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
-from panto_env.base.settings import Positive, Settings, parse, suggest
+from panto_env.base.names import suggest
+from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
@@ -20,6 +22,10 @@ from .ppo import PPO
 from .sac import SAC
 
 ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}
+
+
+MOST_LANES = 65_536
+"""Of which each has a line of its own in memory."""
 
 
 class Evaluation(Settings):
@@ -38,7 +44,9 @@ class Training(Settings):
     algorithm: str = Field(description="one of ALGORITHMS")
     seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all random numbers")
     total_steps: Count = Field(description="environment steps, summed over all lanes")
-    lanes: Count = Field(8, description="environments stepped together")
+    lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
+        8, description="environments stepped together"
+    )
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
     evaluation: Evaluation
@@ -61,8 +69,8 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     Raises InputError where the id or the name of an argument is unknown.
     """
     name = environment.get("id")
-    if name not in IDS:
-        raise InputError(f"[environment]: unknown id {name!r}: {suggest(str(name), list(IDS))}")
+    if not isinstance(name, str) or name not in IDS:
+        raise InputError(f"unknown id {name!r}: {suggest(str(name), list(IDS))}.")
     own = {key: value for key, value in environment.items() if key != "id"}
     _check_keys(own, tuple(fields()), "[environment]")
     return {**IDS[name], **own}
@@ -75,15 +83,15 @@ def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
 
 
 def load_training(path: str | Path, **changes: Any) -> Training:
-    """Read a training from a TOML file; ``changes`` (seed, total_steps) replace the file's unless None.
+    """Read a training from a TOML file, given by its path or by a name of ``configs/``.
+
+    ``changes`` (seed, total_steps) replace the file's unless None.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    if not Path(path).exists():
-        raise InputError(f"The training file {path} does not exist; give a TOML file's path.")
-    table = read_toml(path)
+    file = find(path, "training")
     replacements = {key: value for key, value in changes.items() if value is not None}
-    return parse_training(table | replacements, str(path))
+    return parse_training(read_toml(file) | replacements, str(path))
 
 
 def parse_training(table: Mapping[str, Any], name: str) -> Training:
@@ -91,9 +99,9 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
     try:
         _check_keys(table, tuple(Training.model_fields), "the top level")
         algorithm = table.get("algorithm")
-        if algorithm not in ALGORITHMS:
+        if not isinstance(algorithm, str) or algorithm not in ALGORITHMS:
             raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
-        algorithm_type = ALGORITHMS[str(algorithm)]
+        algorithm_type = ALGORITHMS[algorithm]
         for key, expected in (("hyperparameters", algorithm_type), ("evaluation", Evaluation)):
             if isinstance(table.get(key), Mapping):
                 _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")

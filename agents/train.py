@@ -130,7 +130,7 @@ class Run:
             updates=self.model._n_updates,
             environment=self.training.environment,
             needs=self._needs,
-            ratio=None if math.isinf(ratio) else ratio,
+            ratio=ratio if math.isfinite(ratio) else None,
             qualified=qualified,
             activation=actor.activation,
             squashed=actor.squashed,

@@ -7,22 +7,31 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from panto_env.envs import PantographVectorEnv
+from panto_env.base.errors import InputError
+from panto_env.envs import IDS, PantographVectorEnv
 
 
 class PantographVecEnv(VecEnv):  # type: ignore[misc]
-    """A ``VecEnv`` around a ``PantographVectorEnv`` with autoreset in the same step.
+    """A ``VecEnv`` around a vector environment of Gymnasium, ``PantographVectorEnv`` or a wrapper of one.
 
-    Observations and rewards are those of the native environment, not copied again. When its episode
-    ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the episode's "figures".
+    Any mode of autoreset will do. Observations and rewards are those of the environment, not copied again.
+    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the
+    episode's "figures".
     """
 
-    def __init__(self, env: PantographVectorEnv) -> None:
-        self.env = env
-        self.seconds = 0.0  # spent in the native environment's steps so far
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        """Raises InputError for what is no vector environment of this project."""
+        if not (isinstance(env, VectorEnv) and isinstance(env.unwrapped, PantographVectorEnv)):
+            raise InputError(
+                f"PantographVecEnv takes what gymnasium.make_vec makes of {', '.join(IDS)}, "
+                f"not {type(env).__name__}; Stable-Baselines3 takes single environments as they are."
+            )
+        self.env: Any = env
+        self.seconds = 0.0  # spent in the environment so far
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
@@ -32,7 +41,8 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [{"speed_kmh": float(speed)} for speed in info["speed_kmh"]]
-        return observation
+        first: NDArray[np.float32] = observation
+        return first
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions, (lanes, actions), for ``step_wait``."""
@@ -42,18 +52,22 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         """Step all lanes: observations, rewards, dones and one info per lane."""
         start = time.perf_counter()
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
-        self.seconds += time.perf_counter() - start
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
-            final_observation, figures = info["final_obs"], info["final_info"]["figures"]
+            if "final_obs" in info:  # same-step autoreset
+                last, figures = info["final_obs"], info["final_info"]["figures"]
+            else:  # next-step or no autoreset: those that have ended begin anew now, as is expected here
+                last, figures = observation, info["figures"]
+                observation, _ = self.env.reset(options={"reset_mask": done})
             names = [name for name in figures if not name.startswith("_")]  # "_name" says who has one
             for lane in np.flatnonzero(done).tolist():
                 infos[lane] = {
-                    "terminal_observation": final_observation[lane],
-                    "TimeLimit.truncated": bool(truncated[lane]),
+                    "terminal_observation": last[lane],
+                    "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
                     "figures": {name: float(figures[name][lane]) for name in names},
                 }
+        self.seconds += time.perf_counter() - start
         return observation, reward.astype(np.float32), done, infos
 
     def close(self) -> None:

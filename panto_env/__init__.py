@@ -2,10 +2,10 @@
 
 from .analysis.simulation import simulate
 from .base.errors import InputError
+from .base.version import __version__
 from .envs import register
 from .metrics.trajectory import Trajectory
 
-__all__ = ["InputError", "Trajectory", "simulate"]
-__version__ = "0.1.0"
+__all__ = ["InputError", "Trajectory", "__version__", "simulate"]
 
 register()

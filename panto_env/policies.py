@@ -1,9 +1,13 @@
-"""What a policy is, and how it is found by name."""
+"""What a policy is, how it is found by name, and how one is run whose code may be anyone's."""
 
 from __future__ import annotations
 
-import ast
+import inspect
 import runpy
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,7 +16,8 @@ from numpy.typing import NDArray
 
 from .base import plugins
 from .base.errors import InputError
-from .base.settings import suggest
+from .base.inline import parse_inline
+from .base.names import suggest
 from .control.context import Context
 
 
@@ -29,7 +34,8 @@ class Policy(Protocol):
 def find_policy(source: Any) -> Policy:
     """Policy from an object, a name, a model file, or a class in a file of yours.
 
-    A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5".
+    A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5". A file is
+    run once in a process, and anew when it has changed.
 
     Raises InputError where there is none such.
     """
@@ -58,29 +64,11 @@ def find_policy(source: Any) -> Policy:
     )
 
 
-def _make(maker: Any, source: str, parameters: str) -> Policy:
-    try:
-        policy: Policy = maker(**_parameters(source, parameters))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"Policy '{source}' cannot be made: {error}.") from error
-    return policy
-
-
-def _policy_from_file(source: str, path: Path, text: str) -> Policy:
-    """Policy of the class that ``text``, "Name" or "Name:key=value,...", names in a Python file."""
-    name, _, parameters = text.partition(":")
-    if not name:
-        raise InputError(f"Policy '{source}' must name a class in the file, as {source}:Name.")
-    if not path.is_file():
-        raise InputError(f"The Python file {path} does not exist; check the path.")
-    try:
-        content = runpy.run_path(str(path))
-    except Exception as error:
-        raise InputError(f"{path} cannot be run: {type(error).__name__}: {error}.") from error
-    if not callable(content.get(name)):
-        classes = [key for key, value in content.items() if isinstance(value, type)]
-        raise InputError(f"{path} has no class '{name}': it has {', '.join(classes) or 'none'}.")
-    return find_policy(_make(content[name], source, parameters))
+def with_parameters(source: str, parameters: str) -> str:
+    """A policy's name with more parameters, "key=value,...", behind those that it may have."""
+    name = source.partition(":")[0]
+    colons = 2 if name.endswith(".py") else 1  # of which the last is before the parameters
+    return f"{source}{',' if source.count(':') >= colons else ':'}{parameters}"
 
 
 def policy_names() -> list[str]:
@@ -88,14 +76,73 @@ def policy_names() -> list[str]:
     return list(plugins.installed(plugins.POLICIES))
 
 
-def _parameters(source: str, text: str) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for part in filter(None, text.split(",")):
-        key, equals, value = part.partition("=")
-        if not equals:
-            raise InputError(f"Policy '{source}': '{part}' must read key=value.")
-        try:
-            values[key.strip()] = ast.literal_eval(value.strip())
-        except (ValueError, SyntaxError):
-            values[key.strip()] = value.strip()
-    return values
+def maker_of(name: str) -> Callable[..., Policy]:
+    """What makes the installed policy of this name, from its parameters."""
+    maker: Callable[..., Policy] = plugins.load(plugins.installed(plugins.POLICIES)[name])
+    return maker
+
+
+def parameters_of(maker: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+    """The parameters that a policy can be made with, by name."""
+    return inspect.signature(maker).parameters
+
+
+@contextmanager
+def errors_name(policy: str, method: str) -> Iterator[None]:
+    """Within the body errors of a policy become an InputError that names it, the method, file and line."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"The policy '{policy}' failed in {method}: {error}") from error
+    except Exception as error:  # the policy may be anyone's code
+        raise InputError(f"The policy '{policy}' failed in {method}, {_told(error)}.") from error
+
+
+def _told(error: BaseException) -> str:
+    """Where an error was raised, its kind and what it says."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    words = " ".join(str(error).split()).removesuffix(".")
+    return f"at {place.filename}:{place.lineno}: {type(error).__name__}{f': {words}' if words else ''}"
+
+
+def _make(maker: Any, source: str, text: str) -> Policy:
+    try:
+        given = parse_inline(text)
+    except InputError as error:
+        raise InputError(f"Policy '{source}': {error}") from error
+    known = parameters_of(maker)
+    takes_any = any(parameter.kind is parameter.VAR_KEYWORD for parameter in known.values())
+    for name in () if takes_any else given:
+        if name not in known:
+            which = suggest(name, list(known)) if known else "it has none"
+            raise InputError(f"Policy '{source}' has no parameter '{name}': {which}.")
+    try:
+        policy: Policy = maker(**given)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"Policy '{source}' cannot be made: {str(error).removesuffix('.')}.") from error
+    except Exception as error:
+        raise InputError(f"Policy '{source}' cannot be made, {_told(error)}.") from error
+    return policy
+
+
+def _policy_from_file(source: str, path: Path, text: str) -> Policy:
+    """Policy of the class that ``text``, "Name" or "Name:key=value,...", names in a Python file."""
+    name, _, parameters = text.partition(":")
+    if not name:
+        raise InputError(f"Policy '{source}' must name a class in the file, as {path}:Name.")
+    if not path.is_file():
+        raise InputError(f"The Python file {path} does not exist; check the path.")
+    content = _run_file(path.resolve(), path.stat().st_mtime_ns)
+    if not callable(content.get(name)):
+        classes = [key for key, value in content.items() if isinstance(value, type)]
+        raise InputError(f"{path} has no class '{name}': it has {', '.join(classes) or 'none'}.")
+    return find_policy(_make(content[name], source, parameters))
+
+
+@cache
+def _run_file(path: Path, _modified: int) -> dict[str, Any]:
+    """Names and values of a Python file that has been run."""
+    try:
+        return runpy.run_path(str(path))
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{path} cannot be run, {_told(error)}.") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .analysis.plots import say_what_is_hidden
 from .metrics.trajectory import Trajectory
 
 
@@ -29,5 +30,7 @@ def picture(run: Trajectory) -> NDArray[np.uint8]:
     height.plot(run.position[near], 1e3 * run.head[near], color="tab:blue", label="collector head")
     height.set(xlabel="position (m)", ylabel="height (mm)", xlim=(end - reach, end), ylim=(-60, 200))
     height.legend(loc="upper left", ncols=2, fontsize="small")
+    for axis in (force, height):
+        say_what_is_hidden(axis)
     canvas.draw()
     return np.array(canvas.buffer_rgba())[..., :3].copy()

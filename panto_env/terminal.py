@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -14,11 +14,27 @@ import rich.table
 import typer
 from rich.console import Console
 
-from .base.files import finite
+from .base.files import PICTURES, check_output, finite
 from .base.table import Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
-Plot = Annotated[str | None, typer.Option(help="Write a picture to this file (.png, .svg, .pdf).")]
+
+
+def writable(suffixes: Sequence[str]) -> Callable[[str | None], str | None]:
+    """What checks an option that names a file to write, before the command begins its work."""
+
+    def check(path: str | None) -> str | None:
+        if path is not None:
+            check_output(path, suffixes)
+        return path
+
+    return check
+
+
+Plot = Annotated[
+    str | None,
+    typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
+]
 
 console = Console()
 progress_console = Console(stderr=True)

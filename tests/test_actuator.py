@@ -14,9 +14,9 @@ pytestmark = pytest.mark.plain
 STEP = 1e-3
 
 
-def response(actuator, command, steps=200):
+def response(actuator, command, steps=200, step=STEP):
     line, pantograph = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
-    plant = Plant(line, pantograph, numerics=Numerics(time_step=STEP), actuator=actuator)
+    plant = Plant(line, pantograph, numerics=Numerics(time_step=step), actuator=actuator)
     samples = plant.samples(steps + 1)
     plant.start(0, 50.0)
     plant.advance(np.array([[[command, 0.0]]]), steps, samples)
@@ -29,18 +29,46 @@ def test_ideal_actuator_follows_at_once_within_its_limit():
     assert response(LaggedActuator(), -500.0, 1).tolist() == [-100.0]
 
 
-def test_delay_and_lag_are_those_of_the_closed_form():
-    forces = response(LaggedActuator(delay=0.005, lag=0.015), 60.0)
-    time = STEP * (np.arange(200) + 1)
-    expected = 60 * (1 - np.exp(-np.maximum(time - 0.005, 0) / 0.015))
-    np.testing.assert_allclose(forces, expected, atol=1e-9)
+def rises(time):
+    """Share of a step of command that a lag of 15 ms has followed."""
+    return 1 - np.exp(-np.maximum(time, 0) / 0.015)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.005, 0.0052, 0.0004, 0.00575])
+def test_force_is_the_mean_over_the_step_of_the_closed_form_s(delay):
+    """Whole steps of delay and parts of one: with a part the command's mean over the step counts."""
+    forces = response(LaggedActuator(delay=delay, lag=0.015), 60.0)
+    fine = STEP / 100 * (np.arange(20000) + 0.5)
+    expected = 60 * rises(fine - delay).reshape(200, 100).mean(axis=1)
+    whole = round(delay / STEP) == pytest.approx(delay / STEP)
+    np.testing.assert_allclose(forces, expected, atol=1e-3 if whole else 0.6)  # N; a step changes 4 N
+    np.testing.assert_allclose(forces[20:], expected[20:], atol=2e-2)
+
+
+def test_a_delay_without_a_lag_shifts_the_command_by_itself():
+    forces = response(LaggedActuator(delay=0.00325), 60.0, 6)
+    assert forces == pytest.approx([0.0, 0.0, 0.0, 45.0, 60.0, 60.0])
+
+
+@pytest.mark.parametrize("step", [1e-3, 2e-3, 2.5e-3])
+def test_the_impulse_of_a_command_does_not_depend_on_the_step(step):
+    """A delay of 5 ms is 5 ms, also where the step is 2 ms."""
+    forces = response(LaggedActuator(delay=0.005, lag=0.015), 60.0, round(0.1 / step), step)
+    assert step * forces.sum() == pytest.approx(60 * (0.095 - 0.015 * rises(0.095)), rel=5e-4)
 
 
 def test_rate_limit():
+    """A ramp, whose mean over a step is that at its middle."""
     forces = response(LaggedActuator(rate_limit=2500.0), 100.0)
-    assert np.diff(forces, prepend=0.0).max() == pytest.approx(2.5)
-    assert forces[-1] == 100.0
+    assert forces[:40] == pytest.approx(2.5 * (np.arange(40) + 0.5))
+    assert (forces[40:] == 100.0).all()
     assert (response(LaggedActuator(rate_limit=2500.0), -100.0) == -forces).all()
+
+
+def test_a_ramp_that_ends_within_a_step_counts_as_its_mean():
+    """51 N at 2.5 N a step: in the 21st step 1 N is gone in 0.4 of it."""
+    forces = response(LaggedActuator(rate_limit=2500.0), 51.0, 22)
+    assert forces[20:] == pytest.approx([50.0 + 1.0 * (1 - 0.2), 51.0])
 
 
 def test_presets_and_errors():

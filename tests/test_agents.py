@@ -367,10 +367,11 @@ class TestCommand:
         assert "final model (step 256)" in resumed.stdout
 
     def test_evaluate_takes_names(self, panto):
-        result = panto("evaluate", "p", "--speed", 250, "--distance", 310, "--json")
+        result = panto("evaluate", "p", "--speed", 250, "--distance", 660, "--json")
         assert result.exit_code == 0, result.output
         (entry,) = json.loads(result.stdout)["passes"]
-        expected = simulate(speed_kmh=250, policy="p", distance=310).summary((4, 5))
+        expected = simulate(speed_kmh=250, policy="p", distance=660).summary((10, 11))
+        assert entry["spans"] == "10-11"
         assert entry["policy"]["std"] == expected.std
         assert entry["passive"]["effort"] == 0
         unknown = panto("evaluate", "nobody")

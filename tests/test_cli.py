@@ -51,9 +51,9 @@ def test_simulate_writes_run_plot_and_figures(tmp_path):
 
 
 def test_simulate_takes_a_policy_and_prints_a_table():
-    result = panto("simulate", "--policy", "p", "--distance", 120)
+    result = panto("simulate", "--policy", "p", "--distance", 120, "--spans", "all")
     assert result.returncode == 0, result.stderr
-    assert "policy p" in result.stdout
+    assert "policy p, spans all" in result.stdout
     assert "standard deviation" in result.stdout
 
 

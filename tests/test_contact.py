@@ -10,28 +10,27 @@ pytestmark = pytest.mark.plain
 law = python_function(contact_force)
 
 
-def test_force_is_the_mean_of_the_springs_at_both_ends_of_the_step():
-    stiffness, gap_0, gap_free, compliance = 50e3, 2e-3, 3e-3, 1e-5
-    force = law(stiffness, gap_0, stiffness, gap_free, 0.0, compliance, 0.0)
-    gap_1 = gap_free - compliance * force
-    assert force == pytest.approx(stiffness * (gap_0 + gap_1) / 2)
+def test_force_is_that_of_a_spring_at_the_mean_gap():
+    stiffness, gap, yields = 50e3, 2.5e-3, 5e-6
+    force = law(stiffness, gap, 1e-3, 0.0, yields, 1e-5, 0.0)
+    assert force == pytest.approx(stiffness * (gap - yields * force))
 
 
 def test_damper_adds_its_rate():
-    force = law(50e3, 2e-3, 50e3, 3e-3, 1e4, 0.0, 0.0)
+    force = law(50e3, 2.5e-3, 1e-3, 1e4, 0.0, 0.0, 0.0)
     assert force == pytest.approx(50e3 * 2.5e-3 + 1e4 * 1e-3)
 
 
-def test_stiffness_may_change_and_the_damper_gives_way_too():
-    gap_0, gap_free, compliance, damping = 2e-3, 3e-3, 1e-5, 4e4
-    force = law(50e3, gap_0, 30e3, gap_free, damping, compliance, 0.0)
-    gap_1 = gap_free - compliance * force
-    assert force == pytest.approx((50e3 * gap_0 + 30e3 * gap_1) / 2 + damping * (gap_1 - gap_0))
+def test_spring_and_damper_give_way_to_the_force_each_by_its_own():
+    stiffness, gap, change, damping, yields, compliance = 30e3, 2.5e-3, 1e-3, 4e4, 4e-6, 1e-5
+    force = law(stiffness, gap, change, damping, yields, compliance, 0.0)
+    spring, damper = stiffness * (gap - yields * force), damping * (change - compliance * force)
+    assert force == pytest.approx(spring + damper)
 
 
 def test_contact_only_pushes_unless_told_otherwise():
-    assert law(50e3, -1e-3, 50e3, -2e-3, 0.0, 1e-5, 0.0) == 0.0
-    assert law(50e3, -1e-3, 50e3, -2e-3, 0.0, 1e-5, -np.inf) < 0.0
+    assert law(50e3, -1.5e-3, -1e-3, 0.0, 5e-6, 1e-5, 0.0) == 0.0
+    assert law(50e3, -1.5e-3, -1e-3, 0.0, 5e-6, 1e-5, -np.inf) < 0.0
 
 
 def test_mass_bouncing_on_a_spring_matches_scipy_and_keeps_its_energy():
@@ -45,8 +44,9 @@ def test_mass_bouncing_on_a_spring_matches_scipy_and_keeps_its_energy():
     z, v, energy = -5e-3, 0.0, []
     for _ in range(round(end / step)):
         free = z + v * step + weight * step**2 / (2 * mass)
-        force = law(stiffness, z, stiffness, free, 0.0, step**2 / (2 * mass), 0.0)
-        z, v = free - force * step**2 / (2 * mass), v + (weight - force) * step / mass
+        yields = step**2 / (2 * mass)
+        force = law(stiffness, 0.5 * (z + free), free - z, 0.0, 0.5 * yields, yields, 0.0)
+        z, v = free - yields * force, v + (weight - force) * step / mass
         energy.append(mass * v**2 / 2 + stiffness * max(z, 0.0) ** 2 / 2 - weight * z)
     assert z == pytest.approx(exact.y[0, -1], abs=3e-5)
     assert max(energy) / min(energy) - 1 < 0.02

@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 import panto_env
 from panto_env import InputError
 from panto_env.envs import IDS
+from panto_env.envs.infos import told
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +47,7 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     _, infos, terminated = run_episode(env)
     assert not terminated
     run = env.unwrapped.trajectory
-    figures = run.summary()
+    figures = run.summary("all")
     sums = {key: sum(info["reward_terms"][key] for info in infos) for key in infos[0]["reward_terms"]}
     assert sums["cost_function"] == pytest.approx(figures.cost_function, rel=1e-9)
     assert sums["contact_loss"] == pytest.approx(figures.contact_loss, rel=1e-9, abs=1e-9)
@@ -56,8 +57,8 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
         np.trapezoid(np.abs(run.contact_force - run.nominal_force), dx=stride), rel=1e-9
     )
     # Kept sample by sample instead of computed from all of them: the same but for rounding.
-    assert infos[-1]["figures"] == pytest.approx(figures.as_dict(), rel=1e-9, nan_ok=True)
-    assert "figures" not in infos[0]
+    assert infos[-1]["figures"] == pytest.approx(told(figures), rel=1e-9)
+    assert set(infos[0]["figures"].values()) == {np.inf}  # to come
 
 
 def test_weights_scale_the_reward():
@@ -154,7 +155,7 @@ def test_observation_shows_what_it_says():
 
 
 def test_sensor_delay_and_noise():
-    quiet, late = (gymnasium.make("Pantograph-v0", sensors={"delay": delay}) for delay in (0.0, 0.01))
+    quiet, late = (gymnasium.make("Pantograph-v0", sensors={"delay": delay}) for delay in (0.0, 0.010625))
     quiet.reset(seed=0)
     late.reset(seed=0)
     before = None
@@ -209,15 +210,15 @@ def test_bad_action_is_refused_and_changes_nothing(action):
         ({"speed_kmh": "fast"}, "must be a number or a range of two"),
         ({"catenary": "en50318"}, "did you mean 'en50318-2002'"),
         ({"pantograph": "missing.toml"}, "missing.toml does not exist"),
-        ({"actuator": "strong"}, "actuator must be 'ideal' or 'realistic' or a table"),
+        ({"actuator": "strong"}, "actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "sensors is not valid: key 'noise'"),
         ({"reward": {"cost_function": -1}}, "reward is not valid: key 'cost_function'"),
         ({"observation": "everything"}, "observation must be one of measured, full"),
         ({"distance": -5}, "distance must be a positive number"),
-        ({"distance": 1e9}, "spans"),
-        ({"control_interval": 0.0015}, "whole number of time steps"),
+        ({"distance": 1e9}, "distance must be at most 59,940 m"),
+        ({"control_interval": 0.0015, "time_step": 1e-3}, "whole number of time steps"),
         ({"time_step": 0}, "time_step must be greater than 0, not 0"),
-        ({"window": 4}, "must be an odd number of spans"),
+        ({"window": 2}, "must be a number of spans from 3 up"),
         ({"precision": "half"}, "precision must be 'single' or 'double', not 'half'"),
         ({"spans": 1}, "spans must be a whole number from 3 to 1000"),
         ({"render_mode": "human"}, "render_mode must be None or 'rgb_array'"),

@@ -190,9 +190,9 @@ def test_fitting_performance_is_100_for_the_truth_and_less_for_others():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"k1T": float("nan")}, "must be a number above 0"),
-        ({"m2": 0.0}, "m2 must be a number above 0"),
-        ({"c3": -1.0}, "0 or above"),
+        ({"k1T": float("nan")}, "k1T must be a number from 1,000 to 1e.06 N/m, not nan"),
+        ({"m2": 0.0}, "m2 must be a number from 0.1 to 200 kg, not 0"),
+        ({"c3": -1.0}, "c3 must be a number from 0 to 100,000 N s/m, not -1"),
         ({"k9": 1.0}, "'k9' is not known"),
         (dict(zip(IDENTIFIED, TRUE, strict=True)), "at least one"),
     ],

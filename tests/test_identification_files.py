@@ -126,7 +126,7 @@ def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
     catalogue = simulate("shinkansen-simple", "identified-2dof", 200.0, distance=150)
     np.testing.assert_allclose(own.contact_force, catalogue.contact_force, atol=1.0)
     simulated = panto("simulate", "--catenary", "shinkansen-simple", "--pantograph", tmp_path / "mine.toml",
-                      "--distance", "100")  # fmt: skip
+                      "--distance", "100", "--spans", "all")  # fmt: skip
     assert simulated.returncode == 0, simulated.stderr
 
 

@@ -12,9 +12,9 @@ PACKAGE = Path(panto_env.__file__).parent
 CODE = """
 import time, numpy as np
 from panto_env import simulate
-from panto_env.plant import step
+from panto_env.control import step
 run = simulate("periodic-stiffness", "three-mass", 200, distance=20.0)
-hits = sum(step.advance.stats.cache_hits.values())
+hits = sum(step.control_step.stats.cache_hits.values())
 print(hits, repr(float(run.contact_force.sum())))
 """
 

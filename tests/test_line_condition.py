@@ -16,7 +16,7 @@ from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.schema import Rayleigh
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import DrawnLine, LineCondition, draw
-from panto_env.plant.numerics import Numerics
+from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 
 from .finite_element import simulation as finite_element
@@ -133,11 +133,15 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     data = data.model_copy(update={"damping": Rayleigh(alpha=2.0, beta=1e-4)})
     condition = LineCondition(miscut_droppers=[(3, 4, 0.02)])
     plant = Plant(
-        data, load_pantograph(BENCHMARK), spans=5, numerics=Numerics(**WHOLE), conditions=[condition]
+        data,
+        load_pantograph(BENCHMARK),
+        spans=5,
+        numerics=Numerics(**WHOLE),
+        runs=Runs(conditions=[condition]),
     )
     at, system = 2 * 55 + 21.75, build(data, 5, 0.25)
     node = int(np.argmin(np.abs(system.nodes - at)))
-    heights, slack = np.zeros(5000), []
+    heights, slack = np.zeros(9000), []
     for force in (0.0, -10.0, -200.0):
         load = np.zeros(system.free.size)
         load[4 * node + 2] = force

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from panto_env import InputError
-from panto_env.metrics import en50367
 from panto_env.metrics.figures import Figures, contact_loss, cost_function
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import low_pass
@@ -41,27 +40,6 @@ def test_cost_function_is_eq_14_written_out():
 
 def test_contact_loss_is_a_share_of_distance():
     assert contact_loss(np.array([0.0, 1.0, 0.0, 5.0])) == 50.0
-
-
-def test_en50367_limits_at_both_sides_of_their_speeds():
-    figures = Figures(100, 31, 0, 0, 320, 0, 0, 0.15, 0, 0, 0, 100)
-    slow = en50367.checks(figures, 190 / 3.6)
-    fast = en50367.checks(figures, 280 / 3.6)
-    assert (slow["max"], slow["contact_loss"]) == (False, False)
-    assert (fast["max"], fast["contact_loss"]) == (True, True)
-    assert not fast["std"]
-
-
-def test_limit_of_the_mean_is_a_parabola_of_speed_in_kmh():
-    """0.00097 v^2 + 70, v in km/h."""
-    assert en50367.mean_limit(300 / 3.6) == pytest.approx(157.3)
-    at_limit, above = (Figures(mean, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 100) for mean in (157.2, 157.4))
-    assert en50367.checks(at_limit, 300 / 3.6)["mean"]
-    assert not en50367.checks(above, 300 / 3.6)["mean"]
-
-
-def test_limit_of_the_maximum_changes_above_200_kmh():
-    assert [en50367.maximum_limit(speed / 3.6) for speed in (190, 200, 205, 300)] == [300, 300, 350, 350]
 
 
 def test_every_figure_has_its_label():

@@ -9,8 +9,10 @@ from panto_env.catalog import load_catenary, load_pantograph
 from .pantograph_alone import means, replay, rest
 
 LINE = load_catenary("periodic-stiffness")
-FORCE_LIMIT = 80.0
-FIVE_MASSES = load_pantograph("three-mass").model_copy(
+FORCE_LIMIT, STRIP = 80.0, 20e3
+# An elastic strip: under a rigid one a massless wire is as high as the head.
+THREE_MASSES = load_pantograph("three-mass").model_copy(update={"contact_stiffness": STRIP})
+FIVE_MASSES = THREE_MASSES.model_copy(
     update={
         "name": "five-mass",
         "masses": (7.5, 2.0, 4.6, 3.0, 4.8),
@@ -18,7 +20,7 @@ FIVE_MASSES = load_pantograph("three-mass").model_copy(
         "dampings": (10.0, 15.0, 5.0, 20.0, 32.0),
     }
 )
-PANTOGRAPHS = {"three masses": load_pantograph("three-mass"), "five masses": FIVE_MASSES}
+PANTOGRAPHS = {"three masses": THREE_MASSES, "five masses": FIVE_MASSES}
 
 
 class Episode:
@@ -52,7 +54,8 @@ class Episode:
             self.actions = np.vstack([self.actions, action])
         self.run = self.env.trajectory
         self.per_control = round(0.01 / self.run.time_step)
-        start = rest(pantograph, self.run.nominal_force, self._stiffness(0.0))
+        pressed = 1 / (1 / STRIP + 1 / self._stiffness(0.0))
+        start = rest(pantograph, self.run.nominal_force, pressed)
         self.states = replay(self.run, pantograph, start)
 
     def _stiffness(self, position):
@@ -76,7 +79,10 @@ class Episode:
         masses = self.states.shape[1] // 2
         position = self.speed * 0.01 * np.arange(len(self.observations))
         angle = 2 * np.pi * position / LINE.span_length
-        contact = self.last(self.run.contact_force, self._stiffness(0.0) * self.states[0, 0])
+        half_stride = 0.5 * self.speed * self.run.time_step
+        contact = self.last(
+            self.run.contact_force, self.states[0, 0] / (1 / STRIP + 1 / self._stiffness(0.0))
+        )
         names = {
             "head displacement": self.last_mean(self.states[:, 0]),
             "frame displacement": self.last_mean(self.states[:, masses - 1]),
@@ -86,7 +92,7 @@ class Episode:
             "sine of span position": np.sin(angle),
             "cosine of span position": np.cos(angle),
             "speed": np.full(len(position), self.speed),
-            "wire displacement": contact / self._stiffness(position),
+            "wire displacement": contact / self._stiffness(np.append(0.0, position[1:] - half_stride)),
         }
         names |= {"frame force": 0.0 * position, "head force": 0.0 * position}
         for place, actions in zip(self.driven, self.actions.T, strict=True):

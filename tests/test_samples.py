@@ -72,15 +72,17 @@ def test_time_and_position_are_those_of_the_middle_of_the_step(run):
 
 
 def test_massless_wire_stands_where_its_stiffness_bears_the_force(run):
-    """The wire has no mass, so F = k(x) w; the stiffness is that of the step's end."""
-    end = run.position + 0.5 * run.time_step * SPEED_KMH / 3.6
+    """The wire has no mass, so F = k(x) w; the stiffness is that of mid-step."""
     assert run.contact_force.min() == 0.0  # unloaded, the wire is back at rest
-    assert run.wire == pytest.approx(run.contact_force / stiffness(end), abs=1e-12)
+    assert run.wire == pytest.approx(run.contact_force / stiffness(run.position), abs=1e-12)
 
 
 @pytest.mark.parametrize("condition", ["new", "worn"])
-def test_contact_is_the_mean_of_its_springs_at_both_ends_and_its_damper(condition):
-    """The line's stiffness and the strip's are in series; the gap is counted from an uneven wire."""
+def test_contact_is_its_spring_at_the_mean_gap_and_its_damper(condition):
+    """The line's stiffness and the strip's are in series; the gap is counted from an uneven wire.
+
+    The spring counts the head's mean height from the wire's at mid-step, the damper what either rises.
+    """
     strip, damping = 20e3, 80.0
     data = PANTOGRAPH.model_copy(update={"contact_stiffness": strip, "contact_damping": damping})
     settings = {"catenary": LINE, "pantograph": data, "line_condition": condition, "distance": 100.0}
@@ -88,7 +90,7 @@ def test_contact_is_the_mean_of_its_springs_at_both_ends_and_its_damper(conditio
     task.reset(0, np.random.default_rng(3))
     task.run_passively()
     run = task.trajectory(0)
-    position = SPEED_KMH / 3.6 * run.time_step * np.arange(len(run.time) + 1)
+    position = SPEED_KMH / 3.6 * run.time_step * np.arange(0, len(run.time) + 0.5, 0.5)  # ends, middles
     height = np.zeros(len(position))
     if condition == "worn":  # cosines of random phase, and waves of wear from their deepest on
         turns = np.random.default_rng(3).uniform(0, 1, 3)
@@ -98,21 +100,18 @@ def test_contact_is_the_mean_of_its_springs_at_both_ends_and_its_damper(conditio
         height -= 0.15e-3 * np.cos(2 * np.pi * position / 0.8)
     springs = 1 / (1 / strip + 1 / stiffness(position))
     states = replay(run, data, rest(data, run.nominal_force, springs[0], height[0]))
-    gap = states[:, 0] - height
-    expected = means(springs * gap) + damping * np.diff(gap) / run.time_step
+    gap = means(states[:, 0]) - height[1::2]
+    closing = np.diff(states[:, 0] - height[::2]) / run.time_step
+    expected = springs[1::2] * gap + damping * closing
     assert run.contact_force == pytest.approx(np.maximum(expected, 0.0), rel=1e-6, abs=1e-3)
-    assert run.wire == pytest.approx(means(height) + run.contact_force / stiffness(position[1:]), abs=1e-9)
+    assert run.wire == pytest.approx(height[1::2] + run.contact_force / stiffness(position[1::2]), abs=1e-9)
 
 
-def test_massless_wire_goes_with_a_rigid_strip_while_it_is_pressed():
-    """Paper 3: the head is joined to the spring k(t); so it is the better the shorter the step."""
-    errors = []
-    for step in (2e-3, 1e-3, 5e-4):
-        run = simulate(LINE, PANTOGRAPH, SPEED_KMH, distance=200.0, time_step=step)
-        pressed = run.contact_force > 10.0
-        errors.append(np.abs(run.wire - run.head)[pressed].max() / run.head.max())
-    assert errors[-1] < 2e-3
-    assert errors[0] > 1.8 * errors[1] > 3.2 * errors[2]
+def test_massless_wire_goes_with_a_rigid_strip_while_it_is_pressed(run):
+    """Paper 3: the head is joined to the spring k(t)."""
+    pressed = run.contact_force > 0.0
+    assert 0.5 < pressed.mean() < 1.0
+    assert run.wire[pressed] == pytest.approx(run.head[pressed], abs=1e-12)
 
 
 def test_elastic_strip_is_compressed_by_the_force_over_its_stiffness():
@@ -120,7 +119,7 @@ def test_elastic_strip_is_compressed_by_the_force_over_its_stiffness():
     run = simulate(LINE, elastic, SPEED_KMH, distance=200.0, time_step=5e-4)
     pressed = run.contact_force > 10.0
     strip = (run.head - run.wire)[pressed]
-    assert strip == pytest.approx(run.contact_force[pressed] / 20e3, abs=1.2e-4)  # m, of up to 14 mm
+    assert strip == pytest.approx(run.contact_force[pressed] / 20e3, abs=1e-9)
 
 
 @pytest.mark.parametrize(

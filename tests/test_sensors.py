@@ -34,26 +34,29 @@ def column(env, observations, name):
     return np.array([env.context.layout.read(observation, name) for observation in observations])
 
 
-@pytest.mark.parametrize("milliseconds", [0, 1, 4, 9, 10, 11, 25, 30])
-def test_reading_is_the_sample_of_the_right_time_step(milliseconds):
-    """Delays shorter than a control step of 10 ms, as long, longer, and whole ones."""
-    env = make(sensors={"delay": milliseconds * 1e-3})
+@pytest.mark.parametrize("age", [0, 1, 4, 8, 9, 10, 11, 25, 30, 3.25, 8.6, 9.75, 12.5])
+def test_reading_is_as_old_as_the_delay(age):
+    """Of so many time steps and half a one, as a sample is a mean over its step: shorter than a control step
+    of 10 ms, as long, longer, and between two samples."""
+    env = make(sensors={"delay": (age + 0.5) * 1e-3})
     for seed in (0, 1):  # a second episode has no readings of the first
         observations = observe(env, seed=seed)
         run = env.trajectory
         for name, series in SERIES.items():
             at_rest = env.context.layout.read(observations[0], name)
             samples = np.append(at_rest, getattr(run, series))  # row n: of time step n, counted from 1
-            row = np.maximum(STEPS * np.arange(len(observations)) - milliseconds, 0)
+            row = np.maximum(STEPS * np.arange(len(observations)) - age, 0)
+            expected = np.interp(row, np.arange(len(samples)), samples)
             observed = column(env, observations, name)
-            assert observed == pytest.approx(samples[row], rel=1e-6, abs=1e-9), name
+            assert observed == pytest.approx(expected, rel=1e-6, abs=1e-9), name
             assert np.abs(np.diff(samples[-STEPS:])).min() > 3e-6 * np.abs(samples).max(), name
 
 
-def test_delay_is_rounded_to_whole_time_steps():
-    observations = observe(make(sensors={"delay": 3.4e-3}))
-    np.testing.assert_array_equal(observations, observe(make(sensors={"delay": 3e-3})))
-    assert not np.array_equal(observations, observe(make(sensors={"delay": 3.6e-3})))
+def test_a_reading_is_at_least_half_a_time_step_old():
+    """It is a mean over one."""
+    observations = observe(make(sensors={"delay": 0.0}))
+    np.testing.assert_array_equal(observations, observe(make(sensors={"delay": 0.5e-3})))
+    assert not np.array_equal(observations, observe(make(sensors={"delay": 0.6e-3})))
 
 
 def test_only_readings_are_late():

@@ -58,7 +58,7 @@ def filtered():
 
 
 @pytest.mark.parametrize(
-    ("spans", "inside"), [(None, slice(0, 40)), ((1, 4), slice(0, 40)), ((2, 3), slice(10, 30))]
+    ("spans", "inside"), [("all", slice(0, 40)), ((1, 4), slice(0, 40)), ((2, 3), slice(10, 30))]
 )
 def test_statistics_are_those_of_the_filtered_force_in_the_spans(spans, inside):
     """The filter runs from the start of the run: at a span's beginning it is not at rest."""
@@ -89,7 +89,7 @@ def test_losses_cost_and_actuators_are_those_of_the_raw_samples_in_the_spans():
 @pytest.mark.parametrize(
     ("spans", "uplift"),
     [
-        (None, 0.2 + 0.039),  # all supports, all samples
+        ("all", 0.2 + 0.039),  # all supports, all samples
         ((3, 3), 0.1 + 0.029),  # supports 2 and 3 at its ends, until the train leaves the span
         ((4, 4), 0.039),  # support 3 alone
         ((1, 1), 0.2 + 0.009),
@@ -101,14 +101,14 @@ def test_uplift_is_that_of_the_supports_at_both_ends_of_the_spans_and_between(sp
 
 def test_a_line_without_supports_has_no_uplift():
     bare = replace(RUN, uplift=np.zeros((SAMPLES, 0)), support_position=np.zeros(0))
-    assert np.isnan(bare.summary().max_uplift)
+    assert np.isnan(bare.summary("all").max_uplift)
 
 
 def test_a_single_sample_has_no_rate():
     arrays = {
         name: value[:1] for name, value in vars(RUN).items() if getattr(value, "shape", ())[:1] == (40,)
     }
-    figures = replace(RUN, **arrays).summary()
+    figures = replace(RUN, **arrays).summary("all")
     assert (figures.effort_rate, figures.cost_function) == (0.0, 0.0)
     assert figures.mean == pytest.approx(RUN.contact_force[0])
 

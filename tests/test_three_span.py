@@ -4,7 +4,7 @@ import pytest
 from panto_env import simulate
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.three_span import build as three_span
-from panto_env.plant.numerics import Numerics
+from panto_env.plant.numerics import Numerics, Runs
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +13,7 @@ def data():
 
 
 def built(data):
-    return three_span.ThreeSpan(data, lanes=1, spans=10, numerics=Numerics(), conditions=())
+    return three_span.ThreeSpan(data, lanes=1, spans=10, numerics=Numerics(), runs=Runs())
 
 
 def test_frequencies_are_the_closed_form_where_the_springs_vanish(data):

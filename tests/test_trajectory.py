@@ -30,7 +30,7 @@ def test_parquet_round_trip_is_exact(run, tmp_path):
     again = Trajectory.load(path)
     for name, value in vars(run).items():
         np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)
-    assert again.summary() == run.summary()
+    assert again.summary("all") == run.summary("all")
 
 
 def test_line_without_supports_or_droppers_survives_parquet(tmp_path):
@@ -38,7 +38,7 @@ def test_line_without_supports_or_droppers_survives_parquet(tmp_path):
     run.save(tmp_path / "run.parquet")
     again = Trajectory.load(tmp_path / "run.parquet")
     assert again.dropper_force.shape == run.dropper_force.shape
-    assert np.isnan(again.summary().max_uplift)
+    assert np.isnan(again.summary("all").max_uplift)
 
 
 def test_half_written_file_is_refused_in_one_sentence(run, tmp_path):
@@ -73,7 +73,7 @@ def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("spans", [(0, 1), (3, 2), (1.0, 2), (4, 9)])
+@pytest.mark.parametrize("spans", [(0, 1), (3, 2), (1.0, 2), (4, 9), (1, 2, 3), "5-6", 4])
 def test_spans_outside_the_run_are_refused(run, spans):
     with pytest.raises(InputError, match="spans"):
         run.summary(spans)

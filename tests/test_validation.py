@@ -11,13 +11,13 @@ from .finite_element import __main__ as comparison
 
 
 def test_numerics_in_use_are_those_that_a_run_takes():
-    used = convergence.in_use(Numerics())
-    assert (used.spacing, used.time_step) == (0.375, 2.5e-3)
+    used = convergence.in_use(Numerics(), 300.0)
+    assert (used.spacing, used.time_step) == (0.25, 1.25e-3)
     default, told = simulate(distance=120.0), simulate(distance=120.0, **used.model_dump())
     assert default.time_step == used.time_step
     assert (default.contact_force == told.contact_force).all()
     asked = Numerics(spacing=0.25, time_step=1e-3, window=9, precision="double")
-    assert convergence.in_use(asked) == asked
+    assert convergence.in_use(asked, 300.0) == asked
 
 
 @pytest.fixture
@@ -40,15 +40,16 @@ def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch
     monkeypatch.setattr(validate.console, "_width", 150)
     validate.validate(convergence=True, wear=True)
     printed = capsys.readouterr().out
-    assert row_of(printed, "300")[1:5] == ["0.375", "2.5", "7", "single"]
-    assert row_of(printed, "0.8")[1:5] == ["0.3", "0.375", "2.5", "3.8"]
+    assert row_of(printed, "300")[1:5] == ["0.25", "1.25", "8", "single"]
+    assert row_of(printed, "0.8")[1:5] == ["0.3", "0.25", "1.11", "8.6"]
 
 
 def test_json_holds_the_same_tables(short, capsys):
     validate.validate(convergence=True, wear=True, json=True)
     told = json.loads(capsys.readouterr().out)
     (converged,), (worn,) = told["convergence"], told["wear"]
-    assert (converged["spacing"], converged["time_step"]) == (worn["spacing"], worn["time_step"])
+    assert (converged["spacing"], converged["time_step"]) == (0.25, 1.25e-3)
+    assert worn["time_step"] == pytest.approx(0.01 / 9)
     assert converged["std"] == simulate().summary(reference.SPANS).std
     assert worn["std"][1] > 0
 
@@ -58,19 +59,17 @@ def test_finite_elements_are_compared_with_the_default_s_grid_and_step(monkeypat
     monkeypatch.setattr(comparison, "OURS", (Numerics(),))
     monkeypatch.setenv("COLUMNS", "120")
     comparison.main()
-    assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.375", "2.5"]
+    assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.25", "1.25"]
 
 
-def test_a_long_step_keeps_low_passed_figures_on_a_worn_line_and_loses_contact_loss():
-    """What docs/validation.md says of waves of 0.8 m, of the preset's depth and of 2 mm."""
-    fine, *_, default = wear.DISCRETISATIONS
-    preset, deep, short = ([wear.check_wear(each, n) for n in (fine, default)] for each in wear.CONDITIONS)
-    for true, ours in (preset, deep, short):
-        assert ours.std[0] == pytest.approx(true.std[0], rel=0.005)
-        assert ours.max[0] == pytest.approx(true.max[0], abs=1.0)
-        assert ours.min[0] == pytest.approx(true.min[0], abs=1.0)
-        assert ours.raw_max[0] < true.raw_max[0]
-    assert deep[0].contact_loss[0] == pytest.approx(1.18, abs=0.1)
-    assert deep[1].contact_loss[0] == pytest.approx(0.25, abs=0.05)
-    assert short[1].steps < 2
-    assert short[0].contact_loss[0] > 0 == short[1].contact_loss[0]
+def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_on_any_grid():
+    """What docs/validation.md says of waves of 0.8 m, of the preset's depth and of 2 mm, and of 0.4 m."""
+    fine, full, fast = wear.DISCRETISATIONS
+    for condition in wear.CONDITIONS:
+        true, ours, coarse = (wear.check_wear(condition, each) for each in (fine, full, fast))
+        for other in (ours, coarse):
+            assert other.std[0] == pytest.approx(true.std[0], rel=0.01)
+            assert other.max[0] == pytest.approx(true.max[0], abs=1.5)
+            assert other.min[0] == pytest.approx(true.min[0], abs=1.5)
+        assert ours.contact_loss[0] == pytest.approx(true.contact_loss[0], abs=0.1)
+        assert ours.steps >= 8

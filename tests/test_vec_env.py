@@ -3,17 +3,56 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
-from stable_baselines3 import PPO
+from gymnasium.wrappers.vector import NormalizeObservation
+from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import VecMonitor
 
 from panto_agents.vec_env import PantographVecEnv
+from panto_env import InputError
+
+NAME = "panto_env:PantographStiffness-v0"
 
 
-def make(lanes=3, **settings):
-    native = gymnasium.make_vec(
-        "panto_env:PantographStiffness-v0", num_envs=lanes, autoreset_mode="SameStep", **settings
-    )
-    return PantographVecEnv(native.unwrapped)
+def make(lanes=3, mode="SameStep", **settings):
+    return PantographVecEnv(gymnasium.make_vec(NAME, num_envs=lanes, autoreset_mode=mode, **settings))
+
+
+@pytest.mark.parametrize("make_model", [PPO, SAC])
+def test_stable_baselines_given_a_vector_environment_itself_names_its_wrapper(make_model):
+    native = gymnasium.make_vec(NAME, num_envs=3)
+    with pytest.raises(InputError, match=r"from panto_agents.vec_env import PantographVecEnv"):
+        make_model("MlpPolicy", native)
+    assert repr(type(native)) == "<class 'panto_env.envs.vector.PantographVectorEnv'>"
+
+
+def test_what_is_no_vector_environment_is_refused():
+    for other in (gymnasium.make(NAME), gymnasium.make_vec("CartPole-v1"), "env"):
+        with pytest.raises(InputError, match=r"takes what gymnasium.make_vec makes of Pantograph-v0, .* not"):
+            PantographVecEnv(other)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+def test_every_mode_of_autoreset_gives_the_same(mode):
+    settings = {"distance": 20.0, "sensors": "realistic", "speed_kmh": (200, 300)}
+    envs = [make(**settings), make(mode=mode, **settings)]
+    for env in envs:
+        env.seed(4)
+    np.testing.assert_array_equal(*[env.reset() for env in envs])
+    ends = 0
+    for action in np.random.default_rng(0).uniform(-1, 1, (90, 3, 1)):
+        mine, other = (env.step(action) for env in envs)
+        np.testing.assert_equal(mine, other)
+        ends += mine[2].sum()
+    assert ends > 6
+
+
+def test_wrappers_of_gymnasium_may_stand_between():
+    native = gymnasium.make_vec(NAME, num_envs=3, distance=10.0)
+    env = PantographVecEnv(NormalizeObservation(native))
+    assert np.abs(env.reset()).max() < 10
+    model = PPO("MlpPolicy", env, n_steps=32, batch_size=32, device="cpu")
+    model.learn(96)
+    assert native.unwrapped.np_random_seed == env.get_attr("np_random_seed")[0]
 
 
 def test_ends_as_stable_baselines_expects():

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from panto_env.analysis.options import with_settings
-from panto_env.terminal import Json, Plot, counting, print_json
+from panto_env.terminal import Json, Plot, counting, print_json, writable
+
+from .run import SUFFIXES, run
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
@@ -25,14 +27,18 @@ def benchmark(
         typer.Argument(help="Names, with parameters (p:gain=0.5) or without, or model files."),
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="TOML file; other options take precedence over it.")
+        Path | None,
+        typer.Option(help="TOML file, or a name such as benchmark; other options take precedence over it."),
     ] = None,
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
-    seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(help="File to write: everything as .json, or the passes as .csv or .parquet."),
+        str | None,
+        typer.Option(
+            help="File to write: everything as .json, or the passes as .csv or .parquet.",
+            callback=writable(SUFFIXES),
+        ),
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -44,11 +50,10 @@ def benchmark(
     """
     from rich.console import Console
 
-    from panto_env.analysis.plots import check_plot, save
+    from panto_env.analysis.plots import save
 
     from .plot import plot as draw
     from .report import WIDTH, tables
-    from .run import check_format, run
 
     line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
@@ -58,10 +63,6 @@ def benchmark(
         seeds=seeds,
         **given,
     )
-    if output is not None:
-        check_format(output)
-    if plot is not None:
-        check_plot(plot)
     with counting("passes") as progress:
         outcome = run(settings, workers, progress)
     if output is not None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from panto_env.analysis.plots import mark_supports
 from panto_env.metrics.labels import LABELS
-from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.spans import limits, within
+from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.metrics.spans import in_words, limits, within
 
 from .run import Benchmark
 from .settings import Line
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 def plot(outcome: Benchmark) -> Figure:
     """Contact force along two spans of every line, and sigma over speed.
 
-    The force is that at a line's highest speed with the first seed, over the last two evaluated spans;
-    this runs one more pass per policy and line. ``panto_env.analysis.plots.save`` writes the figure.
+    The force, low-passed without delay, is that at a line's highest speed with the first seed, over the
+    last two evaluated spans; this runs one more pass per policy and line.
+    ``panto_env.analysis.plots.save`` writes the figure.
     """
     from matplotlib.figure import Figure
 
@@ -53,14 +54,16 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
     for policy, colour in colours.items():
         run, _ = drive(settings, line, policy, speed, seed)
         inside = within(run.position, shown, run.span_length)
-        force = low_pass(run.contact_force, run.time_step)[inside]
+        force = low_pass_in_place(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
+    axes.axhline(0.0, color="tab:red", linewidth=0.9)
     mark_supports(axes, run)
     axes.set(
         title=f"{line.pantograph} on {line.catenary} at {speed:g} km/h, seed {seed}",
-        xlabel="position (m); grey lines: supports",
-        ylabel="contact force, below 20 Hz (N)",
+        xlabel=f"position (m); grey lines: supports; spans {in_words(shown)} of the evaluated "
+        f"{in_words(outcome.spans[place])}",
+        ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
         xlim=limits(shown, run.span_length),
     )
     axes.legend(ncols=len(colours) + 1, loc="upper center", fontsize="small", frameon=False)
@@ -78,6 +81,8 @@ def _sigmas(axes: Axes, line: Line, cells: list[Cell], colours: dict[str, str]) 
         axes.plot(speeds[~qualified], sigma[~qualified], "o", color=colour, markerfacecolor="white")
     if any(cell.disqualified for cell in cells):
         axes.plot([], [], "o", color="0.4", markerfacecolor="white", label="disqualified")
+    if any(np.isnan(cell.figures["std"]) for cell in cells):
+        axes.plot([], [], " ", label="not shown: ended early")
     axes.set(
         title=f"{line.pantograph} on {line.catenary}",
         xlabel="speed (km/h)",

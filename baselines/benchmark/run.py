@@ -8,22 +8,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from panto_env.analysis.pool import Progress, in_processes, one_by_one
+from panto_env.analysis.pool import Progress, check_passes, in_processes, one_by_one
 from panto_env.base.errors import InputError
-from panto_env.base.files import TABLES, finite, write_rows, write_whole
+from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
 from panto_env.base.machine import cores
+from panto_env.base.version import __version__
 from panto_env.control import Task
-from panto_env.control.settings import run_settings
-from panto_env.metrics.spans import last_whole_span
+from panto_env.control.settings import far_enough, run_settings
+from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
 from panto_env.policies import find_policy
 
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
 from .statistics import Cell, compare
 
-FIRST_SPAN = 4
-"""First span that is evaluated by default: the three before it are the run-in from rest."""
-FORMATS = (".json", *TABLES)
+SUFFIXES = (".json", *TABLES)
+"""Of the file that an outcome is saved to."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ class Benchmark:
         """Everything, ready for JSON: nan becomes None."""
         table: dict[str, Any] = finite(
             {
+                "version": __version__,
                 "settings": self.settings.model_dump(mode="json"),
                 "spans": self.spans,
                 "cells": [asdict(cell) for cell in self.cells],
@@ -49,8 +50,8 @@ class Benchmark:
 
     def save(self, path: str | Path) -> None:
         """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet."""
-        check_format(path)
-        if Path(path).suffix != ".json":
+        check_output(path, SUFFIXES)
+        if Path(path).suffix.lower() != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
             return
         with write_whole(path) as temporary:
@@ -70,6 +71,8 @@ def run(
     workers = cores() if workers is None else workers
     if workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
+    passes = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
+    check_passes(passes * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy)
     spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
@@ -87,30 +90,21 @@ def run(
     return Benchmark(settings, spans, tuple(rows), compare(rows))
 
 
-def check_format(path: str | Path) -> None:
-    """Raise InputError unless the suffix of the file is one of a known format."""
-    if Path(path).suffix not in FORMATS:
-        raise InputError(f"{path} must end in one of {', '.join(FORMATS)}.")
-
-
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
-    task = Task(
-        run_settings(
-            {
-                "catenary": line.catenary,
-                "pantograph": line.pantograph,
-                "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
-                "actuator": settings.actuator,
-                "sensors": settings.sensors,
-                "line_condition": settings.line_condition,
-                "distance": line.distance,
-                "control_interval": settings.control_interval,
-            }
-        )
-    )
+    given = {
+        "catenary": line.catenary,
+        "pantograph": line.pantograph,
+        "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
+        "actuator": settings.actuator,
+        "sensors": settings.sensors,
+        "line_condition": settings.line_condition,
+        "distance": line.distance,
+        "control_interval": settings.control_interval,
+    }
+    task = Task(far_enough(run_settings(given)))
     last = last_whole_span(task.distance, task.plant.catenary.span_length)
-    first, last = line.spans or (FIRST_SPAN, last)
+    first, last = line.spans or (FIRST_SETTLED, last)
     where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
     if not 1 <= first <= last:
         raise InputError(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
+from panto_configs import find
+from panto_env.analysis.pool import MOST_PASSES
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
@@ -51,7 +54,7 @@ class Line(Settings):
     spans: tuple[int, int] | None = Field(
         None,
         description="first and last span that the figures cover, counted from 1; by default from the "
-        "fourth, which leaves out the run-in, to the last one that every run covers completely",
+        "tenth, where the start has died out, to the last one that every run covers completely",
     )
     policies: tuple[str, ...] = Field(
         (), description="policies that run on this line only, in addition to those that run on every line"
@@ -93,8 +96,11 @@ class BenchmarkSettings(Settings):
     @field_validator("seeds", mode="before")
     @classmethod
     def _from_a_number_of_seeds(cls, value: Any) -> Any:
-        is_number = isinstance(value, int) and not isinstance(value, bool)
-        return tuple(range(value)) if is_number else value
+        if isinstance(value, int | float | str):
+            if not (isinstance(value, int) and 1 <= value <= MOST_PASSES and not isinstance(value, bool)):
+                raise ValueError(f"must be a whole number from 1 to {MOST_PASSES:,}, or a list of seeds")
+            return tuple(range(value))
+        return value
 
     @field_validator("policies", "seeds")
     @classmethod
@@ -113,15 +119,17 @@ class BenchmarkSettings(Settings):
 
 
 def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    for index, value in enumerate(values):
-        if value in values[:index]:
-            raise ValueError(f"{value!r} is given twice")
+    twice = next((value for value, count in Counter(values).items() if count > 1), None)
+    if twice is not None:
+        raise ValueError(f"{twice!r} is given twice")
     return values
 
 
 def load_benchmark(path: str | Path) -> BenchmarkSettings:
-    """Read a TOML file of ``BenchmarkSettings``; paths in it are relative to the working folder.
+    """Read a TOML file of ``BenchmarkSettings``, given by its path or by a name of ``configs/``.
+
+    Paths in it are relative to the working folder.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
-    return parse(BenchmarkSettings, read_toml(path), str(path))
+    return parse(BenchmarkSettings, read_toml(find(path, "benchmark")), str(path))

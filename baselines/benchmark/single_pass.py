@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env import InputError, Trajectory, simulate
+from panto_env import Trajectory, simulate
 from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.spans import within
@@ -96,38 +96,28 @@ def drive(
             distance=line.distance,
             record_droppers=False,
         )
-    return run, np.array(recorder.forces)
+    return run, recorder.forces()
 
 
 class _CommandRecorder:
-    """A policy around another one: it records the commands, and names the policy in its errors."""
+    """A policy around another one, whose name it has: it records what that one returns."""
 
     def __init__(self, policy: Policy, name: str) -> None:
-        self._policy, self._name = policy, name
-        self.forces: list[Array] = []
+        self._policy, self.name = policy, name
+        self._actions: list[Array] = []
 
     def reset(self, context: Context) -> None:
-        self._context = context
-        with self._errors_name_the_policy():
-            self._policy.reset(context)
+        self._force_limit = context.force_limit
+        self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
-        shape = (self._context.actions,)
-        with self._errors_name_the_policy():
-            action = np.asarray(self._policy.act(observation), dtype=float)
-            if action.shape != shape or not np.isfinite(action).all():
-                raise ValueError(f"its action must be finite numbers of shape {shape}, not {action}")
-        self.forces.append(self._context.force_limit * np.clip(action, -1, 1))
+        action = self._policy.act(observation)
+        self._actions.append(np.array(action, dtype=float))  # a copy: a policy may change it later
         return action
 
-    @contextmanager
-    def _errors_name_the_policy(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:  # the policy may be anyone's code
-            prefix = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-            reason = prefix + str(error).rstrip(".")
-            raise InputError(f"The policy '{self._name}' failed: {reason}.") from error
+    def forces(self) -> Array:
+        """Commanded forces (N), (control steps, actions)."""
+        return np.asarray(self._force_limit * np.clip(np.array(self._actions), -1, 1))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ import typer
 
 from ..base.errors import InputError
 from ..control.settings import fields
+from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options that are called otherwise: the unit stands in the help, and --spans are those evaluated."""
@@ -19,8 +20,14 @@ OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 """Options in another unit than the setting: that unit, the option's unit, and the factor between."""
 SIMPLE = (bool, int, float, str)
 
-Spans = Annotated[str | None, typer.Option(help="Spans that the figures cover, first-last, as 5-6.")]
-Seed = Annotated[int, typer.Option(help="Seed of irregularity and noise.")]
+Spans = Annotated[
+    str | None,
+    typer.Option(
+        help="Spans that the figures cover, first-last, as 5-6, or all; by default those after the start has "
+        f"died out, from {FIRST_SETTLED} on."
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
 Command = Callable[..., None]
 
 
@@ -59,14 +66,18 @@ def with_settings(
     return decorate
 
 
-def parse_spans(text: str | None) -> tuple[int, int] | None:
-    """Spans from "5-6". Raises InputError where the text is not two whole numbers."""
+def parse_spans(text: str | None) -> SpanChoice:
+    """Spans from "5-6" or "all". Raises InputError where the text is neither."""
     if text is None:
         return None
-    first, dash, last = text.partition("-")
-    if not (dash and first.strip().isdigit() and last.strip().isdigit()):
-        raise InputError(f"--spans must read first-last, as 5-6, not '{text}'.")
-    return int(first), int(last)
+    if text == "all":
+        return "all"
+    first, dash, last = (part.strip() for part in text.partition("-"))
+    if not (dash and first.isdecimal() and last.isdecimal()):
+        raise InputError(f"--spans must read first-last, as 5-6, or all, not '{text}'.")
+    spans = int(first), int(last)
+    check_spans(spans)
+    return spans
 
 
 def _names() -> list[str]:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from ..base.errors import InputError
-from ..base.settings import Settings, hint, message
+from ..base.explanation import complaints
+from ..base.names import hint
+from ..base.ranges import ranges_of
+from ..base.settings import Settings
 
 S = TypeVar("S", bound=Settings)
 
@@ -21,7 +24,7 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
             names += parameter_names(value, f"{family}.{key}")
         elif isinstance(value, tuple):
             names += _places(value, f"{family}.{key}")
-        elif _is_number(value) or (not isinstance(value, bool) and _takes_number(field.rebuild_annotation())):
+        elif _is_number(value) or any(ranges_of(field.rebuild_annotation())):  # "rigid" or None now
             names.append(f"{family}.{key}")
     return names
 
@@ -52,8 +55,9 @@ def change(entry: S, name: str, value: float) -> S:
     try:
         return type(entry).model_validate(_put(entry.model_dump(), path, value))
     except ValidationError as error:
-        words = dict.fromkeys(message(problem) for problem in error.errors())
-        raise InputError(f"{name} can't be {value:g}: {' or '.join(words)}.") from error
+        found = complaints(error, type(entry))
+        words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found)
+        raise InputError(f"{name} can't be {value:g}: {'; '.join(words)}.") from error
 
 
 def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
@@ -68,14 +72,6 @@ def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _takes_number(annotation: Any) -> bool:
-    """Whether a field that is a word or empty now ("rigid", None) could be a number."""
-    try:
-        return _is_number(TypeAdapter(annotation).validate_python(1.0))
-    except ValidationError:
-        return False
 
 
 def _put(data: Any, path: list[str], value: float) -> Any:

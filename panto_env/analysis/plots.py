@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
-from ..base.files import write_whole
-from ..metrics.low_pass import low_pass
-from ..metrics.spans import Spans, limits
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.files import PICTURES, check_output, write_whole
+from ..metrics import en50367
+from ..metrics.low_pass import low_pass_in_place
+from ..metrics.spans import SpanChoice, Spans, in_words, limits, within
 from ..metrics.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -17,71 +20,58 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Of files that a plot can be written to."""
-
-
-def check_plot(path: str | Path) -> None:
-    """Raise InputError unless a plot can be written under this name."""
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"The plot {path} must end in one of {', '.join(SUFFIXES)}.")
+SUPPORTS = "position (m); grey lines: supports"
 
 
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
-    check_plot(path)
+    check_output(path, PICTURES)
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
 
 
-def plot_run(run: Trajectory, spans: Spans | None = None) -> Figure:
-    """Contact force, heights and actuator force of a run along the line."""
+def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
+    """Contact force, heights and actuator force over the spans, by default those after the start."""
     from matplotlib.figure import Figure
 
-    active = bool(run.frame_force.any() or run.head_force.any())
-    figure = Figure(figsize=(10, 7.5 if active else 6), layout="constrained")
-    contact, height, *actuator = figure.subplots(3 if active else 2, 1, sharex=True)
-    _draw_force(contact, run, raw="0.75")
-    contact.set_title(f"{run.pantograph} on {run.catenary}, {run.speed_kmh:g} km/h, {run.policy}")
-    height.plot(run.position, 1e3 * run.wire, color="tab:red", label="contact wire")
-    height.plot(run.position, 1e3 * run.head, color="tab:blue", label="collector head")
+    actuators = {"on the frame": (run.frame_force, "tab:green"), "on the head": (run.head_force, "tab:olive")}
+    acting = {name: drawn for name, drawn in actuators.items() if drawn[0].any()}
+    figure = Figure(figsize=(10, 8 if acting else 6.4), layout="constrained")
+    contact, height, *others = figure.subplots(3 if acting else 2, 1, sharex=True)
+    covered, shown = run.spans(spans), run.inside(spans)
+    position = run.position[shown]
+    _draw_force(contact, run, shown, raw="0.75")
+    height.plot(position, 1e3 * run.wire[shown], color="tab:red", label="contact wire")
+    height.plot(position, 1e3 * run.head[shown], color="tab:blue", label="collector head")
     height.set(ylabel="height (mm)")
-    for axis in actuator:
-        axis.plot(run.position, run.frame_force, color="tab:green", label="on the frame")
-        axis.plot(run.position, run.head_force, color="tab:olive", label="on the head")
+    for axis in others:
+        for name, (force, colour) in acting.items():
+            axis.plot(position, force[shown], color=colour, label=name)
         axis.set(ylabel="actuator force (N)")
     for axis in figure.axes:
         mark_supports(axis, run)
-        axis.legend(loc="upper right", ncols=3, fontsize="small")
-    end_of_run = float(run.position[-1])
-    begin, end = (0.0, end_of_run) if spans is None else limits(spans, run.span_length)
-    figure.axes[-1].set(xlabel="position (m); grey lines: supports", xlim=(begin, min(end, end_of_run)))
+        _legend_above(axis)
+    begin, end = (0.0, run.distance) if covered is None else limits(covered, run.span_length)
+    figure.axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(run, covered)}", xlim=(begin, end))
+    figure.suptitle(f"{run.pantograph} on {run.catenary}, {run.speed_kmh:g} km/h, {run.policy}")
     return figure
 
 
 def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans, title: str) -> Figure:
-    """Low-passed contact forces of several runs over the same spans, one panel per run."""
+    """Contact forces of several runs over the same spans, one panel per run."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 1.2 + 1.9 * len(runs)), layout="constrained")
+    figure = Figure(figsize=(10, 1.6 + 2.1 * len(runs)), layout="constrained")
     axes = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, run, label in zip(axes, runs, labels, strict=True):
-        _draw_force(axis, run, raw="0.8")
-        axis.set_title(label, loc="left", fontsize="medium")
+        _draw_force(axis, run, within(run.position, spans, run.span_length), raw="0.8")
+        note = ", ended early" if run.terminated else ""
+        axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
         mark_supports(axis, run)
-    axes[0].legend(loc="upper right", ncols=3, fontsize="small")
-    axes[-1].set(xlabel="position (m)", xlim=limits(spans, runs[0].span_length))
+    _legend_above(axes[0])
+    axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(runs[0], spans)}", xlim=limits(spans, runs[0].span_length))
     figure.suptitle(title)
     return figure
-
-
-def _draw_force(axis: Axes, run: Trajectory, raw: str) -> None:
-    """The contact force; raw: the colour of what is not filtered."""
-    filtered = low_pass(run.contact_force, run.time_step)
-    axis.plot(run.position, run.contact_force, color=raw, linewidth=0.8, label="raw")
-    axis.plot(run.position, filtered, color="tab:blue", label="low-passed at 20 Hz, delayed by the filter")
-    axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
-    axis.set(ylabel="contact force (N)")
 
 
 def mark_supports(axis: Axes, run: Trajectory) -> None:
@@ -89,3 +79,44 @@ def mark_supports(axis: Axes, run: Trajectory) -> None:
     count = int(run.position[-1] // run.span_length) + 2
     for k in range(count):
         axis.axvline(k * run.span_length, color="0.85", linewidth=0.8, zorder=0)
+
+
+def say_what_is_hidden(axis: Axes) -> None:
+    """Write into a panel of fixed limits how far its curves go beyond them."""
+    (begin, end), (low, high) = axis.get_xlim(), axis.get_ylim()
+    highest, lowest = high, low
+    for line in axis.lines:
+        x, y = (np.asarray(values, dtype=float) for values in line.get_data())
+        y = y[(x >= begin) & (x <= end)] if len(x) > 2 else y[:0]  # two points: a mark across the panel
+        highest, lowest = max([highest, *y]), min([lowest, *y])
+    notes = {f"up to {highest:.0f}": highest > high, f"down to {lowest:.0f}": lowest < low}
+    hidden = [note for note, beyond in notes.items() if beyond]
+    if hidden:
+        text = f"not shown: {', '.join(hidden)}"
+        axis.text(0.99, 0.97, text, transform=axis.transAxes, ha="right", va="top", color="tab:red")
+
+
+def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str) -> None:
+    """The contact force and its limits, where shown, (n,); raw: the colour of what is not filtered."""
+    position = run.position[shown]
+    filtered = low_pass_in_place(run.contact_force, run.time_step)[shown]
+    limit = en50367.maximum_limit(run.speed_kmh / 3.6)
+    words = f"EN 50367: at most {limit:g} N"
+    axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
+    axis.plot(position, filtered, color="tab:blue", label="low-passed at 20 Hz, not delayed")
+    axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
+    axis.axhline(limit, color="tab:red", linestyle="--", linewidth=0.9, label=words)
+    axis.axhline(0.0, color="tab:red", linewidth=0.9, label="0 N: no contact")
+    axis.set(ylabel="contact force (N)")
+
+
+def _legend_above(axis: Axes) -> None:
+    """A legend that covers no data."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize="small", frameon=False)
+
+
+def _not_shown(run: Trajectory, shown: Spans | None) -> str:
+    """What of a run a plot of these spans leaves out, as a clause."""
+    if shown is None:
+        return f"all {run.distance:.0f} m of the run"
+    return f"spans {in_words(shown)}; the rest of the run's {run.distance:.0f} m is not shown"

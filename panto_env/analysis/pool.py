@@ -19,7 +19,15 @@ Job = Callable[[], T]
 Progress = Callable[[int, int], None]
 """Called with the number of jobs done and of all."""
 
+MOST_PASSES = 100_000
+"""That a sweep or a benchmark may have: an hour and more, on two cores."""
 LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+def check_passes(count: int, what: str) -> None:
+    """Raise InputError where there are more passes than anyone would wait for."""
+    if count > MOST_PASSES:
+        raise InputError(f"{what} has {count:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
 
 
 def in_processes(
@@ -33,7 +41,7 @@ def in_processes(
     """
     with _one_thread_of_linear_algebra():
         # Spawned, not forked: threads of Numba and torch do not survive a fork.
-        executor = ProcessPoolExecutor(_workers(jobs, workers), mp_context=get_context("spawn"))
+        executor = ProcessPoolExecutor(workers_for(len(jobs), workers), mp_context=get_context("spawn"))
         try:
             return _collect(executor, jobs, progress)
         except BrokenProcessPool as error:
@@ -49,7 +57,9 @@ def in_threads(
 
     Kernels run without Python's lock. Raises what a job raises, after cancelling those not begun.
     """
-    return _collect(ThreadPoolExecutor(_workers(jobs, workers), thread_name_prefix="panto"), jobs, progress)
+    return _collect(
+        ThreadPoolExecutor(workers_for(len(jobs), workers), thread_name_prefix="panto"), jobs, progress
+    )
 
 
 def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> list[T]:
@@ -62,8 +72,9 @@ def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> l
     return results
 
 
-def _workers(jobs: Sequence[Job[T]], workers: int | None) -> int:
-    return max(1, min(cores() if workers is None else workers, len(jobs)))
+def workers_for(jobs: int, workers: int | None) -> int:
+    """How many workers so many jobs get, one per core unless told otherwise."""
+    return max(1, min(cores() if workers is None else workers, jobs))
 
 
 def _collect(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:

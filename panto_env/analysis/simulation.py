@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import inspect
-import traceback
+import reprlib
 from collections.abc import Callable
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError
-from ..control import Task
+from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
-from ..control.settings import RunSettings, default, run_settings
+from ..control.settings import RunSettings, default, far_enough, run_settings
+from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
-from ..policies import Policy, find_policy
+from ..policies import Policy, errors_name, find_policy
 
 _LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
 
@@ -28,53 +30,59 @@ def simulate(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
     record_droppers: bool = True,
+    evaluated: SpanChoice = None,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
 
-    policy: None, a name ("pd"), a model file, or an object with reset and act. seed: of the line's
-    irregularity and the sensors' noise. progress: called with the share done. record_droppers: keep the
-    tension of every dropper. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the
-    full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
+    policy: None, a name ("pd"), a model file, or an object with reset and act, which is called by its
+    ``name`` if it has one, else by its class. seed: of the line's irregularity and the sensors' noise.
+    progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
+    spans over which a mean force is met, as ``Trajectory.summary`` takes them. catenary, pantograph,
+    speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
+    ``help(panto_env.envs.PantographEnv)``.
+
+    A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
+    its ``ending`` says where and why.
 
     Raises InputError for what is not valid, TypeError for an unknown argument.
     """
     check_arguments(settings, RunSettings, "simulate")
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise InputError(f"seed must be a whole number from 0 up, not {seed!r}.")
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
-    task = Task(run_settings(given), record_droppers=record_droppers)
+    checked = far_enough(run_settings(given))
+    trim = trim_of_pass(checked, seed, evaluated, passive_mean)
+    task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, np.random.default_rng(seed))
     if policy is None:
         task.run_passively()
         return task.trajectory(0, seed=seed)
-    name = policy if isinstance(policy, str) else type(policy).__name__
-    run_policy(task, find_policy(policy), progress)
+    name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
+    run_policy(task, find_policy(policy), name, progress)
     return task.trajectory(0, policy=name, seed=seed)
 
 
-def run_policy(task: Task, policy: Policy, progress: Callable[[float], None] | None = None) -> None:
-    """Drive lane 0, already reset, to the end of its run.
+def run_policy(
+    task: Task, policy: Policy, name: str, progress: Callable[[float], None] | None = None
+) -> None:
+    """Drive lane 0, already reset, to the end of its run; name: of the policy, for errors.
 
     Raises InputError where the policy fails, or its action is not finite or not of the right shape.
     """
-    policy.reset(task.context(0))
+    with errors_name(name, "reset"):
+        policy.reset(task.context(0))
     episode = task.episode
+    shape = episode.action[0].shape
     while not (episode.truncated[0] or episode.terminated[0]):
-        # A copy: a policy may keep what it was shown.
-        try:
-            action = np.asarray(policy.act(episode.observation[0].copy()), dtype=float)
-        except InputError:
-            raise
-        except Exception as error:
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            raise InputError(
-                f"The policy {type(policy).__name__} failed in act, at {place.filename}:{place.lineno}: "
-                f"{type(error).__name__}: {error}."
-            ) from error
-        if action.shape != episode.action[0].shape or not np.isfinite(action).all():
-            raise InputError(
-                f"The policy must return {episode.action.shape[1]} finite numbers as its action, "
-                f"not {action!r}."
-            )
+        with errors_name(name, "act"):
+            # A copy: a policy may keep what it was shown.
+            returned = policy.act(episode.observation[0].copy())
+            action = np.asarray(returned, dtype=float)
+            if action.shape != shape or not np.isfinite(action).all():
+                raise InputError(
+                    f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
+                )
         task.step(action[None])
         if progress is not None:
             progress(float(task.plant.steps_done[0] / task.end(0)))

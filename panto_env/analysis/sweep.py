@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -11,23 +13,29 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.settings import Settings, hint
+from ..base.names import hint
+from ..base.settings import Settings
+from ..control import Task
 from ..control.arguments import check_arguments
-from ..control.settings import RunSettings, default, run_settings
+from ..control.memory import check_memory
+from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
-from ..metrics.spans import Spans
-from ..policies import find_policy
+from ..metrics.spans import SpanChoice, in_words
+from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_names
-from .pool import Progress, in_threads
+from .pool import Progress, check_passes, in_threads, workers_for
 from .simulation import simulate
 
 SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
 MOST_PARAMETERS = 2
-MOST_PASSES = 100_000
 
 Row = dict[str, Any]
+DISCRETISATION = ("time_step", "spacing", "window")
+"""Settings that a value may change by itself, and a row therefore tells."""
+SEEN_BY_POLICIES = ("actuator", "sensors")
+"""Families that the passive pantograph does without."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, as ``pantograph.masses.0``."""
 
@@ -45,7 +53,8 @@ def sweep(
     parameters: Mapping[str, Sequence[float]],
     *,
     policies: Sequence[str | Path | None] = (None,),
-    spans: Spans | None = None,
+    spans: SpanChoice = None,
+    line_spans: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -56,30 +65,33 @@ def sweep(
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1; the whole run by default. workers: threads, one per core by
-    default; the outcome does not depend on it. progress: called with the passes done and of all.
-    seed, settings: as for ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
+    figures cover, first and last from 1, or "all"; by default those after the start. line_spans: ``spans``
+    of ``simulate``, how many the line has. workers: threads, one per core by default; the outcome does not
+    depend on it. progress: called with the passes done and of all. seed, settings: as for ``simulate``
+    (catenary, pantograph, speed_kmh, distance (m), ...).
 
     Returns one row per pass, in the order of values, then policies: the swept values, what was run, and
-    every figure of ``Trajectory.summary`` (nan where the run ended early). Raises InputError for an
-    unknown parameter, a value that its schema refuses, and whatever else ``simulate`` refuses; all
-    values are checked before the first pass.
+    every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
+    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and whatever else
+    ``simulate`` refuses; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     check_arguments(settings, RunSettings, "sweep")
+    settings["spans"] = line_spans
     checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
     entries: dict[str, Settings] = {family: getattr(checked, family) for family in FAMILIES[:-1]}
     entries["line_condition"] = checked.line_condition[0]
-    given = settings | {"seed": seed}
+    given = {**settings, "seed": seed}
     _check(parameters, entries, policies)
     passes = [
         _prepare(dict(zip(parameters, values, strict=True)), policy, entries, given)
         for values in product(*parameters.values())
         for policy in policies
     ]
+    _check_memory(passes, workers)
     # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
     return in_threads(
         [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
@@ -102,9 +114,43 @@ def _check(
         _check_name(name, entries)
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
-    passes = len(policies) * math.prod(len(values) for values in parameters.values())
-    if passes > MOST_PASSES:
-        raise InputError(f"This sweep has {passes:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
+        family = name.partition(".")[0]
+        if family in SEEN_BY_POLICIES and all(policy is None for policy in policies):
+            raise InputError(f"{name} changes nothing without a policy; name one.")
+        twice = next((value for value, count in Counter(values).items() if count > 1), None)
+        if twice is not None:
+            raise InputError(f"{name} has the value {twice:g} twice; give each once.")
+    check_passes(len(policies) * math.prod(len(values) for values in parameters.values()), "This sweep")
+
+
+def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
+    """Raise InputError where the records of as many passes as run at once don't fit into memory.
+
+    The longest in time is built, not run: it takes the most.
+    """
+    longest = max(passes, key=_seconds)
+    given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
+    with _named(longest):
+        needed = Task(run_settings(given)).memory
+    at_once = workers_for(len(passes), workers)
+    check_memory(at_once * needed, f"{at_once} passes at once", ", or fewer workers")
+
+
+def _seconds(one_pass: _Pass) -> float:
+    """About how long a train is under way (s)."""
+    line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
+    length = distance or line.span_length * line.spans
+    return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
+
+
+@contextmanager
+def _named(one_pass: _Pass) -> Iterator[None]:
+    """Within the body an InputError says at which values."""
+    try:
+        yield
+    except InputError as error:
+        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
+        raise InputError(f"At {at}: {error}") from error
 
 
 def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
@@ -143,20 +189,17 @@ def _prepare(
     if of_policy:
         if source is None:
             raise InputError(f"The passive pantograph has no {' or '.join(values)}; name a policy.")
-        source = f"{source}{',' if ':' in source else ':'}{','.join(of_policy)}"
+        source = with_parameters(source, ",".join(of_policy))
     if source is not None:
         find_policy(source)
     label = "passive" if policy is None else str(policy)
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _row(one_pass: _Pass, spans: Spans | None) -> Row:
-    try:
-        run = simulate(**{"record_droppers": False} | one_pass.arguments)
+def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
+    with _named(one_pass):
+        run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
         figures = Figures.none() if run.terminated else run.summary(spans)
-    except InputError as error:
-        at = ", ".join(f"{name} = {value:g}" for name, value in one_pass.values.items())
-        raise InputError(f"At {at}: {error}") from error
     return {
         **one_pass.values,
         "policy": one_pass.policy,
@@ -164,7 +207,10 @@ def _row(one_pass: _Pass, spans: Spans | None) -> Row:
         "pantograph": run.pantograph,
         "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
+        **{name: run.settings[name] for name in DISCRETISATION},
         "nominal_force": run.nominal_force,
         "terminated": run.terminated,
+        "ending": run.ending,
+        "spans": "" if run.terminated else in_words(run.spans(spans)),
         **figures.as_dict(),
     }

@@ -31,7 +31,11 @@ def plot_sweep(rows: Sequence[Row], parameters: Sequence[str]) -> Figure:
     first = rows[0]
     fixed = [name for name in dict.fromkeys((*parameters, "speed_kmh")) if name not in varied]
     values = (f"{name} = {first[name]:g}" for name in fixed)
-    figure.suptitle(", ".join((f"{first['pantograph']} on {first['catenary']}", *values)))
+    early = sum(row["terminated"] for row in rows)
+    spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
+    title = ", ".join((f"{first['pantograph']} on {first['catenary']}", *values, f"spans {spans}"))
+    note = f"\n{early} of {len(rows)} passes ended early and are not shown" if early else ""
+    figure.suptitle(f"{title}{note}")
     return figure
 
 

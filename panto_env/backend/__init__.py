@@ -3,16 +3,17 @@
 ``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` let a
 function differ by the type of what it works on; ``new_block`` gives a kernel memory on its stack; ``pack``
 and ``bind`` take a kernel's arguments apart only once; ``constants`` gives kernels the names of rows;
-``lane_table`` and ``aligned_zeros`` are memory that vector instructions like; ``lane_threads`` shares lanes
-among cores.
+``lane_table`` and ``aligned_zeros`` are memory that vector instructions like, which ``copy_whole`` keeps in
+copies; ``lane_threads`` shares lanes among cores.
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
 from .block import LANES_ABREAST, new_block, new_blocks
+from .cache import cache_folder
 from .compile import JIT, constants, inlined, kernel, python_function, subroutine
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, floor
-from .memory import CACHE_LINE, aligned_zeros, lane_table
+from .memory import CACHE_LINE, aligned_zeros, copy_whole, lane_table
 from .packed import bind, open_packed, pack
 from .threads import LaneThreads, lane_threads
 
@@ -24,7 +25,9 @@ __all__ = [
     "LaneThreads",
     "aligned_zeros",
     "bind",
+    "cache_folder",
     "constants",
+    "copy_whole",
     "floor",
     "implements",
     "inlined",

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numba
 
 from .cache import cache_folder
+from .once import compile_once
 
 F = TypeVar("F", bound=Callable[..., Any])
 E = TypeVar("E", bound=IntEnum)
@@ -26,15 +27,18 @@ OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_n
 def kernel(function: F) -> F:
     """Compile ``function`` with Numba on its first call; keep the result on disk.
 
-    A kernel runs without Python's lock, so that threads can share the lanes of a batch.
+    Of several processes that call it at the same time one compiles it. A kernel runs without Python's lock,
+    so that threads can share the lanes of a batch.
     """
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder())  # read by Numba when it decorates
     try:
         compiled: F = numba.njit(cache=True, nogil=True, **OPTIONS)(function)
-        return compiled
     finally:
         numba.config.CACHE_DIR = previous
+    if JIT:
+        compile_once(compiled)
+    return compiled
 
 
 def inlined(function: F) -> F:

@@ -1,9 +1,10 @@
-"""Memory that vector instructions and caches like."""
+"""Memory that vector instructions and caches like, and copies of it that they like as well."""
 
 from __future__ import annotations
 
+import copyreg
 import math
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,3 +30,91 @@ def lane_table(*sizes: int) -> NDArray[np.float64]:
     *rows, lanes = sizes
     lines = -(-lanes // 8)
     return aligned_zeros((*rows, 8 * (lines + 1 - lines % 2)))
+
+
+class _View(NamedTuple):
+    """An array as a part of a block of memory."""
+
+    block: int
+    offset: int  # bytes
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]  # bytes
+    kind: np.dtype[Any]
+
+
+class _Parts(NamedTuple):
+    """A named tuple of arrays taken apart, until ``_together`` makes another one of it."""
+
+    kind: type
+    blocks: list[tuple[NDArray[np.uint8], int]]  # memory that arrays share, and its place in a page (bytes)
+    fields: list[Any]  # a ``_View`` for each array; what is no array is as it was
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Itself: the memory is copied when it is put together."""
+        return self
+
+
+def copy_whole(*tuples: Any) -> None:
+    """From now on, let named tuples of these classes be copied and pickled as a whole.
+
+    Arrays that share memory then share it in the copy, and all lie as they did within a page.
+    """
+    for each in tuples:
+        copyreg.pickle(type(each), _apart)
+
+
+def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
+    """How to make a copy of a named tuple, as ``pickle`` and ``copy`` want it told."""
+    owners: dict[int, Any] = {}
+    used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
+    for array in arrays:
+        if isinstance(array, np.ndarray):
+            owner = _owner(array)
+            owners[id(owner)] = owner
+            first, last = _reach(array)
+            known = used.get(id(owner), (first, last))
+            used[id(owner)] = min(first, known[0]), max(last, known[1])
+    blocks = []
+    for key, (first, last) in used.items():
+        begin = first - owners[key].ctypes.data
+        blocks.append((owners[key].ravel("K").view(np.uint8)[begin : begin + last - first], first % PAGE))
+    number = {key: block for block, key in enumerate(used)}
+
+    def field(value: Any) -> Any:
+        if not isinstance(value, np.ndarray):
+            return value
+        key = id(_owner(value))
+        return _View(number[key], value.ctypes.data - used[key][0], value.shape, value.strides, value.dtype)
+
+    return _together, (_Parts(type(arrays), blocks, [field(value) for value in arrays]),)
+
+
+def _together(parts: _Parts) -> Any:
+    """The named tuple that ``_apart`` has taken apart, in memory of its own."""
+    memory = []
+    for content, place in parts.blocks:
+        memory.append(aligned_zeros(content.shape, np.uint8, place))
+        memory[-1][:] = content
+
+    def value(field: Any) -> Any:
+        if not isinstance(field, _View):
+            return field
+        return np.ndarray(field.shape, field.kind, memory[field.block], field.offset, field.strides)
+
+    return parts.kind(*map(value, parts.fields))
+
+
+def _owner(array: Any) -> Any:
+    """The array whose memory this one is a part of."""
+    while isinstance(array.base, np.ndarray):
+        array = array.base
+    return array
+
+
+def _reach(array: NDArray[Any]) -> tuple[int, int]:
+    """First address of an array's memory, and the one after its last; strides are not negative."""
+    first = array.ctypes.data
+    if array.size == 0:
+        return first, first
+    steps = sum((count - 1) * stride for count, stride in zip(array.shape, array.strides, strict=True))
+    return first, first + steps + array.itemsize

@@ -1,5 +1,9 @@
-"""The one error that bad input of any kind raises."""
+"""The one error that bad input of any kind raises, and the warning of inaccurate figures."""
 
 
 class InputError(ValueError):
     """Bad input (action, argument or file): one sentence that says what was wrong and what to do."""
+
+
+class AccuracyWarning(UserWarning):
+    """Figures are less accurate than usual: one sentence that says why and by how much."""

@@ -6,7 +6,7 @@ import math
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,10 @@ from .errors import InputError
 def write_whole(path: str | Path) -> Iterator[Path]:
     """A temporary path beside ``path`` to write to; it takes the place of ``path`` at the end.
 
-    If the body raises, ``path`` is as it was. Raises InputError where its folder can't be written.
+    If the body raises, ``path`` is as it was. Raises InputError where it can't be written.
     """
     target = Path(path)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
     except OSError as error:
         raise InputError(f"{target} cannot be written: {error.strerror or error}.") from error
@@ -40,22 +39,45 @@ def write_whole(path: str | Path) -> Iterator[Path]:
 
 TABLES = (".csv", ".parquet")
 """Suffixes of files that hold rows."""
+PICTURES = (".png", ".svg", ".pdf")
+"""Suffixes of files that a plot can be written to."""
 
 
-def check_table(path: str | Path) -> None:
-    """Raise InputError unless the name of a file says how to write rows."""
-    if Path(path).suffix not in TABLES:
-        raise InputError(f"{path} must end in one of {', '.join(TABLES)}.")
+def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
+    """Raise InputError unless a file of this name can be written: to be asked before any work begins.
+
+    suffixes: one of which, in any case, says how it is written. Its folder must exist: none is made for it.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in suffixes:
+        which = f"one of {', '.join(suffixes)}" if len(suffixes) > 1 else suffixes[0]
+        raise InputError(f"{path} must end in {which}.")
+    if not target.parent.exists():
+        raise InputError(f"{path} cannot be written: there is no folder {target.parent}, so make it first.")
+    if not target.parent.is_dir():
+        raise InputError(f"{path} cannot be written: {target.parent} is no folder.")
+    if target.is_dir():
+        raise InputError(f"{path} cannot be written: it is a folder.")
+    if not os.access(target.parent, os.W_OK):
+        raise InputError(f"{path} cannot be written: the folder {target.parent} does not allow it.")
+
+
+def make_folder(path: str | Path) -> None:
+    """Make a folder that is itself what was asked for, and those above it. InputError where it can't be."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
 
 
 def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
     """Write rows of the same keys as CSV or Parquet, by the file's suffix, whole or not at all."""
-    check_table(path)
+    check_output(path, TABLES)
     import pyarrow as pa  # slow to import
 
     table = pa.Table.from_pylist(rows)
     with write_whole(path) as temporary:
-        if temporary.suffix == ".csv":
+        if temporary.suffix.lower() == ".csv":
             from pyarrow.csv import write_csv
 
             write_csv(table, temporary)
@@ -69,8 +91,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """The table of a TOML file. Raises InputError, naming the file, where it can't be read."""
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} could not be read: {error}.") from error
+    except FileNotFoundError as error:
+        raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
+    except OSError as error:
+        raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} could not be read: it is not text in UTF-8.") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
 

@@ -17,6 +17,14 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def memory() -> float:
+    """Bytes of memory that the machine has; infinite where the system doesn't say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):  # Windows
+        return float("inf")
+
+
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
     """Within the body the caller's thread, and threads that it starts there, run on ``count`` cores.

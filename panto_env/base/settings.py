@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from .errors import InputError
+from .explanation import explain
+from .inline import parse_inline
+from .names import suggest
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+def _number(value: Any) -> Any:
+    """The value, unless it is text or a truth value, which pydantic would take for a number."""
+    if isinstance(value, str | bytes | bool):
+        raise PydanticCustomError("float_type", "must be a number")
+    return value
+
+
+Positive = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, BeforeValidator(_number), Field(ge=0, allow_inf_nan=False)]
 
 
 class Settings(BaseModel):
@@ -20,28 +31,49 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        """Itself: what never changes need not be copied, and a copy of an environment should be quick."""
+        return self
+
 
 S = TypeVar("S", bound=Settings)
 
 
 def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None = None) -> S:
-    """Settings from an instance, a table of its keys, or the name of a preset.
+    """Settings from an instance, a table of its keys, or a preset: "worn", or "worn:wear_depth=1e-3,...".
 
     Raises InputError, naming the argument and the key, where the value is not valid.
     """
     presets = presets or {}
     if isinstance(value, kind):
         return value
-    if isinstance(value, str) and value in presets:
-        return presets[value]
     if isinstance(value, Mapping):
-        try:
-            return kind.model_validate(dict(value))
-        except ValidationError as error:
-            raise InputError(f"{name} is not valid: {explain(error)}.") from error
+        return _validated(kind, value, name)
+    if isinstance(value, str):
+        preset, _, changes = value.partition(":")
+        if preset in presets:
+            return _changed(presets[preset], changes, name)
     options = [f"'{preset}'" for preset in presets]
+    if presets:
+        options[-1] += f" (with values, as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
+
+
+def _changed(preset: S, changes: str, name: str) -> S:
+    """A preset with values of "key=value,..."."""
+    try:
+        given = parse_inline(changes)
+    except InputError as error:
+        raise InputError(f"{name} is not valid: {error}") from error
+    return _validated(type(preset), preset.model_dump() | given, name) if given else preset
+
+
+def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:
+    try:
+        return kind.model_validate(plain(table))
+    except ValidationError as error:
+        raise InputError(f"{name} is not valid: {explain(error, kind)}.") from error
 
 
 def parse_kind(
@@ -59,51 +91,12 @@ def parse_kind(
     return parse(kinds[chosen], value, name, presets)
 
 
-def explain(error: ValidationError) -> str:
-    """One clause per problem: the key, what was expected, what was given."""
-    parts = []
-    for problem in error.errors():
-        key, given = _key(problem), problem["input"]
-        shown = "" if isinstance(given, dict | BaseModel) else f" (given: {given!r})"
-        parts.append(f"key '{key}': {message(problem)}{shown}" if key else message(problem))
-    return "; ".join(parts)
-
-
-def sentence(error: ValidationError) -> str:
-    """What is wrong with keyword arguments, in one sentence without its full stop."""
-    parts = []
-    for problem in error.errors():
-        cause = problem.get("ctx", {}).get("error")
-        if isinstance(cause, InputError):
-            parts.append(str(cause).removesuffix("."))
-            continue
-        words = message(problem).replace("Input should be", "must be")
-        parts.append(f"{_key(problem)} {words}, not {problem['input']!r}")
-    return "; ".join(parts)
-
-
-def message(problem: ErrorDetails) -> str:
-    """What Pydantic or a validator of ours says of one problem."""
-    return problem["msg"].removeprefix("Value error, ")
-
-
-def _key(problem: ErrorDetails) -> str:
-    """The dotted key that a problem is at."""
-    return ".".join(str(part) for part in problem["loc"])
-
-
-def suggest(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A clause with the nearest known name, if any is near, and all of them."""
-    return f"{hint(name, known)}known are {', '.join(known)}"
-
-
-def hint(name: str, known: list[str] | tuple[str, ...]) -> str:
-    """A question that names the nearest known name, or nothing if none is near."""
-    near = nearest(name, known)
-    return "" if near is None else f"did you mean '{near}'? "
-
-
-def nearest(name: str, known: list[str] | tuple[str, ...]) -> str | None:
-    """The known name that is nearest to a misspelt one, if any is near."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return near[0] if near else None
+def plain(value: Any) -> Any:
+    """A value with NumPy's numbers as Python's own, in tables and lists too."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    return value

@@ -3,17 +3,43 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+import warnings
+from typing import Annotated, TextIO
 
 import typer
 
-from .. import __version__
 from ..base import plugins
-from ..base.errors import InputError
+from ..base.errors import AccuracyWarning, InputError
+from ..base.version import __version__
 
 
 def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
+    warnings.showwarning = _show_warning
+    try:
+        make_app()()
+    except InputError as error:
+        print(f"panto: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Write our own warnings without the place in our sources, which tells the user nothing."""
+    if issubclass(category, AccuracyWarning):
+        print(f"panto: warning: {message}", file=sys.stderr)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
+
+
+def make_app() -> typer.Typer:
+    """The command with all its sub-commands, those of installed packages too."""
     from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
@@ -32,13 +58,9 @@ def main() -> None:
     app.command()(identify.identify)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
-    try:
-        for name, point in plugins.installed(plugins.COMMANDS).items():
-            app.command(name)(plugins.load(point))
-        app()
-    except InputError as error:
-        print(f"panto: {error}", file=sys.stderr)
-        sys.exit(2)
+    for name, point in plugins.installed(plugins.COMMANDS).items():
+        app.command(name)(plugins.load(point))
+    return app
 
 
 def _show_version(wanted: bool) -> None:

@@ -1,82 +1,71 @@
-"""``panto list``: the catalogue and the policies."""
+"""``panto list``: what can be named on the command line."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from pydantic import BaseModel
+from rich.markup import escape
 from rich.table import Table
 
-from ..base.errors import InputError
-from ..catalog import available, load_catenary, load_pantograph
-from ..plant.catenary.schema import CatenaryData
-from ..plant.pantograph.schema import PantographData
-from ..policies import policy_names
 from ..terminal import Json, console, print_json
-
-Entry = CatenaryData | PantographData
-LOADERS: dict[str, Callable[[str], Entry]] = {"catenary": load_catenary, "pantograph": load_pantograph}
+from .descriptions import LOADERS, POLICY, PRESETS, Description, described, everything
 
 
 def list_entries(
     name: Annotated[
         str | None,
-        typer.Argument(help="Show all values of this entry, or TOML file, with sources."),
+        typer.Argument(
+            help="Show all of this line, pantograph, policy, line condition, preset of actuator or sensors, "
+            "or TOML file."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """List lines, pantographs and policies, or every value of one entry with its source."""
-    if name is None:
-        _overview(json)
-    else:
-        _entry(name, json)
-
-
-def _overview(json: bool) -> None:
-    entries = {family: [LOADERS[family](name) for name in available(family)] for family in LOADERS}
+    """List lines, pantographs, policies and presets, or every value of one with its source or default."""
+    if name is not None:
+        found = described(name)
+        if json:
+            print_json({each.family: each.data for each in found})
+        else:
+            for each in found:
+                _print(each)
+        return
+    families = everything()
     if json:
         print_json(
-            {family: [entry.model_dump() for entry in listed] for family, listed in entries.items()}
-            | {"policy": policy_names()}
+            {family: [each.data for each in families[family]] for family in LOADERS}
+            | {family: {each.name: each.data for each in families[family]} for family in (POLICY, *PRESETS)}
         )
         return
-    for family, listed in entries.items():
-        table = Table("name", "kind", "description", title=family, title_justify="left")
-        for entry in listed:
-            table.add_row(entry.name, entry.kind, entry.description.split(".")[0] + ".")
+    for family in LOADERS:
+        table = _table(family, "name", "kind", "description")
+        for each in families[family]:
+            table.add_row(each.name, each.data["kind"], escape(each.text))
         console.print(table)
-    console.print("policies:", ", ".join(policy_names()))
+    table = _table(POLICY, "name", "parameters", "description")
+    for each in families[POLICY]:
+        given = "\n".join(f"{parameter}={default}" for parameter, default in each.rows)
+        table.add_row(each.name, escape(given), escape(each.text.partition("\n\n")[0].replace("\n", " ")))
+    console.print(table)
+    for family in PRESETS:
+        table = _table(family, "name", "values")
+        for each in families[family]:
+            changed = [f"{key}={value}" for key, value, usual, _ in each.rows if value != usual]
+            table.add_row(each.name, escape(", ".join(changed)) or "none")
+        console.print(table)
+    console.print("All of one: panto list NAME. With values of your own: NAME:key=value,...", markup=False)
 
 
-def _entry(name: str, json: bool) -> None:
-    entries: dict[str, Entry] = {}
-    failures = []
-    for family, load in LOADERS.items():
-        try:
-            entries[family] = load(name)
-        except InputError as error:
-            failures.append(str(error))
-    if not entries:
-        raise InputError(failures[0] if name.endswith(".toml") else " ".join(failures))
-    if json:
-        print_json({family: entry.model_dump() for family, entry in entries.items()})
-        return
-    for family, entry in entries.items():
-        table = Table("key", "value", "meaning", "source", title=f"{family} {entry.name}")
-        for key, value, meaning in _leaves(entry, ""):
-            table.add_row(key, str(value), meaning, entry.sources.get(key, ""))
-        console.print(entry.description)
+def _print(each: Description) -> None:
+    console.print(f"{each.family} {each.name}", style="bold", markup=False)
+    console.print(each.text, markup=False)
+    if each.rows:
+        table = Table(*each.headings)
+        for row in each.rows:
+            table.add_row(*map(escape, row))
         console.print(table)
 
 
-def _leaves(entry: BaseModel, prefix: str) -> list[tuple[str, Any, str]]:
-    rows: list[tuple[str, Any, str]] = []
-    for key, field in type(entry).model_fields.items():
-        value = getattr(entry, key)
-        if isinstance(value, BaseModel):
-            rows += _leaves(value, f"{prefix}{key}.")
-        elif value is not None and key not in ("sources", "name", "kind", "description"):
-            rows.append((prefix + key, value, field.description or ""))
-    return rows
+def _table(family: str, *headings: str) -> Table:
+    return Table(*headings, title=family, title_justify="left", show_lines=True)

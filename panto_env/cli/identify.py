@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..base.errors import InputError
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..identification.pantograph_file import SUFFIXES, check_possible
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console, writable
 
 if TYPE_CHECKING:
     from ..base.arrays import Array
@@ -53,37 +54,50 @@ def identify(
     static_force: Annotated[
         float | None, typer.Option(help="Lifting force of the pantograph written (N), else the mean force.")
     ] = None,
-    output: Annotated[Path | None, typer.Option(help="Write the pantograph to this TOML file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            help="Write the pantograph to this file (.toml), if the model explains the record.",
+            callback=writable(SUFFIXES),
+        ),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Identify a two-mass pantograph from a record of a rig, as paper 1 does, and by output error."""
+    """Identify a two-mass pantograph from a record of a rig, as paper 1 does, and by output error.
+
+    y_p1 is the plate, y_p2 the pan head, y_p3 the articulated frame. They count from where the unloaded
+    pantograph rests, in the direction in which the plate pushes the head (down, under a wire); the force is
+    positive where the plate pushes. A record whose sampling, sizes or signs can't be a rig's is refused with
+    the likely mistake; values that no pantograph can have are marked; a pantograph is written only where the
+    model explains the recorded motion.
+    """
     from .. import identification
 
     full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
-    known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])])}
+    known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])]).items()}
     if plot is not None:
-        from ..analysis.plots import check_plot, save
-
-        check_plot(plot)
-    record = identification.read_record(file, dict(_pairs(unit or [])))
+        from ..analysis.plots import save
+    record = identification.read_record(file, _pairs(unit or []))
     with progress_console.status("identifying"):
         identified = identification.identify(record, known, band=band, free_offset=free_offset)
     chosen = identified.fits.get(full_name)
     if chosen is None and (output is not None or plot is not None or not identified.fits):
         raise InputError(f"{full_name.capitalize()}: {identified.failures[full_name]}")
+    if output is not None and chosen is not None:
+        check_possible(chosen)
     matches: list[Match] = []
     if chosen is not None:
         try:
             matches = identification.matches(record, chosen.parameters)
         except InputError as error:
-            if plot is not None:
+            if plot is not None or output is not None:
                 raise
             identified.failures[f"the model by {chosen.method}"] = str(error)
     if output is not None and chosen is not None:
         force, source = _static_force(static_force, record.force, file)
         identification.write_pantograph(
-            chosen, output, record=file.name, static_force=force, force_source=source
+            chosen, output, matches=matches, record=file.name, static_force=force, force_source=source
         )
     if plot is not None and chosen is not None:
         from ..identification.plots import plot_matches
@@ -97,16 +111,18 @@ def identify(
     _print(identified, matches, full_name)
 
 
-def _pairs(texts: list[str]) -> list[tuple[str, str]]:
-    """Names and values from "a=1", "a=1 b=2" or "a=1,b=2"."""
-    pairs = []
+def _pairs(texts: list[str]) -> dict[str, str]:
+    """Values by name from "a=1", "a=1 b=2" or "a=1,b=2"."""
+    pairs: dict[str, str] = {}
     for part in re.split(r"[\s,]+", " ".join(texts).strip()):
         if not part:
             continue
         name, equals, text = part.partition("=")
         if not (name and equals and text):
             raise InputError(f"'{part}' must read name=value, as k1T=32992 or y_p1=mm.")
-        pairs.append((name, text))
+        if name in pairs:
+            raise InputError(f"{name} is given twice, as {pairs[name]} and as {text}.")
+        pairs[name] = text
     return pairs
 
 
@@ -160,6 +176,9 @@ def _print(identified: Identification, matches: list[Match], method: str) -> Non
                 f"95 % interval holds 0 (condition number {fit.condition:.4g}); excite more frequencies, "
                 "or record longer."
             )
+        if fit.impossible:
+            shown = ", ".join(f"{name} = {fit.parameters[name]:.4g}" for name in fit.impossible)
+            console.print(f"[bold red]Warning:[/] {fit.method}: {shown}: no pantograph has that.")
     for name, reason in identified.failures.items():
         console.print(f"[bold red]Warning:[/] {name}: {reason}")
     if matches:

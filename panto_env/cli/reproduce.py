@@ -10,6 +10,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from .. import studies
+from ..base.files import make_folder
 from ..terminal import console, number, print_table, progress_console
 
 
@@ -22,6 +23,8 @@ def reproduce(
     """Reproduce a paper's results: print ours beside the paper's, write figures and every number."""
     names = studies.STUDIES if name == "all" else (name,)
     chosen = {name: studies.find_study(name) for name in names}
+    for name in chosen:  # now: a study takes minutes
+        make_folder(output / name)
     with Progress(console=progress_console, transient=True) as progress:
         for study, run in chosen.items():
             bar = progress.add_task(study, total=1.0)

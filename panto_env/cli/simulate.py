@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -9,10 +10,11 @@ from rich.progress import Progress
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..metrics import en50367
+from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
-from ..metrics.trajectory import Trajectory, check_run_file
-from ..terminal import Json, Plot, console, number, print_json, progress_console
+from ..metrics.spans import in_words
+from ..metrics.trajectory import SUFFIXES, Trajectory
+from ..terminal import Json, Plot, console, number, print_json, progress_console, writable
 
 
 @with_settings(left_out=("observation",))
@@ -24,20 +26,19 @@ def simulate(
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    output: Annotated[str | None, typer.Option(help="Save the run to this Parquet file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Save the run to this Parquet file (.parquet).", callback=writable(SUFFIXES)),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Simulate one pass along a line and print its figures."""
+    """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
     from ..analysis.simulation import simulate as run
 
     chosen = parse_spans(spans)
-    if output is not None:
-        check_run_file(output)
     if plot is not None:
-        from ..analysis.plots import check_plot, plot_run, save
-
-        check_plot(plot)
+        from ..analysis.plots import plot_run, save
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
@@ -45,32 +46,51 @@ def simulate(
         trajectory = run(
             policy=policy,
             seed=seed,
+            evaluated=chosen,
             progress=lambda share: progress.update(bar, completed=share),
             **settings,
         )
-    figures = trajectory.summary(chosen)
     if output is not None:
         trajectory.save(output)
     if plot is not None:
-        save(plot_run(trajectory, chosen), plot)
+        save(plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
+    if trajectory.terminated:
+        if json:
+            print_json(_facts(trajectory) | {"spans": None, "figures": None, "compliance": None})
+        else:
+            console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
+        raise typer.Exit(1)
+    figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
+    criteria = trajectory.compliance(chosen)
     if json:
-        print_json(_facts(trajectory) | {"spans": chosen, "figures": figures.as_dict()})
+        told = {"spans": covered, "figures": figures.as_dict()}
+        print_json(_facts(trajectory) | told | {"compliance": [each.as_dict() for each in criteria]})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
         table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
-    console.print(f"{title}, policy {trajectory.policy}, spans {spans or 'all'}")
-    if trajectory.terminated:
-        console.print("[bold red]The run ended early: it left the plant's valid range.")
+    console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
+    if not math.isnan(trajectory.target_mean):
+        console.print(
+            f"Applied force {trajectory.nominal_force:.1f} N, trimmed for a passive mean of "
+            f"{trajectory.target_mean:.1f} N."
+        )
     console.print(table)
-    kept = en50367.checks(figures, trajectory.speed_kmh / 3.6)
-    console.print(
-        "EN 50367 (as recalled):",
-        ", ".join(f"{name} {'kept' if ok else '[bold red]broken[/]'}" for name, ok in kept.items()),
-    )
+    print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:
-    names = ("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "nominal_force")
+    names = (
+        "catenary",
+        "pantograph",
+        "speed_kmh",
+        "policy",
+        "seed",
+        "terminated",
+        "ending",
+        "nominal_force",
+        "target_mean",
+        "settings",
+    )
     return {name: getattr(run, name) for name in names}

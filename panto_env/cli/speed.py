@@ -32,10 +32,8 @@ def speed(
     from ..studies.throughput import study, tables
 
     if plot is not None:
-        from ..analysis.plots import check_plot, save
+        from ..analysis.plots import save
         from ..studies.throughput.plots import plot_speed
-
-        check_plot(plot)
     with progress_console.status("measuring") as status:
         result = study.run(repeats, report=lambda what: status.update(f"measuring {what}"))
     if plot is not None:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..analysis.sweep import MOST_PASSES, SPEED
+from ..analysis.pool import MOST_PASSES
+from ..analysis.sweep import SPEED
 from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
+from ..base.files import TABLES, write_rows
+from ..base.version import __version__
+from ..control.identity import plain
+from ..control.settings import run_settings
 from ..metrics.labels import LABELS
-from ..terminal import Json, Plot, console, counting, number, print_json
+from ..terminal import Json, Plot, console, counting, number, print_json, writable
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -41,41 +45,42 @@ def sweep(
     spans: Spans = None,
     seed: Seed = 0,
     workers: Annotated[int | None, typer.Option(help="Threads; one per core unless told otherwise.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Save the table to this .csv or .parquet file.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Save the table to this .csv or .parquet file.", callback=writable(TABLES)),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Run every value of one parameter, or every pair of two, and print the figures."""
-    from ..base import files
-
     values = _parse(parameters)
-    if output is not None:
-        files.check_table(output)
     if plot is not None:
-        from ..analysis.plots import check_plot, save
+        from ..analysis.plots import save
         from ..analysis.sweep_plots import plot_sweep
-
-        check_plot(plot)
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
+    line_spans = settings.pop("spans", None)
     with counting("passes") as progress:
         rows = run(
             values,
             policies=policy or (None,),
             spans=parse_spans(spans),
+            line_spans=line_spans,
             seed=seed,
             workers=workers,
             progress=progress,
             **settings,
         )
     if output is not None:
-        files.write_rows(rows, output)
+        write_rows(rows, output)
     if plot is not None:
         save(plot_sweep(rows, list(values)), plot)
     if json:
-        print_json(rows)
+        used = plain(run_settings(settings | {"spans": line_spans}))
+        told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
+        print_json(told | {"rows": rows})
         return
-    _print(rows, list(values), spans)
+    _print(rows, list(values))
 
 
 def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
@@ -110,10 +115,11 @@ def parse_values(name: str, text: str) -> list[float]:
     return [first + (last - first) * k / steps for k in range(steps + 1)]
 
 
-def _print(rows: list[dict[str, Any]], parameters: list[str], spans: str | None) -> None:
+def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
     first = rows[0]
     at = "" if "speed_kmh" in parameters else f" at {first['speed_kmh']:g} km/h"
-    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans or 'all'}")
+    spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
+    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans}")
     for name in (*parameters, "policy"):
         heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
         table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..analysis.requirements import print_criteria
 from ..studies.en50318 import study
 from ..terminal import Json, Plot, console, print_json, print_table, progress_console
 
@@ -20,18 +21,28 @@ def validate(
     wear: Annotated[
         bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
     ] = False,
+    lines: Annotated[
+        bool,
+        typer.Option("--lines", help="Print what the default grid and step cost on every line and speed."),
+    ] = False,
+    start: Annotated[
+        bool, typer.Option("--start", help="Print what the start of a run does to σ, by spans evaluated.")
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
     if plot is not None:
-        from ..analysis.plots import check_plot, save
+        from ..analysis.plots import save
         from ..studies.en50318.plots import plot_reference
-
-        check_plot(plot)
     with progress_console.status("validating") as status:
         validation = study.run(
-            status.update, with_convergence=convergence, with_windows=window, with_wear=wear
+            status.update,
+            with_convergence=convergence,
+            with_windows=window,
+            with_wear=wear,
+            with_lines=lines,
+            with_start=start,
         )
     if plot is not None:
         save(plot_reference(validation.runs), plot)
@@ -44,6 +55,8 @@ def validate(
             "The catalogue entry en50318-2002 says which open values were chosen, and how: "
             "`panto list en50318-2002`."
         )
+        for run, criteria in zip(validation.runs, validation.compliance, strict=True):
+            print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
         for table in others:
             print_table(table)
         console.print("All figures inside." if validation.passed else "[bold red]Not all figures are inside.")

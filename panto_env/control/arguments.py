@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from ..base.settings import nearest
+from ..base.names import nearest
 from .settings import RunSettings, fields
 
 P = ParamSpec("P")

@@ -23,6 +23,7 @@ class Episode(NamedTuple):
     weights: Array  # (terms,): of the reward
     idle: Flags  # (lanes,): lanes that the next step leaves as they are
     terminated: Flags  # (lanes,): whether the plant has left its valid range
+    ending: Index  # (lanes,): by what, an ``Ending``
     truncated: Flags  # (lanes,): whether the end of the run is reached
     observation: NDArray[np.float32]  # (lanes, entries)
     writers: Index  # (entries, 2): writer and number of each entry of the observation

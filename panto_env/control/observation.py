@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..backend import NOT_NEGATIVE, inlined, subroutine
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
-from ..base.settings import suggest
+from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
 from ..plant.state import ROW

@@ -14,8 +14,12 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..base.errors import InputError
-from ..base.settings import parse, sentence, suggest
+from ..base.explanation import sentence
+from ..base.names import suggest
+from ..base.ranges import Between
+from ..base.settings import parse, plain
 from ..catalog import load_catenary, load_pantograph
+from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.schema import check_span_count
@@ -63,10 +67,26 @@ def _scatter(value: Any) -> float:
     return value
 
 
+def _mean_force(value: Any) -> float | str | None:
+    if value is None:
+        return None
+    if isinstance(value, str) and value == "en50367":
+        return "en50367"
+    try:
+        force = float(value)
+    except (TypeError, ValueError):
+        force = math.nan
+    if isinstance(value, bool) or not (math.isfinite(force) and force > 0):
+        raise InputError(f"mean_force must be a positive number (N) or 'en50367', not {value!r}.")
+    return force
+
+
 def speed_range(speed_kmh: Any) -> tuple[float, float]:
     """Lowest and highest speed (km/h) of a number or a range; InputError where it is neither."""
     values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
     try:
+        if any(isinstance(value, str | bool) for value in values):  # float would take them
+            raise TypeError
         low, high = (float(value) for value in values)
     except (TypeError, ValueError) as error:
         raise InputError(
@@ -94,18 +114,25 @@ class RunSettings(Numerics):
         description="train speed (km/h): a number, or a range of two to draw from",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
-        "ideal", validate_default=True, description='actuator: "ideal", "realistic", or a table of its values'
+        "ideal",
+        validate_default=True,
+        description='actuator: "ideal", "realistic", one with values as "realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", or a table of their values',
+        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn", or a table; '
-        "of a list one is drawn per run",
+        description='condition of the line: "new", "fair", "worn", one with values and defects as '
+        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; of a list one is drawn per run',
+    )
+    mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
+        None,
+        description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
+        "standard's largest; by default as the pantograph says: its force applied, or met by the mean",
     )
     pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
@@ -118,19 +145,33 @@ class RunSettings(Numerics):
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,
-        description="distance to run (m), by default to the end of the line; a short line gets more spans",
+        description="distance to run (m); by default to the end of the line, and a pass outside an "
+        f"environment to the end of span {LAST_USUAL} at least; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
     )
     # Published active pantographs are controlled at 50-100 Hz.
-    control_interval: float = Field(0.01, description="time between two actions (s)")
+    control_interval: Annotated[float, Between(1e-4, 10, "s")] = Field(
+        0.01, description="time between two actions (s)"
+    )
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property
     def numerics(self) -> Numerics:
         """How the plant is computed."""
         return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
+
+
+def far_enough(settings: RunSettings) -> RunSettings:
+    """Settings of a pass: one that was told neither distance nor spans goes on until its start has died out.
+
+    The line gets as many spans as that takes.
+    """
+    line = settings.catenary
+    if settings.distance is not None or settings.spans is not None or line.spans > LAST_USUAL:
+        return settings
+    return settings.model_copy(update={"distance": LAST_USUAL * line.span_length})
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:
@@ -157,9 +198,9 @@ def run_settings(given: Mapping[str, Any]) -> RunSettings:
 def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
     """As ``run_settings``, of a class of settings that has more."""
     try:
-        return kind.model_validate(dict(given))
+        return kind.model_validate(plain(given))
     except ValidationError as error:
-        raise InputError(f"{sentence(error)}.") from error
+        raise InputError(f"{sentence(error, kind)}.") from error
 
 
 def check_names(given: Mapping[str, Any], what: str) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ..backend import inlined, kernel, new_block, new_blocks, open_packed
+from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import BLOCK_ROWS, CONTACTS, PLACE, ROW
 from ..plant.step import lanes_of_one_variant, load, record_blocks, step_blocks, store
+from ..plant.valid_range import ENDING
 from .observation import observe
 from .reward import add_sample_to_terms, begin_terms, charge_early_end, compute_reward
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
@@ -28,13 +30,19 @@ def command(episode, blocks, begin, count):
 
 
 @inlined
-def end_episodes(episode, block, task, begin, count):
+def end_episodes(line, wire, episode, block, task, begin, count):
     """Whether episodes end here."""
     terminated = episode.terminated[begin : begin + count]
     truncated = episode.truncated[begin : begin + count]
+    endings = episode.ending[begin : begin + count]
     for i in range(count):
-        too_high = not abs(block[ROW.STATE, i]) <= episode.head_range  # nor is NaN
-        terminated[i] = too_high or task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] >= episode.loss_limit
+        ending = ending_by_wire(line, wire, begin + i)
+        if task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] >= episode.loss_limit:
+            ending = ENDING.LOSS
+        if not abs(block[ROW.STATE, i]) <= episode.head_range:  # nor is NaN
+            ending = ENDING.HEAD
+        endings[i] = ending
+        terminated[i] = ending != ENDING.NONE
         truncated[i] = block[ROW.STEP, i] >= task[TASK_ROW.END, i]
         if terminated[i]:
             charge_early_end(episode, block, task, i)
@@ -80,7 +88,7 @@ def control_step(packed, first, last):
             add_sample_to_figures(running, samples, block, task, begin, count)
             take_readings(sensors, step, block, task[TASK_ROW.READING :], begin, count)
         compute_reward(episode, block, task, begin, count)
-        end_episodes(episode, block, task, begin, count)
+        end_episodes(line, wire, episode, block, task, begin, count)
         add_control_step_to_figures(task, count)
         store(task[TASK_ROW.FILTER_STATE :], running.table, begin, count)
         observe(episode, sensors, block, task, begin, count)

@@ -7,32 +7,39 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import bind, lane_table, lane_threads, pack
+from ..backend import bind, copy_whole, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
+from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
+from ..plant.catenary.schema import MOST_SPANS
 from ..plant.line_condition import draw
+from ..plant.numerics import Runs
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
 from ..plant.state import Row
+from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
 from .context import Context
 from .episode import Episode, Flags
+from .identity import identity
+from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
+from .memory import check_memory, record_size
 from .observation import layout
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
 from .step import control_step, observe_start
 
-HEAD_RANGE = 0.3
-"""Height of the head (m), either way, beyond which an episode ends: outside the wire's clearance."""
-LOSS_TIME = 0.5
-"""Time without contact (s) after which an episode ends."""
-LARGEST_FORCE = 1e5
-"""Contact force (N) beyond which, a thousand times any real one, a computation has diverged."""
+LARGEST_DEVIATION = 2e3
+"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
 LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
+
+BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_step", "_observe_start")
+"""Attributes that ``Task._bind`` makes of the others."""
 
 
 class Task:
@@ -45,11 +52,13 @@ class Task:
         lanes: int = 1,
         keep_samples: bool = True,
         record_droppers: bool = False,
+        trim: Trim | None = None,
     ) -> None:
-        """Build the plant and the arrays of an episode.
+        """Build the plant and the arrays of an episode; ``memory`` says what its record takes (bytes).
 
         keep_samples: keep those of a whole episode, for ``trajectory``; record_droppers: with the tension
-        of every dropper. Raises InputError for what is not valid together.
+        of every dropper. trim: static force, where a mean force is to be met; by default that of the line and
+        the pantograph as designed. Raises InputError for what is not valid together.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
@@ -61,7 +70,7 @@ class Task:
             spans=_spans(settings),
             numerics=settings.numerics,
             actuator=settings.actuator,
-            conditions=settings.line_condition,
+            runs=_runs(settings),
             bilateral=settings.bilateral,
             varied=settings.pantograph_scatter > 0,
         )
@@ -74,11 +83,16 @@ class Task:
         self.control_interval = settings.control_interval
         self.control_steps = _whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)
+        stride = self.speed_range[1] * self.control_interval
+        if self.distance < stride - 1e-9:
+            raise InputError(
+                f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
+                f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
+            )
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
+        self.trim = trim
         self.episode = self._episode()
-        self.reward = self.episode.table[TaskRow.REWARD, :lanes]
-        self.terms = self.episode.table[TaskRow.TERM : EPISODE_ROWS, :lanes]
         self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes)
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
@@ -86,13 +100,36 @@ class Task:
         self._record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
+        supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
+        self.memory = record_size(lanes, rows - 1, supports, droppers)
+        check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
-        self._threads = lane_threads(lanes, plant.lanes_abreast)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    def _bind(self) -> None:
+        """Look at the arrays by name, and bind the kernels to them."""
+        self.reward_and_terms = self.episode.table[TaskRow.REWARD : EPISODE_ROWS, : self.lanes]
         self._action = self.episode.action
-        packed = pack(*plant.arrays, self.sensors, self.samples, self.episode, self.running)
+        self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
+        packed = pack(*self.plant.arrays, *self._arrays)
         self._control_step = bind(control_step, packed, 0, 1)
         self._observe_start = bind(observe_start, packed, 0, 1)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
 
     def _episode(self) -> Episode:
         lanes, actions, time_step = self.lanes, len(self.actuator.places), self.plant.time_step
@@ -105,6 +142,7 @@ class Task:
             weights=self.settings.reward.weights,
             idle=np.zeros(lanes, dtype=np.bool_),
             terminated=np.zeros(lanes, dtype=np.bool_),
+            ending=np.zeros(lanes, dtype=np.int64),
             truncated=np.zeros(lanes, dtype=np.bool_),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
             writers=self.layout.writers,
@@ -130,13 +168,19 @@ class Task:
         possible = self.plant.model.length / stride + 1e-9
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
+    @property
+    def most_control_steps(self) -> int:
+        """Control steps of an episode at the lowest speed: the longest that there are."""
+        return self._steps(self.speed_range[0]) // self.control_steps
+
     def reset(self, lane: int, random: np.random.Generator) -> None:
         """Start an episode in one lane: draw its speed, its line and its pantograph."""
         low, high = self.speed_range
         speed = low if low == high else float(random.uniform(low, high))
         plant, episode, scatter = self.plant, self.episode, self.settings.pantograph_scatter
         line = draw(self.settings.line_condition, random, len(plant.model.droppers))
-        plant.start(lane, speed, line, with_scatter(plant.pantograph, scatter, random) if scatter else None)
+        own = with_scatter(plant.pantograph, scatter, random) if scatter else None
+        plant.start(lane, speed, line, own, self._static_force(speed))
         self.speed[lane] = speed
         end = self._steps(speed)
         column = episode.table[:, lane]
@@ -145,6 +189,7 @@ class Task:
         column[TaskRow.DISTANCE] = end * plant.stride[lane]
         episode.action[lane] = episode.last_action[lane] = 0.0
         episode.terminated[lane] = episode.truncated[lane] = False
+        episode.ending[lane] = Ending.NONE
         plant.clear(self.samples, lane)
         sample = plant.sample[:, lane]
         self.sensors.reset(lane, sample)
@@ -155,6 +200,14 @@ class Task:
             self._noise.start(lane, random)
             self._noise.write(self.sensors.noise, np.array([lane]))
         self._observe_start(lane, lane + 1)
+
+    def _static_force(self, speed: float) -> float | None:
+        """Static force (N) at a speed (m/s) where a mean force is to be met, else None."""
+        if target_mean(self.settings, speed) is None:
+            return None
+        if self.trim is None:
+            self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
+        return self.trim.static_force(speed)
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -179,13 +232,14 @@ class Task:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
         Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
-        Results are in ``episode`` (observation, terminated, truncated), ``reward`` and ``terms``.
+        Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
         """
+        self._action[...] = action
+        stepped = self._all_lanes
         if skip is not None:
             self.episode.idle[:] = skip
-        self._action[:] = action
+            stepped = np.flatnonzero(~skip)
         if self._noise is not None:
-            stepped = self._all_lanes if skip is None else np.flatnonzero(~skip)
             self._noise.write(self.sensors.noise, stepped)
         if self._threads is None:
             self._control_step(0, self.lanes)
@@ -195,8 +249,11 @@ class Task:
             self.episode.idle[:] = False
 
     def run_passively(self) -> None:
-        """Run all lanes, reset to one speed, to the end without actuators, in one kernel call."""
-        self.plant.advance_passively(self.end(0), self.samples)
+        """Run all lanes, just reset, to their ends without actuators."""
+        idle, ended = np.zeros_like(self._action), np.zeros(self.lanes, dtype=np.bool_)
+        while not ended.all():
+            self.step(idle, skip=ended)
+            ended |= self.episode.terminated | self.episode.truncated
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's control steps so far, the same as its trajectory's summary.
@@ -206,15 +263,16 @@ class Task:
         plant = self.plant
         nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
         figures = self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
-        self._refuse_divergence(
-            lane, np.array([figures.mean, figures.max, figures.min]), plant.sample[Row.WIRE_HEIGHT, lane]
-        )
+        deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
+        self._refuse_divergence(lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
         return figures
 
-    def _refuse_divergence(self, lane: int, force: Array, height: Array) -> None:
-        """Raise InputError where a lane's contact force (N) or wire height (m) is that of no line."""
-        possible = (np.abs(force) < LARGEST_FORCE).all() and (np.abs(height) < LARGEST_HEIGHT).all()
-        if not possible:
+    def _refuse_divergence(self, lane: int, deviation: float, height: Array) -> None:
+        """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
+        is that of no line.
+        """
+        possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
+        if not possible or self.episode.ending[lane] == Ending.DIVERGED:
             plant = self.plant
             raise InputError(
                 f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
@@ -222,11 +280,17 @@ class Task:
                 f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
             )
 
+    def target_mean(self, lane: int) -> float:
+        """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
+        target = target_mean(self.settings, float(self.speed[lane]))
+        return math.nan if target is None else target
+
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
         """Record of a lane's run so far. Raises InputError where its computation diverged."""
         plant, steps = self.plant, int(self.plant.steps_done[lane])
         rows = self.samples.rows[lane, 1 : steps + 1, 0]
-        self._refuse_divergence(lane, rows[:, Row.CONTACT_FORCE], rows[:, Row.WIRE_HEIGHT])
+        deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
+        self._refuse_divergence(lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
         middle = (np.arange(steps) + 0.5) * plant.time_step
         return Trajectory(
             time=middle,
@@ -249,10 +313,54 @@ class Task:
             span_length=plant.catenary.span_length,
             time_step=plant.time_step,
             nominal_force=float(plant.nominal_force[lane]),
+            target_mean=self.target_mean(lane),
+            settings=identity(self.settings, plant, self.distance),
             policy=policy,
             seed=seed,
             terminated=bool(self.episode.terminated[lane]),
+            ending=self.ending(lane),
+            line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(self.speed[lane])),
         )
+
+    def ending(self, lane: int) -> str:
+        """Where and why a lane's run ended early, as a sentence; empty where it did not."""
+        ending = Ending(self.episode.ending[lane])
+        if ending is Ending.NONE:
+            return ""
+        plant = self.plant
+        time = float(plant.steps_done[lane] * plant.time_step)
+        position, line = time * float(self.speed[lane]), plant.catenary
+        return (
+            f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
+            f"{time:.2f} s): {reason(ending, line.free_uplift)}."
+        )
+
+
+def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
+    """Mean force of a pass without a policy, over the spans, as a function of the static force."""
+    task = Task(settings)
+
+    def mean(force: float) -> float:
+        task.trim = Trim((0.0,), (force,))
+        task.reset(0, np.random.default_rng(seed))
+        task.run_passively()
+        run = task.trajectory(0)
+        if run.terminated:
+            raise InputError(
+                f"A mean force of {run.target_mean:.1f} N cannot be met by '{run.pantograph}' on "
+                f"'{run.catenary}' at {run.speed_kmh:g} km/h. With {force:.1f} N of static force: "
+                f"{run.ending}"
+            )
+        return run.summary(spans).mean
+
+    return mean
+
+
+def _runs(settings: RunSettings) -> Runs:
+    """What the plant must be good for."""
+    slow, quick = settings.speed_kmh
+    pantograph, interval = settings.pantograph, settings.control_interval
+    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
 
 
 def _spans(settings: RunSettings) -> int | None:
@@ -260,7 +368,13 @@ def _spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    return max(line.spans, math.ceil(settings.distance / line.span_length) + 1)
+    wanted = math.ceil(settings.distance / line.span_length) + 1
+    if wanted > MOST_SPANS:
+        longest = (MOST_SPANS - 1) * line.span_length
+        raise InputError(
+            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
+        )
+    return max(line.spans, wanted)
 
 
 def _whole_steps(control_interval: float, time_step: float) -> int:

@@ -34,6 +34,9 @@ class VectorSettings(RunSettings):
         AutoresetMode.NEXT_STEP,
         description='when a lane whose episode has ended begins anew: "NextStep", "SameStep" or "Disabled"',
     )
+    max_episode_steps: int | None = Field(
+        None, ge=1, description="steps after which an episode is truncated; by default the line's end"
+    )
     render_mode: None = Field(None, description="None: the vector environment does not render")
 
     @field_validator("autoreset_mode", mode="before")

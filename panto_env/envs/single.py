@@ -7,6 +7,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
@@ -15,17 +16,31 @@ from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.arguments import table, takes
 from ..control.observation import BOUND, layout
-from ..control.settings import check_names, default, read_settings
+from ..control.settings import default, read_settings
 from ..control.state import EPISODE_ROWS, TaskRow
 from ..metrics.trajectory import Trajectory
 from ..plant.actuators import actuator_settings
 from ..plant.state import Row
+from .episodes import task_with_options, with_longest_episode
+from .infos import (
+    CONTACT_FORCE,
+    FIGURES_TO_COME,
+    FRAME_FORCE,
+    HEAD,
+    HEAD_FORCE,
+    WIRE,
+    first_info,
+    told,
+)
 from .settings import EnvironmentSettings
 
-# Places in a lane's columns as plain integers: members of an enum would double the time that `step` takes.
-CONTACT_FORCE, HEAD, WIRE = int(Row.CONTACT_FORCE), int(Row.HEAD_HEIGHT), int(Row.WIRE_HEIGHT)
-FRAME_FORCE, HEAD_FORCE = int(Row.FRAME_FORCE), int(Row.HEAD_FORCE)
+# Rows as plain integers: members of an enum would double the time that `step` takes.
 STEP, STRIDE = int(Row.STEP), int(Row.STRIDE)
+
+SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
+
+SEEN = ("_shape", "_observation", "_plant_column", "_reward_and_terms", "_terminated", "_truncated")
+"""Attributes that ``PantographEnv._watch`` takes from the task."""
 
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -62,14 +77,25 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     At the start of the line, at rest under the nominal force.
 
     ## Episode End
-    Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m or
-    contact is lost for 0.5 s; the rest of the run is then charged as if without contact. At the end
-    `info["figures"]` holds the episode's figures, those of `Trajectory.summary()`.
+    Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
+    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the rest of
+    the run is then charged as if without contact.
+
+    ## Info
+    `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
+    actuators (N), position (m), speed (km/h), the reward's terms. `info["figures"]` holds the episode's
+    figures when it ends, those of `Trajectory.summary()`. Until then they are infinite, as is always one that
+    the run has not, such as uplift where no support is passed. A `TimeLimit` ends episodes without the
+    environment's knowledge: `trajectory.summary()` has the figures then, too.
 
     ## Arguments
     {arguments}
 
     `reset(options=...)` takes the same for one episode, but those that change a space.
+
+    ## Copies
+    `copy.deepcopy` and `pickle` take the environment as it is, in the middle of an episode too; the copy goes
+    on bit for bit as the original would, as tree search and worker processes need.
 
     ## Version History
     * v0: first version.
@@ -82,13 +108,22 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, EnvironmentSettings)
         self.render_mode = settings.render_mode
-        self._given = given
+        self._spec: EnvSpec | None = None
         self._usual = Task(settings)
         self._watch(self._usual)
         self._running = False
         shape = self.task.episode.observation[0].shape
         self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.task.episode.action[0].shape, np.float32)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gymnasium.make` made it, with the steps of its longest episode without options."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = with_longest_episode(spec, self._usual.most_control_steps)
 
     @property
     def context(self) -> Context:
@@ -104,13 +139,14 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; ``options`` are arguments of the class, for this episode alone."""
-        task = self._episode_task(options or {})
-        super().reset(seed=seed)
+        task = task_with_options(self._usual, options or {})
+        super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed)
         if task is not self.task:
             self._watch(task)
         task.reset(0, self.np_random)
+        self._speed_kmh = 3.6 * float(task.speed[0])
         self._running = True
-        return task.episode.observation[0].copy(), {"speed_kmh": 3.6 * float(task.speed[0])}
+        return self._observation.copy(), first_info(task)
 
     def _watch(self, task: Task) -> None:
         """Make this the task, and keep its only lane's arrays at hand for ``step``."""
@@ -121,17 +157,13 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._reward_and_terms = episode.table[TaskRow.REWARD : EPISODE_ROWS, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
-    def _episode_task(self, options: dict[str, Any]) -> Task:
-        check_names(options, "option")
-        if not options:
-            return self._usual
-        task = Task(read_settings(self._given | options, EnvironmentSettings))
-        if task.layout != self._usual.layout or task.actuator.places != self._usual.actuator.places:
-            raise InputError(
-                f"The options {', '.join(options)} would change the observation or action space; "
-                "make another environment for that."
-            )
-        return task
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to see anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in SEEN}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._watch(self.task)
 
     def step(
         self, action: NDArray[np.float32]
@@ -150,16 +182,18 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "frame_force": plant[FRAME_FORCE],
             "head_force": plant[HEAD_FORCE],
             "position": plant[STEP] * plant[STRIDE],
+            "speed_kmh": self._speed_kmh,
             "reward_terms": {
                 "cost_function": cost_function,
                 "contact_loss": contact_loss,
                 "effort": effort,
                 "rate": rate,
             },
+            "figures": FIGURES_TO_COME.copy(),
         }
         if terminated or truncated:
             self._running = False
-            info["figures"] = self.task.figures(0).as_dict()
+            info["figures"] = told(self.task.figures(0))
         return self._observation.copy(), reward, terminated, truncated and not terminated, info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -174,7 +208,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 def checked(action: Any, shape: tuple[int, ...]) -> Array:
     """Action as an array of this shape. Raises InputError where it is of another or not finite."""
     force: Array = action
-    if not (isinstance(action, np.ndarray) and action.dtype.char in "fd"):
+    if not (isinstance(action, np.ndarray) and (action.dtype is SINGLE or action.dtype is DOUBLE)):
         try:
             force = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError) as error:

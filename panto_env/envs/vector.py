@@ -7,33 +7,45 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from ..base.arrays import Array
 from ..base.errors import InputError
 from ..control import Task
 from ..control.arguments import takes
+from ..control.episode import Flags
 from ..control.observation import BOUND
 from ..control.settings import read_settings
-from ..control.state import TERMS
+from .episodes import task_with_options, with_longest_episode
+from .infos import lane_figures, lane_infos
+from .lanes import Answer, Lanes
 from .settings import VectorSettings
 from .single import checked
+from .stable_baselines import NamedToStableBaselines
 
-Lanes = NDArray[np.bool_]
 
-
-class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class PantographVectorEnv(
+    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]], metaclass=NamedToStableBaselines
+):
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
     speed, line irregularity and noise drawn for each lane. Lane i, seeded seed + i, sees bit for bit what a
     single environment seeded so sees. `autoreset_mode` is "NextStep" (as Gymnasium's default), "SameStep"
-    or "Disabled", where `reset(options={"reset_mask": ...})` begins anew in the lanes marked.
+    or "Disabled"; `max_episode_steps` truncates episodes as Gymnasium's `TimeLimit` does.
 
-    `infos` holds arrays with a value per lane ("contact_force" (N), "position" (m), the reward's terms) and,
-    for lanes whose episode ends, "figures".
+    `reset(options=...)` takes what the single environment takes, for the episodes that it begins. With
+    "reset_mask" among them, an array of bool, it begins them in the lanes marked alone.
+
+    `infos` holds what the single environment's does, in the form of Gymnasium's vector environments: arrays
+    with a value per lane, and under "_key" which lanes have it. Lanes whose episodes end have "figures"; with
+    "SameStep" these and all else that they ended with are in "final_info", beside "final_obs".
+
+    Stable-Baselines3 takes it inside `panto_agents.vec_env.PantographVecEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
@@ -54,42 +66,69 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, episode.action[0].shape, np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._random: list[np.random.Generator] = []
-        self._ended: Lanes = np.zeros(self.num_envs, dtype=np.bool_)
+        self._shape = episode.action.shape
+        self._spec: EnvSpec | None = None
+        self._limit = settings.max_episode_steps
+        self._lanes = Lanes(self.task)
+        self._random: dict[int, np.random.Generator] = {}  # by lane, and what it was seeded with
+        self._seeds: dict[int, int] = {}
+        self._running = False
+        self._steps = np.zeros(self.num_envs, dtype=np.int64)  # of each lane's episode so far
+        self._ended: Flags = np.zeros(self.num_envs, dtype=np.bool_)
         self._any_ended = False
 
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gymnasium.make_vec` made it, with the steps of the longest episode."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = with_longest_episode(spec, self._limit or self.task.most_control_steps)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Each lane's generator."""
+        self._seed(self._all, None)
+        return tuple(self._random[lane] for lane in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What each lane's generator was seeded with."""
+        self._seed(self._all, None)
+        return tuple(self._seeds[lane] for lane in range(self.num_envs))
+
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
 
-        seed: of lane 0, lane i having seed + i; or one per lane.
+        seed: of lane 0, lane i having seed + i; or one per lane. Other options are arguments of the class,
+        for these episodes alone. Raises InputError, and changes nothing, where one is not valid.
         """
         options = dict(options or {})
-        mask = options.pop("reset_mask", None)
-        if options:
-            raise InputError(f"Unknown option '{next(iter(options))}': known is reset_mask.")
-        lanes = self._masked(mask)
-        seeds = self._seeds(seed)
-        if not self._random:
-            self._random = [seeding.np_random(lane_seed)[0] for lane_seed in seeds]
-        elif seed is not None:
-            for lane in np.flatnonzero(lanes).tolist():
-                self._random[lane] = seeding.np_random(seeds[lane])[0]
-        self._restart(lanes)
-        return self.task.episode.observation.copy(), {"speed_kmh": 3.6 * self.task.speed}
+        mask = self._mask(options.pop("reset_mask", None))
+        lanes = self._all if mask is None else mask
+        task = task_with_options(self.task, options)
+        self._seed(lanes, seed)
+        self._begin(lanes, task)
+        self._running = True
+        answer = self._lanes.answer()
+        return answer.observation, lane_infos(answer if mask is None else answer.of(mask))
 
     def step(
         self, actions: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64], Lanes, Lanes, dict[str, Any]]:
+    ) -> tuple[NDArray[np.float32], Array, Flags, Flags, dict[str, Any]]:
         """Hold ``actions``, (num_envs, actions), for one control interval in every lane.
 
         Raises InputError, and changes nothing, for actions that are not valid.
         """
-        if not self._random:
+        if not self._running:
             raise InputError("No episode has begun; call reset before step.")
-        task, episode = self.task, self.task.episode
-        force = checked(actions, episode.action.shape)
+        force = checked(actions, self._shape)
         if self.autoreset_mode == AutoresetMode.DISABLED and self._any_ended:
             raise InputError(
                 f"The episode of lane {np.flatnonzero(self._ended)[0]} has ended; "
@@ -98,68 +137,77 @@ class PantographVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], ND
         waiting = None  # in "NextStep": lanes that begin anew instead of stepping
         if self._any_ended:
             waiting = self._ended.copy()
-            self._restart(waiting)
-        task.step(force, skip=waiting)
-        reward = task.reward.astype(np.float64)
-        if waiting is not None:
-            reward[waiting] = 0.0
-        terminated = episode.terminated.copy()
-        truncated = episode.truncated & ~terminated
+            self._begin(waiting, self.task)
+        self._lanes.step(force, waiting)
+        answer = self._lanes.answer()
+        observation, terminated, truncated = answer.observation, answer.terminated, answer.truncated
+        if self._limit is not None:
+            self._steps += 1 if waiting is None else ~waiting
+            truncated |= self._steps >= self._limit
         self._ended = terminated | truncated
-        self._any_ended = bool(self._ended.any())
-        infos: dict[str, Any] = {
-            "contact_force": task.plant.contact_force.copy(),
-            "position": task.plant.steps_done * task.plant.stride,
-            **dict(zip(TERMS, task.terms.copy(), strict=True)),
-        }
-        if self._any_ended:
-            for lane in np.flatnonzero(self._ended).tolist():
-                infos = self._add_info(infos, {"figures": task.figures(lane).as_dict()}, lane)
-        observation = episode.observation.copy()
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._any_ended:
-            observation, infos = self._same_step(observation, infos)
-        return observation, reward, terminated, truncated, infos
+        self._any_ended = bool(np.count_nonzero(self._ended))  # sooner than ``any``
+        if not self._any_ended:
+            infos = lane_infos(answer)
+        elif self.autoreset_mode == AutoresetMode.SAME_STEP:
+            observation, infos = self._begin_at_once(answer)
+        else:
+            infos = lane_infos(answer) | self._figures()
+        return observation, answer.rewards[0], terminated, truncated, infos
 
-    def _same_step(
-        self, observation: NDArray[np.float32], infos: dict[str, Any]
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin anew at once where episodes have ended; what they ended with goes to the infos."""
+    def _figures(self) -> dict[str, Any]:
+        ended = np.flatnonzero(self._ended).tolist()
+        return lane_figures({lane: self._lanes.figures(lane) for lane in ended}, self.num_envs)
+
+    def _begin_at_once(self, answer: Answer) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin anew where episodes have ended; what they ended with goes to the infos."""
         ended = self._ended.copy()
-        final = np.full(self.num_envs, None, dtype=object)
+        final_observation = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended).tolist():
-            final[lane] = observation[lane].copy()
-        outcome = dict(infos)
-        self._restart(ended)
-        fresh = {
-            "speed_kmh": 3.6 * self.task.speed,
-            "final_obs": final,
+            final_observation[lane] = answer.observation[lane]
+        final = {
+            "final_obs": final_observation,
             "_final_obs": ended,
-            "final_info": outcome,
+            "final_info": lane_infos(answer.of(ended)) | self._figures(),
             "_final_info": ended,
         }
-        return self.task.episode.observation.copy(), infos | fresh
+        self._begin(ended, self.task)
+        begun = self._lanes.answer()
+        return begun.observation, lane_infos(begun) | final
 
-    def _restart(self, lanes: Lanes) -> None:
-        for lane in np.flatnonzero(lanes).tolist():
-            self.task.reset(lane, self._random[lane])
-            self._ended[lane] = False
+    @property
+    def _all(self) -> Flags:
+        return np.ones(self.num_envs, dtype=np.bool_)
+
+    def _begin(self, lanes: Flags, task: Task) -> None:
+        self._lanes.begin(lanes, task, self._random)
+        self._steps[lanes] = 0
+        self._ended[lanes] = False
         self._any_ended = bool(self._ended.any())
 
-    def _masked(self, mask: Any) -> Lanes:
+    def _mask(self, mask: Any) -> Flags | None:
         if mask is None:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        lanes = np.asarray(mask)
-        if lanes.shape != (self.num_envs,) or lanes.dtype != np.bool_ or not self._random:
-            raise InputError(
-                f"reset_mask must be {self.num_envs} booleans, given after a first reset of all lanes."
-            )
+            return None
+        valid = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,) and mask.dtype == np.bool_
+        if not (valid and mask.any()):
+            raise InputError(f"reset_mask must be {self.num_envs} booleans, an array with one true or more.")
+        if not (self._running or mask.all()):
+            raise InputError("The first reset must begin episodes in all lanes; leave out reset_mask.")
+        lanes: Flags = mask.copy()
         return lanes
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+    def _seed(self, lanes: Flags, seed: int | Sequence[int | None] | None) -> None:
+        """Seed the lanes marked; one without a seed of its own keeps its generator if it has one."""
+        seeds = self._lane_seeds(seed)
+        wanted = [k for k in np.flatnonzero(lanes).tolist() if seeds[k] is not None or k not in self._random]
+        fresh = {lane: seeding.np_random(seeds[lane]) for lane in wanted}
+        for lane, (random, used) in fresh.items():
+            self._random[lane], self._seeds[lane] = random, used
+
+    def _lane_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int):
-            return [seed + lane for lane in range(self.num_envs)]
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + lane for lane in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InputError(f"seed must be a number or one per lane, {self.num_envs}, not {len(seed)}.")
         return [None if each is None else int(each) for each in seed]

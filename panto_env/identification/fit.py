@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from .model import IDENTIFIED, UNITS, Parameters
+from .model import IDENTIFIED, UNITS, Parameters, possible
 
 CONFIDENCE = 0.95
 Z = 1.959963984540054  # of the normal distribution, two-sided, at CONFIDENCE
@@ -48,6 +48,11 @@ class Fit:
         """Parameters whose 95 % interval contains 0: the record does not determine them."""
         return tuple(name for name, share in zip(self.names, self.rsd, strict=True) if Z * share > 100)
 
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """Parameters whose value no pantograph can have, such as a negative mass."""
+        return tuple(name for name, value in self.parameters.items() if not possible(name, value))
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         parameters = {
@@ -62,6 +67,7 @@ class Fit:
             "condition": self.condition,
             "dependence": self.dependence,
             "undetermined": list(self.undetermined),
+            "impossible": list(self.impossible),
         }
 
 

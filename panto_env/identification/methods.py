@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,8 +10,9 @@ from ..base.errors import InputError
 from .equation_error import FILTERED, PRINTED, fit_equation_error
 from .fit import Fit
 from .low_pass import excited_band
-from .model import Parameters
+from .model import Parameters, check_known
 from .output_error import OUTPUT_ERROR, fit_output_error
+from .plausibility import check_record
 from .record import Record
 
 METHODS = (PRINTED, FILTERED, OUTPUT_ERROR)
@@ -33,7 +35,12 @@ def identify(
     known: at least k1T (N/m), m2 (kg) and k2 (N/m). band: highest frequency of the excitation (Hz), found
     from the plate's motion unless given. free_offset: only motion counts, not where the springs carry
     nothing. A method that finds nothing says why in ``failures``.
+
+    Raises InputError, with the likely mistake, for a record or known values that can't be those of a rig.
     """
+    check_record(record, check_known(known))
+    if band is not None and not (math.isfinite(band) and band > 0):
+        raise InputError(f"The band must be a frequency above 0 Hz, not {band:g}.")
     band = excited_band(record) if band is None else band
     runs: dict[str, Callable[[], Fit]] = {
         PRINTED: lambda: fit_equation_error(record, known, free_offset=free_offset),

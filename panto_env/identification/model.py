@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.ranges import ranges_of
 from ..plant.pantograph.schema import PantographData
 
 Parameters = Mapping[str, float]
@@ -36,6 +36,31 @@ HEAD, SUPPORT, HEAD_SPEED, SUPPORT_SPEED, PLATE = range(5)
 """Places in the state: y_p2, y_p3, y_p2', y_p3', and y_p1 where the contact force drives the plate."""
 
 
+def _range(field: str) -> tuple[float, float]:
+    """Lowest and highest value that a pantograph may have."""
+    (between,) = set(ranges_of(PantographData.model_fields[field].rebuild_annotation()))
+    return between.low, between.high
+
+
+RANGES = {
+    "k1T": _range("contact_stiffness"),
+    "m2": _range("masses"),
+    "k2": (1.0, _range("stiffnesses")[1]),  # without a spring between them head and support are two things
+    "c1T": _range("contact_damping"),
+    "c2": _range("dampings"),
+    "m3": (1.0, _range("masses")[1]),  # of an articulated frame
+    "c3": _range("dampings"),
+    "k3": _range("stiffnesses"),
+}
+"""Lowest and highest value of each parameter, in its unit."""
+
+
+def possible(name: str, value: float) -> bool:
+    """Whether a pantograph can have this value of a parameter; nan is none."""
+    low, high = RANGES[name]
+    return low <= value <= high
+
+
 def check_known(known: Parameters) -> dict[str, float]:
     """Values known beforehand, all of MEASURED among them; any of IDENTIFIED may be fixed too.
 
@@ -44,10 +69,12 @@ def check_known(known: Parameters) -> dict[str, float]:
     for name, value in known.items():
         if name not in UNITS:
             raise InputError(f"Measured parameter '{name}' is not known; known are {', '.join(UNITS)}.")
-        positive = name in MEASURED or name == "m3"
-        if not (math.isfinite(value) and (value > 0 if positive else value >= 0)):
-            wanted = "above 0" if positive else "0 or above"
-            raise InputError(f"Measured parameter {name} must be a number {wanted}, not {value:g}.")
+        if not possible(name, value):
+            low, high = RANGES[name]
+            raise InputError(
+                f"Measured parameter {name} must be a number from {low:,g} to {high:,g} {UNITS[name]}, "
+                f"not {value:g}."
+            )
     missing = [name for name in MEASURED if name not in known]
     if missing:
         raise InputError(

@@ -20,6 +20,8 @@ from .record import Record
 from .response import polynomials, respond
 
 OUTPUT_ERROR = "output error"
+MOST_EVALUATIONS = 100
+"""Of the model in a pass; real records take about ten."""
 PASSES = 2  # the second weighs with the covariance that the first left
 SAMPLES_PER_PERIOD = 200
 """Of the band, to simulate with: a spline through them is good to 1e-9 of the motion."""
@@ -56,12 +58,21 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     guess = {n: max(v, START[n]) for n, v in zip(start.names, start.values, strict=True)}
     misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
+    bounds = (misfit.lowest(), np.inf)
     for _ in range(PASSES):
-        fitted = least_squares(
-            misfit.residuals, solution, misfit.jacobian, bounds=(misfit.lowest(), np.inf), x_scale="jac"
-        )
-        solution = fitted.x
-        misfit.weigh(solution)
+        try:
+            fitted = least_squares(
+                misfit.residuals,
+                solution,
+                misfit.jacobian,
+                bounds=bounds,
+                x_scale="jac",
+                max_nfev=MOST_EVALUATIONS,
+            )
+            solution = fitted.x
+            misfit.weigh(solution)
+        except (ValueError, np.linalg.LinAlgError) as error:  # the model's motion is beyond all numbers
+            raise InputError(f"The output-error fit diverges ({error}); check the record's units.") from error
     jacobian = misfit.jacobian(solution)
     length = np.linalg.norm(jacobian, axis=0)
     _, singular, rows = np.linalg.svd(jacobian / length, full_matrices=False)

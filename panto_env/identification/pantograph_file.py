@@ -3,34 +3,70 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import check_output, write_whole
+from ..base.ranges import ranges_of
+from ..plant.pantograph.schema import PantographData
 from .fit import Fit
+from .model import UNITS
+from .performance import Match
+
+EXPLAINS = 50.0
+"""Fitting performance (%) of a displacement from which a model explains it."""
+(_FORCE,) = set(ranges_of(PantographData.model_fields["static_force"].rebuild_annotation()))
+MOST_FORCE = _FORCE.high
+"""Largest lifting force (N) of a pantograph."""
+SUFFIXES = (".toml",)
+"""Of the file that a pantograph is written to."""
 
 
-def write_pantograph(
-    fit: Fit, path: str | Path, *, record: str, static_force: float, force_source: str
-) -> None:
-    """Write what ``panto simulate --pantograph`` takes, whole or not at all.
-
-    record: name of the record, for the sources. static_force: lifting force (N), and where it is from.
-    Raises InputError for a file that is not .toml, and for parameters that no pantograph can have.
-    """
-    path = Path(path)
-    if path.suffix != ".toml":
-        raise InputError(f"The pantograph file {path} must end in .toml.")
+def check_possible(fit: Fit) -> None:
+    """Raise InputError for parameters that no pantograph can have."""
     p = fit.parameters
-    impossible = [name for name, value in p.items() if not (value > 0 if name[0] == "m" else value >= 0)]
-    if impossible:
-        shown = ", ".join(f"{name} = {p[name]:.4g}" for name in impossible)
+    if fit.impossible:
+        shown = ", ".join(f"{name} = {p[name]:.4g} {UNITS[name]}" for name in fit.impossible)
         raise InputError(
             f"The {fit.method} found {shown}: no pantograph has that, so none is written; take a record that "
             "determines it, another --method, or give its value with --measured."
         )
-    if not static_force >= 0:
-        raise InputError(f"The static force must be 0 N or above, not {static_force:g}.")
+
+
+def write_pantograph(
+    fit: Fit,
+    path: str | Path,
+    *,
+    matches: Sequence[Match],
+    record: str,
+    static_force: float,
+    force_source: str,
+) -> None:
+    """Write what ``panto simulate --pantograph`` takes, whole or not at all.
+
+    matches: of the model beside the record. record: its name, for the sources. static_force: lifting force
+    (N), and where it is from.
+    Raises InputError for a file that is not .toml, for parameters that no pantograph can have, and for a
+    model that does not explain the motion that it was identified from.
+    """
+    check_output(path, SUFFIXES)
+    check_possible(fit)
+    for match in matches:
+        if match.driven_by == "plate" and match.channel != "force" and not match.performance >= EXPLAINS:
+            raise InputError(
+                f"The model by {fit.method} does not explain the motion of {match.channel} (fitting "
+                f"performance {match.performance:.3g} %, {EXPLAINS:g} % is wanted), so none is written; "
+                "check units and signs, or take a record with more motion, another --method, or known values "
+                "by --measured."
+            )
+    if not 0 <= static_force <= MOST_FORCE:
+        raise InputError(
+            f"The static force must be a number from 0 to {MOST_FORCE:g} N, not {static_force:g}; give it "
+            "with --static-force."
+        )
+
+    p = fit.parameters
 
     def source(*names: str) -> str:
         parts = []

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.files import write_whole
-from ..base.settings import suggest
+from ..base.names import suggest
 from .record import Record, equal_step
 
 NAMES = {
@@ -75,8 +75,9 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise InputError(
-            f"The record {path} could not be read: {error}; give a CSV file in UTF-8."
+            f"The record {path} could not be read: {reason}; give a CSV file in UTF-8."
         ) from error
     kept = [
         (number, line)

@@ -12,7 +12,10 @@ from .performance import Match
 
 
 def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
-    """What was identified, a column for each method; band: of the excitation (Hz)."""
+    """What was identified, a column for each method; band: of the excitation (Hz).
+
+    Values that no pantograph can have are marked.
+    """
     names = next(iter(fits.values())).names
     rows = []
     for k, name in enumerate(names):
@@ -20,7 +23,8 @@ def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
         for fit in fits.values():
             low, high = fit.interval[k]
             half = (high - low) / 2
-            cells.append(f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %")
+            mark = "[bold red]impossible:[/] " if name in fit.impossible else ""
+            cells.append(f"{mark}{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %")
         rows.append((f"{name} ({UNITS[name]})", *cells))
     rows.append(("condition number", *(f"{fit.condition:.5g}" for fit in fits.values())))
     title = f"Identified, ± 95 %, relative standard deviation; excitation up to {band:.4g} Hz"

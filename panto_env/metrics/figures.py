@@ -9,6 +9,9 @@ import numpy as np
 
 from ..base.arrays import Array
 
+ARC = 5e-3
+"""Longest loss of contact (s) that is no arc."""
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -49,3 +52,13 @@ def cost_function(force: Array, nominal_force: float, stride: float) -> float:
 def contact_loss(force: Array) -> float:
     """CL (%), Eq. 13 of paper 1: share of the distance without contact."""
     return float(100 * np.mean(force <= 0))
+
+
+def arcing(force: Array, time_step: float) -> float:
+    """NQ (%): share of time in losses of contact longer than ``ARC``, as far as steps resolve them.
+
+    Time with current is taken to be all of the time. Contact loss counts losses of any length.
+    """
+    edges = np.diff(np.concatenate([[0], (force <= 0).astype(int), [0]]))
+    steps = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
+    return float(100 * steps[steps * time_step > ARC + 1e-9].sum() / len(force))

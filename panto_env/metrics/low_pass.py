@@ -1,4 +1,7 @@
-"""EN 50317's low-pass of the contact force: a Butterworth filter of sixth order at 20 Hz."""
+"""EN 50317's low-pass of the contact force: a Butterworth filter of sixth order at 20 Hz.
+
+It lets the force through 31 ms late, 2.6 m at 300 km/h: right for figures, but not for pictures along a line.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,8 @@ from ..base.errors import InputError
 
 CUTOFF = 20.0
 """Hz."""
+MIRRORED = 1.0
+"""Time (s) of the record that is mirrored about each end, where ``low_pass_in_place`` looks beyond it."""
 
 
 @cache
@@ -41,3 +46,20 @@ def low_pass(force: Array, time_step: float) -> Array:
     sections, settled = low_pass_sections(time_step)
     filtered, _ = sosfilt(sections, force, zi=settled * force[0])
     return np.asarray(filtered)
+
+
+def low_pass_in_place(force: Array, time_step: float) -> Array:
+    """Contact force (N) with the same attenuation, but not delayed: for pictures along a line.
+
+    Its σ is that of ``low_pass``; single peaks differ, because a filter that delays also shifts phases.
+    Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
+    """
+    from scipy.signal import freqz_sos  # slow to import
+
+    sections, _ = low_pass_sections(time_step)
+    before, after = (min(len(force) - 1, round(MIRRORED / time_step)),) * 2
+    mirrored = np.pad(force, (before, after), mode="reflect", reflect_type="odd")
+    frequency = np.fft.rfftfreq(len(mirrored))
+    _, response = freqz_sos(sections, worN=2 * np.pi * frequency)
+    filtered = np.fft.irfft(np.abs(response) * np.fft.rfft(mirrored), len(mirrored))
+    return np.asarray(filtered[before : len(mirrored) - after])

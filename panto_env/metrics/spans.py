@@ -1,13 +1,14 @@
 """Stretches of a line in whole spans, counted from 1: their limits, and which positions lie inside.
 
-The figures of a run cover the spans first to last, both included (EN 50318 takes 5 and 6). Span 1 begins
-at the start of the line; a support belongs to the span that begins at it.
+The figures of a run cover the spans first to last, both included (EN 50318 takes 5 and 6), by default those
+after the start has died out. Span 1 begins at the start of the line; a support belongs to the span that
+begins at it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,25 @@ from ..base.errors import InputError
 
 Spans: TypeAlias = tuple[int, int]
 """The first and the last span."""
+SpanChoice: TypeAlias = Spans | Literal["all"] | None
+"""The first and the last span, "all" for the whole run, or None for those after the start has died out."""
+FIRST_SETTLED = 10
+"""First span after the start has died out: the waves about the train take their time to build up. What is
+missing falls by about a fifth per span at any speed; docs/validation.md shows what is left."""
+LAST_USUAL = 19
+"""Last span of a run unless told otherwise, so that ten are evaluated."""
 
 
 def check_spans(spans: Any) -> None:
     """Raise InputError unless spans are two whole numbers from 1 up that do not fall."""
-    first, last = spans
-    if not (isinstance(first, int) and isinstance(last, int) and 1 <= first <= last):
+    pair = tuple(spans) if isinstance(spans, list | tuple) else ()
+    if not (len(pair) == 2 and all(isinstance(each, int) for each in pair) and 1 <= pair[0] <= pair[1]):
         raise InputError(f"spans must be two whole numbers, first and last, counted from 1, not {spans!r}.")
+
+
+def in_words(spans: Spans | None) -> str:
+    """The spans as a command takes them: "10-19", or "all" for the whole run."""
+    return "all" if spans is None else f"{spans[0]}-{spans[1]}"
 
 
 def limits(spans: Spans, span_length: float) -> tuple[float, float]:
@@ -36,6 +49,26 @@ def within(position: Array, spans: Spans, span_length: float) -> NDArray[np.bool
     """Which positions (m), (n,), lie inside the spans."""
     begin, end = limits(spans, span_length)
     return np.asarray((position >= begin) & (position < end))
+
+
+def chosen_spans(choice: SpanChoice, distance: float, span_length: float) -> Spans | None:
+    """The spans that a choice means for a run of this distance (m); None for the whole run.
+
+    Raises InputError where it is none, or the run ends before its start has died out.
+    """
+    if choice == "all":
+        return None
+    if choice is not None:
+        check_spans(choice)
+        return choice
+    last = last_whole_span(distance, span_length, tolerance=1e-9)
+    if last < FIRST_SETTLED:
+        raise InputError(
+            f"A run of {distance:g} m ends before its start has died out, which takes "
+            f"{FIRST_SETTLED - 1} spans ({(FIRST_SETTLED - 1) * span_length:g} m); run further, or name the "
+            'spans to evaluate, as (5, 6), or "all".'
+        )
+    return FIRST_SETTLED, last
 
 
 def last_whole_span(distance: float, span_length: float, tolerance: float = 0.0) -> int:

@@ -6,20 +6,26 @@ import dataclasses
 import json
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.files import write_whole
-from .figures import Figures, contact_loss, cost_function
+from ..base.files import check_output, write_whole
+from .compliance import LineFacts, compliance
+from .criterion import Criterion
+from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
-from .spans import Spans, check_spans, limits, within
+from .spans import SpanChoice, Spans, chosen_spans, limits, within
 
-FORMAT = 1
+FORMAT = 2
+SUFFIXES = (".parquet",)
+"""Of the file that a run is saved to."""
 SERIES = (
     "time",
     "position",
@@ -32,12 +38,6 @@ SERIES = (
     "frame_force",
     "head_force",
 )
-
-
-def check_run_file(path: str | Path) -> None:
-    """Raise InputError unless the name of a file is that of a run, a Parquet file."""
-    if Path(path).suffix != ".parquet":
-        raise InputError(f"A run is saved as Parquet: {path} must end in .parquet.")
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,25 @@ class Trajectory:
     speed_kmh: float
     span_length: float  # m
     time_step: float  # s
-    nominal_force: float  # static and aerodynamic uplift (N)
+    nominal_force: float  # static force and aerodynamic uplift, as applied (N)
+    target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # that identify the run, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
+    ending: str = ""  # where and why it did, as a sentence
+    line: LineFacts = field(default_factory=LineFacts)
 
-    def summary(self, spans: Spans | None = None) -> Figures:
-        """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or the whole run.
+    def summary(self, spans: SpanChoice = None) -> Figures:
+        """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or "all" the run.
 
-        Uplift is that of the supports at the ends of these spans and between. Raises InputError
-        where the run does not cover the spans.
+        By default the spans are those after the start has died out. Uplift is that of the supports at the
+        ends of these spans and between. Raises InputError where the run does not cover the spans, is too
+        short for its start to die out, or ended early and no spans before are named.
         """
+        covered = self.spans(spans)
         inside = self.inside(spans)
-        begin, end = (0.0, float(self.position[-1])) if spans is None else limits(spans, self.span_length)
+        begin, end = (0.0, float(self.position[-1])) if covered is None else limits(covered, self.span_length)
         force = self.contact_force[inside]
         filtered = low_pass(self.contact_force, self.time_step)[inside]
         mean, std = float(filtered.mean()), float(filtered.std())
@@ -99,34 +105,68 @@ class Trajectory:
             distance=float(inside.sum() * self.stride),
         )
 
+    def compliance(self, spans: SpanChoice = None) -> list[Criterion]:
+        """What the run keeps of EN 50367 and EN 50119 over the spans, and what is told beside.
+
+        That of droppers needs their record. Raises InputError as ``summary`` does.
+        """
+        inside = self.inside(spans)
+        tension = self.dropper_force[inside]
+        train, dropper = (x // self.span_length for x in (self.position[inside], self.dropper_position))
+        return compliance(
+            self.summary(spans),
+            arcing(self.contact_force[inside], self.time_step),
+            self.line,
+            self.speed_kmh / 3.6,
+            self.span_length,
+            tension,
+            tension[train[:, None] == dropper] if tension.size else tension,
+        )
+
     @property
     def stride(self) -> float:
         """Distance from one sample to the next (m)."""
         return self.speed_kmh / 3.6 * self.time_step
 
-    def inside(self, spans: Spans | None = None) -> NDArray[np.bool_]:
-        """Which samples lie inside the spans, (n,); all by default.
+    @property
+    def distance(self) -> float:
+        """Covered from the start to the end of the last step (m)."""
+        return float(self.position[-1] + self.position[0])
 
-        Raises InputError where the run does not cover the spans.
+    def spans(self, choice: SpanChoice = None) -> Spans | None:
+        """First and last span that a choice means, by default those after the start; None: the whole run.
+
+        Raises InputError where the run does not cover them, or they are not to be had of it.
         """
+        if choice is None and self.terminated:
+            raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
+        spans = chosen_spans(choice, self.distance, self.span_length)
         if spans is None:
-            return np.ones(len(self.time), dtype=bool)
-        check_spans(spans)
+            return None
         _, end = limits(spans, self.span_length)
         if self.position[-1] + self.stride < end:
             first, last = spans
+            if self.terminated:
+                raise InputError(f"Spans {first} to {last} end at {end:g} m. {self.ending}")
             raise InputError(
                 f"spans {first} to {last} end at {end:g} m, but the run ends at "
                 f"{self.position[-1]:.1f} m; run further or choose earlier spans."
             )
-        return within(self.position, spans, self.span_length)
+        return spans
+
+    def inside(self, spans: SpanChoice = None) -> NDArray[np.bool_]:
+        """Which samples lie inside the spans, (n,). Raises InputError as ``spans`` does."""
+        covered = self.spans(spans)
+        if covered is None:
+            return np.ones(len(self.time), dtype=bool)
+        return within(self.position, covered, self.span_length)
 
     def save(self, path: str | Path) -> None:
         """Write a Parquet file, whole or not at all. Raises InputError for a name that is not such a file's.
 
         One column per series, and one per support and per dropper, by number.
         """
-        check_run_file(path)
+        check_output(path, SUFFIXES)
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -138,6 +178,7 @@ class Trajectory:
             name: value.tolist() if isinstance(value := getattr(self, name), np.ndarray) else value
             for name in _facts()
         }
+        facts["line"] = vars(self.line)
         table = pa.table(columns).replace_schema_metadata({"panto_env": json.dumps(facts)})
         with write_whole(path) as temporary:
             pq.write_table(table, temporary)
@@ -157,6 +198,7 @@ class Trajectory:
                 raise ValueError("it has another format")
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
+            facts["line"] = LineFacts(**facts["line"])
             series = {name: table[name].to_numpy() for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),

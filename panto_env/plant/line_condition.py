@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -10,24 +11,29 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from ..base.arrays import Array
-from ..base.settings import NonNegative, Positive, Settings
+from ..base.ranges import Between
+from ..base.settings import Settings
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a fair line (seen in one toy model).
 IRREGULARITY = ((12.0, 0.15e-3), (5.0, 0.08e-3), (1.5, 0.03e-3))
 
-Number = Annotated[int, Field(ge=1)]
+Number = Annotated[int, Between(1, 1000)]
 # Beyond this a wire is no longer nearly level.
-Error = Annotated[float, Field(ge=-0.2, le=0.2, allow_inf_nan=False)]
+Error = Annotated[float, Between(-0.2, 0.2, "m")]
 
 
 class LineCondition(Settings):
     """What differs from the line as designed. Spans, droppers in a span and supports count from 1."""
 
-    irregularity: NonNegative = Field(
+    irregularity: Annotated[float, Between(0, 100)] = Field(
         0.0, description="height irregularity, as a multiple of a fair line's, of random phases (-)"
     )
-    wear_depth: NonNegative = Field(0.0, description="depth A of wear waves, A/2 (1 - cos) (m)")
-    wear_wavelength: Positive = Field(0.8, description="wavelength of the wear waves (m)")
+    wear_depth: Annotated[float, Between(0, 0.02, "m")] = Field(
+        0.0, description="depth A of wear waves, A/2 (1 - cos) (m)"
+    )
+    wear_wavelength: Annotated[float, Between(0.02, 100, "m")] = Field(
+        0.8, description="wavelength of the wear waves (m)"
+    )
     broken_droppers: tuple[tuple[Number, Number], ...] = Field(
         (), description="droppers that are broken: (span, number in the span)"
     )
@@ -39,7 +45,7 @@ class LineCondition(Settings):
         description="messenger supports out of height: (number, how much too high (m)); support k "
         "stands between span k and span k + 1",
     )
-    dropper_scatter: Annotated[float, Field(ge=0, le=0.05)] = Field(
+    dropper_scatter: Annotated[float, Between(0, 0.05, "m")] = Field(
         0.0, description="rms error of the length of every dropper, drawn at random (m)"
     )
 
@@ -56,6 +62,12 @@ class LineCondition(Settings):
     def waves(self) -> int:
         """How many cosines it takes."""
         return len(IRREGULARITY) * (self.irregularity > 0) + (self.wear_depth > 0)
+
+    @property
+    def shortest_wave(self) -> float:
+        """Of the wire's height (m), infinite where it is even."""
+        irregularity = min(length for length, _ in IRREGULARITY) if self.irregularity > 0 else math.inf
+        return min(irregularity, self.wear_wavelength if self.wear_depth > 0 else math.inf)
 
     @property
     def defective(self) -> bool:

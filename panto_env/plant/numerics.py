@@ -1,33 +1,40 @@
-"""How a plant is computed: grid, time step, window, precision."""
+"""How a plant is computed: accuracy, grid, time step, window, precision."""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 from pydantic import Field, field_validator
 
+from ..base.errors import InputError
 from ..base.settings import Positive, Settings
+from .line_condition import LineCondition
+
+SAMPLES_PER_WAVE = 8
+"""Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
 
 
 class Numerics(Settings):
-    """Discretisation. docs/validation.md shows what the defaults cost in accuracy.
+    """Discretisation. docs/validation.md shows what each choice costs in accuracy."""
 
-    A pantograph at 300 km/h goes 0.21 m in a step of 2.5 ms: short wear waves and contact loss on a worn
-    line want a shorter one (``panto validate --wear``).
-    """
-
+    accuracy: Literal["full", "fast"] = Field(
+        "full",
+        description='"full": grid and time step for which figures of a flexible line are within 1 % of '
+        'converged ones at the speeds asked for; "fast": coarser ones, three to twenty times as fast',
+    )
     time_step: Positive | None = Field(
-        None,
-        description="time step (s); by default 2.5 ms, or 2 ms on a flexible line that needs a finer grid "
-        "for it, or 5 ms on a line of periodic stiffness",
+        None, description="time step (s), instead of the one that the accuracy asks for"
     )
     spacing: Positive | None = Field(
         None,
-        description="grid of the flexible catenary (m); by default 1/3 m, or the finest above it that is "
-        "stable with the time step (0.375 m on en50318-2002)",
+        description="grid of the flexible catenary (m), instead of the one that the accuracy asks for",
     )
     window: int = Field(
-        7, description="spans of the flexible catenary computed about the train, odd; 0: the whole line"
+        8,
+        description="spans of the flexible catenary computed about the train, of an even number one more "
+        "ahead than behind; 0: the whole line",
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
@@ -35,7 +42,46 @@ class Numerics(Settings):
 
     @field_validator("window")
     @classmethod
-    def _odd(cls, value: int) -> int:
-        if value != 0 and not (value >= 3 and value % 2 == 1):
-            raise ValueError("must be an odd number of spans from 3 up, or 0 for the whole line")
+    def _wide_enough(cls, value: int) -> int:
+        if value != 0 and value < 3:
+            raise ValueError("must be a number of spans from 3 up, or 0 for the whole line")
         return value
+
+
+class Runs(NamedTuple):
+    """The runs for which a plant is built."""
+
+    speeds: tuple[float, float] = (250 / 3.6, 300 / 3.6)  # lowest and highest (m/s)
+    control_interval: float = 0.01  # s, of which a time step is a whole part unless given
+    conditions: Sequence[LineCondition] = (LineCondition(),)
+    hard_contact: bool = False  # whether stiffer, or more damped, than a collector strip's
+
+    def whole_part(self, longest: float) -> float:
+        """The longest time step (s) up to ``longest`` of which the control interval is a whole number."""
+        return self.control_interval / math.ceil(self.control_interval / longest - 1e-9)
+
+    @property
+    def shortest_wave(self) -> float:
+        """Of the height of the contact wire (m), infinite where it is even."""
+        return min(condition.shortest_wave for condition in self.conditions)
+
+    def wave_step(self, samples: float) -> float:
+        """Time step (s) in which the fastest train takes so many steps for the shortest wave."""
+        return self.shortest_wave / self.speeds[1] / samples
+
+    def carried_step(self, usual: float) -> float:
+        """A usual time step (s), shortened so that the interval is a whole number and waves are carried."""
+        return self.whole_part(min(usual, self.wave_step(SAMPLES_PER_WAVE)))
+
+    def check_wave(self, time_step: float) -> None:
+        """Raise InputError where the wire has waves that a time step (s) cannot carry."""
+        if time_step > self.wave_step(2):
+            raise InputError(
+                f"A time step of {1e3 * time_step:g} ms cannot carry waves of {self.shortest_wave:g} m at "
+                f"{3.6 * self.speeds[1]:g} km/h, of which a train passes one in "
+                f"{1e3 * self.wave_step(1):.3g} ms; take one below {1e3 * self.wave_step(2):.2g} ms."
+            )
+
+
+RUNS = Runs()
+"""Of a train at 250 to 300 km/h under an even wire."""

@@ -40,21 +40,22 @@ class Row(IntEnum):
     STRIDE = 9  # distance covered in one step (m)
     NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
     FORCE = 11  # mean contact force over the last step (N)
-    GAP = 12  # head height minus wire height now (m): positive where they are pressed together
-    STIFFNESS = 13  # of contact spring and massless line in series now (N/m)
-    ACTUATOR_FORCE = 14  # now (N), one row per place
-    STATE = 16  # displacements (m), then velocities (m/s) of the pantograph, head first
+    ACTUATOR_FORCE = 12  # now (N), one row per place
+    STATE = 14  # displacements (m), then velocities (m/s) of the pantograph, head first
     # Rows that only a block has.
     FREE_STATE = STATE + MAX_STATE  # the state at the end of the step, were there no contact force
     COMMAND = FREE_STATE + MAX_STATE  # of the actuators (N), one row per place
     ARRIVING_COMMAND = COMMAND + len(Place)  # the command that arrives at an actuator now (N)
-    IRREGULARITY = ARRIVING_COMMAND + 1  # of the contact wire's height, at the end of the step (m)
+    IRREGULARITY = ARRIVING_COMMAND + 1  # of the contact wire's height, at mid-step (m)
+    WIRE_BEFORE = ARRIVING_COMMAND + 2  # height of the wire where it is touched, at the step's start (m)
+    WIRE_MIDDLE = ARRIVING_COMMAND + 3  # likewise at mid-step, as far as this step's forces don't count (m)
+    RISE = ARRIVING_COMMAND + 4  # of the wire along the step's way, at mid-step (m)
 
 
 ROW, PLACE = constants(Row), constants(Place)
 SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 """Rows of a sample: the first ones."""
-BLOCK_ROWS = int(Row.IRREGULARITY) + 1
+BLOCK_ROWS = int(Row.RISE) + 1
 """Rows of a block."""
 
 

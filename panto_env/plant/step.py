@@ -8,7 +8,15 @@ from __future__ import annotations
 
 from ..backend import NOT_NEGATIVE, inlined, kernel, new_blocks, open_packed
 from .actuators import drive
-from .catenary.protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from .catenary.protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .contact import contact_force
 from .pantograph.step import add_contact_force, move_freely
 from .state import BLOCK_ROWS, CONTACTS, PLACE, ROW, SAMPLE_ROWS
@@ -34,26 +42,41 @@ def store(block, table, begin, count):
 
 
 @inlined
-def read_irregularity(waves, block, begin, count):
-    """Height of the contact wire's irregularity at the end of the step (m): a sum of cosines."""
+def irregularity(waves, block, ahead, out, begin, count):
+    """Height of the contact wire's irregularity (m), a sum of cosines, ``ahead`` strides on; into ``out``."""
     for i in range(count):
-        block[ROW.IRREGULARITY, i] = 0.0
+        out[i] = 0.0
     for k in range(waves.shape[0]):
         wave = waves[k, :, begin : begin + count]
         for i in range(count):
-            turns = wave[1, i] * (block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)) + wave[2, i]
-            block[ROW.IRREGULARITY, i] += wave[0, i] * cosine_of_turns(turns)
+            turns = wave[1, i] * (block[ROW.STRIDE, i] * (block[ROW.STEP, i] + ahead)) + wave[2, i]
+            out[i] += wave[0, i] * cosine_of_turns(turns)
 
 
 @inlined
-def approach(pantographs, actuators, run, contact, block, begin, count):
+def approach(line, wire, pantographs, actuators, run, contact, block, begin, count):
     """Begin the step of one contact's pantographs: all but the contact force."""
     force = block[ROW.ACTUATOR_FORCE :]
     drive(actuators, contact, force, block[ROW.COMMAND :], block[ROW.ARRIVING_COMMAND], begin, count)
     state, free_state = block[ROW.STATE :], block[ROW.FREE_STATE :]
     variant = pantographs.variant[begin]
     move_freely(pantographs, variant, state, free_state, block[ROW.NOMINAL_FORCE], force, count)
-    read_irregularity(run.waves, block, begin, count)
+    irregularity(run.waves, block, 0.5, block[ROW.IRREGULARITY], begin, count)
+    for i in range(count):
+        x = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 0.5)
+        before, middle = place_contact(line, wire, (begin + i) & NOT_NEGATIVE, contact, x)
+        block[ROW.WIRE_BEFORE, i], block[ROW.WIRE_MIDDLE, i] = before, middle
+
+
+@inlined
+def look_along(line, wire, run, contact, block, begin, count):
+    """How far the wire rises, or falls, over the way of the step: what a damped contact feels."""
+    irregularity(run.waves, block, 1.0, block[ROW.RISE], begin, count)
+    irregularity(run.waves, block, 0.0, block[ROW.HEAD_HEIGHT], begin, count)
+    for i in range(count):
+        x0 = block[ROW.STRIDE, i] * block[ROW.STEP, i]
+        rise = rise_at_contact(line, wire, (begin + i) & NOT_NEGATIVE, contact, x0, x0 + block[ROW.STRIDE, i])
+        block[ROW.RISE, i] += rise - block[ROW.HEAD_HEIGHT, i]
 
 
 @inlined
@@ -62,31 +85,34 @@ def meet(line, wire, pantographs, run, contact, block, begin, count):
     variant = pantographs.variant[begin]
     contact_input = pantographs.contact_input[variant, 0]
     strip, damping = pantographs.strip_compliance[variant], pantographs.strip_damping[variant]
+    if damping > 0.0:
+        look_along(line, wire, run, contact, block, begin, count)
+    else:
+        for i in range(count):
+            block[ROW.RISE, i] = 0.0
+    share = pantographs.implicit_share[variant]
     for i in range(count):
         lane = (begin + i) & NOT_NEGATIVE
-        x = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 1.0)
-        height, wire_yield, spring = look_at_contact(line, wire, lane, contact, x)
-        height += block[ROW.IRREGULARITY, i]
-        stiffness = 1.0 / (strip + spring)
-        gap = block[ROW.GAP, i]
+        x = block[ROW.STRIDE, i] * (block[ROW.STEP, i] + 0.5)
+        free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, contact, x)
+        before, irregular = block[ROW.WIRE_BEFORE, i], block[ROW.IRREGULARITY, i]
+        head, free_head = block[ROW.STATE, i], block[ROW.FREE_STATE, i]
+        middle = share * 0.5 * (before + free_wire) + (1.0 - share) * block[ROW.WIRE_MIDDLE, i]
+        middle_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
         force = contact_force(
-            block[ROW.STIFFNESS, i],
-            gap,
-            stiffness,
-            block[ROW.FREE_STATE, i] - height,
+            1.0 / (strip + spring),
+            0.5 * (head + free_head) - (middle + irregular),
+            free_head - head - (free_wire - before) - block[ROW.RISE, i],
             damping,
+            middle_yield - 0.5 * contact_input,
             wire_yield - contact_input,
             run.lowest_force,
         )
-        head = block[ROW.FREE_STATE, i] + contact_input * force
-        new_gap = head - height - wire_yield * force
-        mean_head = 0.5 * (block[ROW.STATE, i] + head)
-        block[ROW.GAP, i] = new_gap
-        block[ROW.STIFFNESS, i] = stiffness
+        mean_head = 0.5 * (head + free_head + contact_input * force)
         block[ROW.FORCE, i] = force
         block[ROW.CONTACT_FORCE, i] = force
         block[ROW.HEAD_HEIGHT, i] = mean_head
-        block[ROW.WIRE_HEIGHT, i] = mean_head - 0.5 * (gap + new_gap) + spring * force
+        block[ROW.WIRE_HEIGHT, i] = middle + irregular + (middle_yield + spring) * force
         apply_force(line, wire, lane, contact, x, force)
 
 
@@ -118,7 +144,7 @@ def step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count):
     All the lanes have pantographs of one variant.
     """
     for c in range(blocks.shape[0]):
-        approach(pantographs, actuators, run, c, blocks[c], begin, count)
+        approach(line, wire, pantographs, actuators, run, c, blocks[c], begin, count)
     for i in range(count):
         advance_wire(line, wire, begin + i)
     for c in range(blocks.shape[0]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from ..base.errors import InputError
-from ..base.settings import suggest
+from ..base.names import suggest
 from ..base.table import Table
 from .study import Comparison, Outcome, Report, Study, write
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..analysis.plots import save
-from ..base.files import finite, write_whole
+from ..base.files import finite, make_folder, write_whole
 from ..base.table import Table
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def write(outcome: Outcome, folder: str | Path) -> list[Path]:
         "comparisons": [comparison.as_dict() for comparison in outcome.comparisons],
         **outcome.numbers,
     }
+    make_folder(folder)
     files = [folder / "numbers.json"]
     with write_whole(files[0]) as temporary:
         text = json.dumps(finite(table), indent=1, ensure_ascii=False, allow_nan=False)

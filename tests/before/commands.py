@@ -92,7 +92,10 @@ def _panto(arguments: tuple[str, ...], folder: str = ".") -> subprocess.Complete
 def _json(arguments: tuple[str, ...], tape: Tape, folder: str = ".") -> None:
     done = _panto((*arguments, "--json"), folder)
     tape.add("exit status", done.returncode)
-    tape.add("printed", json.loads(done.stdout))
+    printed = json.loads(done.stdout)
+    if arguments[0] == "sweep" and isinstance(printed, dict):
+        printed = printed["rows"]  # they once stood alone
+    tape.add("printed", printed)
 
 
 def _train(algorithm: str, tape: Tape) -> None:

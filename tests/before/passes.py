@@ -102,7 +102,8 @@ def _add(tape: Tape, name: str, run: Trajectory) -> None:
     tape.add(name, run)
     if not run.terminated:
         tape.add(f"{name}.summary", run.summary(SPANS))
-    tape.add(f"{name}.summary of all", run.summary())
+    # Until the start was left out by default, no spans meant all of them.
+    tape.add(f"{name}.summary of all", run.summary("all") if hasattr(run, "spans") else run.summary())
 
 
 def _every_pantograph(line: str, tape: Tape) -> None:

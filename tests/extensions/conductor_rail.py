@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.settings import Positive
+from ...base.ranges import Between
 from .protocol import (
     CatenaryKind,
     StartPoint,
     advance_wire,
     apply_force,
     end_step,
+    ending_by_wire,
     look_at_contact,
+    place_contact,
     record_wire,
     refuse_defects,
+    rise_at_contact,
 )
 from .schema import CatenaryData
 
 
 class ConductorRailData(CatenaryData):
     kind: Literal["conductor_rail"] = "conductor_rail"
-    stiffness: Positive = Field(description="stiffness under the pantograph (N/m)")
+    stiffness: Annotated[float, Between(1e3, 1e8, "N/m")] = Field(
+        description="stiffness under the pantograph (N/m)"
+    )
 
 
 class RailLine(NamedTuple):
@@ -37,11 +42,13 @@ class RailWire(NamedTuple):
 
 class ConductorRail:
     massless = True
+    contact_gain = 0.0
+    grid = {}  # noqa: RUF012 - nothing is added to it
     wave_speed = np.inf
     length = np.inf
 
-    def __init__(self, data, *, lanes, spans, numerics, conditions):
-        refuse_defects(data, conditions)
+    def __init__(self, data, *, lanes, spans, numerics, runs):
+        refuse_defects(data, runs.conditions)
         self.time_step = numerics.time_step or 5e-3
         self.line, self.wire = RailLine(1 / data.stiffness), RailWire(np.zeros(lanes))
         self.usual_end = spans * data.span_length
@@ -58,9 +65,19 @@ class ConductorRail:
 KIND = CatenaryKind(ConductorRailData, ConductorRail)
 
 
+@implements(place_contact, RailLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(rise_at_contact, RailLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    return 0.0
+
+
 @implements(look_at_contact, RailLine)
 def _look(line, wire, lane, contact, x):
-    return 0.0, 0.0, line.compliance
+    return 0.0, 0.0, 0.0, line.compliance
 
 
 @implements(advance_wire, RailLine)
@@ -76,6 +93,11 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, RailLine)
 def _end(line, wire, lane):
     pass
+
+
+@implements(ending_by_wire, RailLine)
+def _ending(line, wire, lane):
+    return 0
 
 
 @implements(record_wire, RailLine)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.settings import Positive
+from ...base.ranges import Between
 from ..state import CONTACTS, Place
 from .base import ActuatorSettings, drive
 
 
 class IntegratingActuator(ActuatorSettings):
     kind: Literal["integrating"] = "integrating"
-    time: Positive = Field(0.1, description="time in which the full command is reached (s)")
+    time: Annotated[float, Between(1e-3, 100, "s")] = Field(
+        0.1, description="time in which the full command is reached (s)"
+    )
 
     def arrays(self, time_step, lanes):
         turned = np.zeros((CONTACTS, len(Place), lanes))

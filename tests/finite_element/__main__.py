@@ -23,8 +23,8 @@ def main() -> None:
     line, pantograph = load_catenary(NAME), load_pantograph(NAME)
     table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
     for speed in (250.0, 300.0):
-        for numerics in map(in_use, OURS):
-            figures = simulate(NAME, NAME, speed, **numerics.model_dump()).summary((5, 6))
+        for numerics in (in_use(each, speed) for each in OURS):
+            figures = simulate(NAME, NAME, speed, distance=361.0, **numerics.model_dump()).summary((5, 6))
             values = (figures.mean, figures.std, figures.max, figures.min)
             row = (f"{value:.2f}" for value in values)
             table.add_row(

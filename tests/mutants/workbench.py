@@ -17,7 +17,7 @@ from .mutant import Mutant
 ROOT = Path(__file__).parents[2]
 TIME_LIMIT = 900
 """Seconds after which tests count as failed: a mutant may run forever."""
-PACKAGES = {"panto_baselines": "baselines", "panto_agents": "agents"}
+PACKAGES = {"panto_baselines": "baselines", "panto_agents": "agents", "panto_configs": "configs"}
 """Names of packages whose folders have other ones (see pyproject.toml)."""
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 

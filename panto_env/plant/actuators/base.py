@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import Field
 
 from ...backend import operation
 from ...base.arrays import Array
-from ...base.settings import Positive, Settings
+from ...base.ranges import Between
+from ...base.settings import Settings
 from ..state import Place
 
 
@@ -24,7 +25,9 @@ class ActuatorSettings(Settings, ABC):
     """An actuator as a user asks for it; one on the frame and one on the head have the same data."""
 
     place: Literal["frame", "head", "both"] = Field("frame", description="where the force acts")
-    force_limit: Positive = Field(100.0, description="largest force either way (N)")
+    force_limit: Annotated[float, Between(1e-3, 1e5, "N")] = Field(
+        100.0, description="largest force either way (N)"
+    )
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -1,19 +1,25 @@
-"""What a kind of catenary provides: a class for Python, and four operations for kernels.
+"""What a kind of catenary provides: a class for Python, and its operations for kernels.
 
-A step of a lane goes: ``advance_wire`` once; then, for each contact point, ``look_at_contact`` and
-``apply_force``; then ``end_step`` once. Each operation has one source per class of line constants.
+A step of a lane goes: ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
+point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. Each operation has one source per
+class of line constants; what a run may end by is asked once a control step.
+
+A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
+the step is read there by the same weights by which the force acts there, so that the work that the force
+does on the wire is force times the change of that height, exactly, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ..line_condition import DrawnLine, LineCondition
-from ..numerics import Numerics
+from ..numerics import Numerics, Runs
 from .schema import CatenaryData
 
 
@@ -32,6 +38,8 @@ class CatenaryModel(Protocol):
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: what moves, in all lanes
     massless: bool  # whether the contact wire has no mass of its own
+    contact_gain: float  # stiffness at which an explicit contact law gets unstable, inverted (m/N)
+    grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # how far a run can go (m)
     usual_end: float  # how far a run goes unless told otherwise (m)
@@ -46,9 +54,9 @@ class CatenaryModel(Protocol):
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
-        """Build the line; conditions: in which it may be, one for each run.
+        """Build the line; runs: what it is to be good for.
 
         Raises InputError where it cannot be computed so, or has not what is said to be defective.
         """
@@ -67,6 +75,20 @@ class CatenaryKind(NamedTuple):
     model: type[CatenaryModel]
 
 
+def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
+    """Raise InputError unless trains at these speeds (m/s) are slower than the waves of a line (m/s)."""
+    for speed in speeds:
+        if not (math.isfinite(speed) and 0 < speed < wave_speed):
+            bound = (
+                ""
+                if math.isinf(wave_speed)
+                else f" and below the wave speed of the contact wire, {3.6 * wave_speed:.0f} km/h"
+            )
+            raise InputError(
+                f"The speed must lie above 0{bound} on line '{line}', not at {3.6 * speed:g} km/h."
+            )
+
+
 def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> None:
     """Raise InputError where a line without droppers and supports is to have defects."""
     if any(condition.defective for condition in conditions):
@@ -82,22 +104,42 @@ def advance_wire(line: Any, wire: Any, lane: int) -> None:
 
 
 @operation
-def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
-    """One contact point, between ``advance_wire`` and ``apply_force``; x: at the step's end (m).
+def place_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
+    """Place a contact point at x (m), where it is at mid-step; returns the wire's height there (m) now, and
+    at mid-step as far as the forces of this step don't count.
+    """
 
-    Returns there: the wire's height (m), its yield to 1 N of contact force over the step (m/N), and the
-    compliance of a massless spring in series (m/N, 0 if none).
+
+@operation
+def rise_at_contact(line: Any, wire: Any, lane: int, contact: int, x0: float, x1: float) -> Any:
+    """How much higher the wire is at x1 than at x0 (m) at mid-step, between ``advance_wire`` and
+    ``apply_force``; x0, x1: where the contact point is at the step's ends.
+    """
+
+
+@operation
+def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
+    """One contact point, between ``advance_wire`` and ``apply_force``, where it was placed.
+
+    Returns the wire's height at the step's end, were there no contact force in this step (m), its yield to
+    1 N of contact force at the step's end and at mid-step (m/N), and the compliance of a massless spring in
+    series (m/N, 0 if none).
     """
 
 
 @operation
 def apply_force(line: Any, wire: Any, lane: int, contact: int, x: float, force: float) -> None:
-    """Apply the contact force (N), the mean over the step, at one contact point."""
+    """Apply the contact force (N), the mean over the step, where the contact point was placed."""
 
 
 @operation
 def end_step(line: Any, wire: Any, lane: int) -> None:
     """End the step of one lane."""
+
+
+@operation
+def ending_by_wire(line: Any, wire: Any, lane: int) -> Any:
+    """The ``Ending`` of one lane's run by what its wire does, ``Ending.NONE`` within the valid range."""
 
 
 @operation

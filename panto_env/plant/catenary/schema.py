@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from ...base.errors import InputError
-from ...base.settings import NonNegative, Positive, Settings
+from ...base.ranges import Between
+from ...base.settings import Settings
+from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
+LONGEST_SPAN = 200.0  # m
+"""Two and a half times the longest of usual lines."""
 
 
 def check_span_count(spans: Any) -> int:
     """Number of spans of a line. Raises InputError where it is none."""
     if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
-        raise InputError(f"spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}.")
+        raise InputError(
+            f"A line's spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}."
+        )
     return spans
 
 
@@ -25,14 +32,37 @@ class CatenaryData(Settings):
     kind: str = Field(description="which of CATENARIES it is")
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
-    span_length: Positive = Field(description="distance between supports (m)")
-    spans: int = Field(ge=FEWEST_SPANS, le=MOST_SPANS, description="number of spans unless told otherwise")
+    span_length: Annotated[float, Between(2, LONGEST_SPAN, "m")] = Field(
+        description="distance between supports (m)"
+    )
+    system: Literal["AC", "DC 1.5 kV", "DC 3 kV"] = Field(
+        "AC", description="power supply, by which EN 50367 sets the mean force: AC, DC 1.5 kV or DC 3 kV"
+    )
+    free_uplift: Annotated[float, Between(0.01, 1.0, "m")] = Field(
+        FREE_UPLIFT,
+        description="room for the contact wire's uplift at a support, up to the steady arm's stop (m)",
+    )
+    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(
+        description="number of spans unless told otherwise"
+    )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
+
+    def reflections(self, frequency: float) -> tuple[float, float]:
+        """Share of a wave of this frequency (Hz) that a dropper and a support send back; nan if none does."""
+        return math.nan, math.nan
 
 
 class Wire(Settings):
     """A tensioned wire with bending stiffness."""
 
-    mass: Positive = Field(description="mass per length (kg/m)")
-    tension: Positive = Field(description="tension (N)")
-    bending_stiffness: NonNegative = Field(description="bending stiffness EI (N m^2)")
+    # Twin wires, and one equivalent wire for all, are up to five times those of one wire.
+    mass: Annotated[float, Between(0.05, 20, "kg/m")] = Field(description="mass per length (kg/m)")
+    tension: Annotated[float, Between(500, 200e3, "N")] = Field(description="tension (N)")
+    bending_stiffness: Annotated[float, Between(0, 1e5, "N m^2")] = Field(
+        description="bending stiffness EI (N m^2)"
+    )
+
+    @property
+    def impedance(self) -> float:
+        """Force over velocity of a wave that runs along it (N s/m), bending left out."""
+        return math.sqrt(self.tension * self.mass)

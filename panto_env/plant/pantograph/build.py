@@ -8,10 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.arrays import Array, Index
+from ..catenary.protocol import CatenaryModel
 from .schema import PantographData
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
+STABILITY_MARGIN = 0.3
+"""Share of the stiffest contact that an explicit contact law could bear, which is used."""
 
 
 class Pantographs(NamedTuple):
@@ -27,18 +30,22 @@ class Pantographs(NamedTuple):
     head_input: Array  # (variants, 2n): by 1 N up on the head and down on the mass below it
     strip_compliance: Array  # (variants,): of the contact spring (m/N)
     strip_damping: Array  # (variants,): of the damper beside it, divided by the time step (N/m)
+    implicit_share: Array  # (variants,): of the wire's height in the contact law, 0 explicit, 1 implicit
 
-    def set_variant(self, variant: int, pantograph: PantographData, massless: bool, time_step: float) -> None:
-        """Make one variant this pantograph; massless: whether the wire is, so that a strip can be rigid."""
+    def set_variant(self, variant: int, pantograph: PantographData, catenary: CatenaryModel) -> None:
+        """Make one variant this pantograph; under a massless wire a strip can be rigid."""
+        time_step = catenary.time_step
         transition, inputs = discretise(pantograph, time_step)
         self.transition[variant] = transition
         self.contact_input[variant] = inputs[:, 0]
         self.frame_input[variant] = inputs[:, 1]
         self.head_input[variant] = inputs[:, 2]
-        rigid = 0.0 if massless else 1 / STRIP_STIFFNESS
+        rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
         stiffness = pantograph.contact_stiffness
         self.strip_compliance[variant] = rigid if stiffness == "rigid" else 1 / stiffness
         self.strip_damping[variant] = pantograph.contact_damping / time_step
+        bearable, gain = STABILITY_MARGIN * self.strip_compliance[variant], catenary.contact_gain
+        self.implicit_share[variant] = 0.0 if bearable >= gain else 1.0 - bearable / gain
 
 
 def pantographs(size: int, lanes: int, variants: int = 1) -> Pantographs:
@@ -51,6 +58,7 @@ def pantographs(size: int, lanes: int, variants: int = 1) -> Pantographs:
         head_input=np.zeros((variants, size)),
         strip_compliance=np.zeros(variants),
         strip_damping=np.zeros(variants),
+        implicit_share=np.zeros(variants),
     )
 
 

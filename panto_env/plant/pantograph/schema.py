@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...base.settings import NonNegative, Positive, Settings
+from ...base.ranges import Between
+from ...base.settings import Settings
+
+Mass = Annotated[float, Between(0.1, 200, "kg")]
+Spring = Annotated[float, Between(0, 1e7, "N/m")]
+Damper = Annotated[float, Between(0, 1e5, "N s/m")]
+
+HARD_STIFFNESS, HARD_DAMPING = 250e3, 300.0
+"""Of a contact (N/m, N s/m) beyond which it needs a finer grid: see ``PantographData.hard_contact``."""
+STIFFEST_CONTACT = 1e6
+"""Contact spring (N/m): beyond it, rounding and a moving point of contact can make a force that grows."""
+Contact = Annotated[float, Between(1e3, STIFFEST_CONTACT, "N/m")]
 
 
 class PantographData(Settings):
@@ -15,21 +26,28 @@ class PantographData(Settings):
     kind: Literal["pantograph"] = "pantograph"
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
-    masses: tuple[Positive, ...] = Field(min_length=1, max_length=8, description="masses, head first (kg)")
-    stiffnesses: tuple[NonNegative, ...] = Field(
+    masses: tuple[Mass, ...] = Field(min_length=1, max_length=8, description="masses, head first (kg)")
+    stiffnesses: tuple[Spring, ...] = Field(
         description="springs below each mass, the last to the ground (N/m)"
     )
-    dampings: tuple[NonNegative, ...] = Field(
+    dampings: tuple[Damper, ...] = Field(
         description="dampers below each mass, the last to the ground (N s/m)"
     )
-    static_force: NonNegative = Field(description="lifting force on the lowest mass (N)")
-    aerodynamic_coefficient: NonNegative = Field(
+    force: Literal["applied", "mean"] = Field(
+        "applied",
+        description="whether static force and aerodynamic uplift are applied as they are, or state the mean "
+        "contact force, for which the static force is trimmed: applied or mean",
+    )
+    static_force: Annotated[float, Between(0, 1000, "N")] = Field(
+        description="lifting force on the lowest mass (N)"
+    )
+    aerodynamic_coefficient: Annotated[float, Between(0, 0.02, "N/(km/h)^2")] = Field(
         description="aerodynamic uplift on the lowest mass per speed squared (N/(km/h)^2)"
     )
-    contact_stiffness: Positive | Literal["rigid"] = Field(
+    contact_stiffness: Contact | Literal["rigid"] = Field(
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
-    contact_damping: NonNegative = Field(0.0, description="damper beside the contact spring (N s/m)")
+    contact_damping: Damper = Field(0.0, description="damper beside the contact spring (N s/m)")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     @model_validator(mode="after")
@@ -43,6 +61,12 @@ class PantographData(Settings):
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
         return self
+
+    @property
+    def hard_contact(self) -> bool:
+        """Whether the contact is stiffer, or more damped, than any that strips are computed with."""
+        stiffness = 0.0 if self.contact_stiffness == "rigid" else self.contact_stiffness
+        return stiffness > HARD_STIFFNESS or self.contact_damping > HARD_DAMPING
 
     def nominal_force(self, speed: float) -> float:
         """Force that lifts the pantograph (N) at a train speed (m/s)."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from ...backend import implements, lane_table
+from ...backend import implements, inlined, lane_table
 from ...base.arrays import Array
-from ...base.settings import NonNegative
+from ...base.ranges import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
 
@@ -22,10 +22,18 @@ class DelayedSensors(SensorSettings):
     """What is added to the readings of contact force, displacement and velocity."""
 
     kind: Literal["delayed"] = "delayed"
-    force_noise: NonNegative = Field(0.0, description="rms noise of the contact force (N)")
-    displacement_noise: NonNegative = Field(0.0, description="rms noise of displacements (m)")
-    velocity_noise: NonNegative = Field(0.0, description="rms noise of velocities (m/s)")
-    delay: NonNegative = Field(0.0, description="age of a reading, rounded to time steps (s)")
+    force_noise: Annotated[float, Between(0, 1000, "N")] = Field(
+        0.0, description="rms noise of the contact force (N)"
+    )
+    displacement_noise: Annotated[float, Between(0, 0.1, "m")] = Field(
+        0.0, description="rms noise of displacements (m)"
+    )
+    velocity_noise: Annotated[float, Between(0, 10, "m/s")] = Field(
+        0.0, description="rms noise of velocities (m/s)"
+    )
+    delay: Annotated[float, Between(0, 1, "s")] = Field(
+        0.0, description="age of a reading (s); at least half a time step, as it is a mean over one"
+    )
 
     @property
     def noise_rms(self) -> tuple[float, ...] | None:
@@ -36,10 +44,17 @@ class DelayedSensors(SensorSettings):
 
     def arrays(self, time_step: float, control_steps: int, lanes: int) -> DelayedArrays:
         """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
-        whole, rest = divmod(round(self.delay / time_step), control_steps)
+        # A sample is a mean over its step, so half a step old when that ends; between two it is interpolated.
+        age = max(self.delay / time_step - 0.5, 0.0)
+        late = age - int(age + 1e-6)
+        whole, rest = divmod(int(age + 1e-6), control_steps)
+        read_at = control_steps - rest
         return DelayedArrays(
             past=np.zeros((whole, len(Reading), lanes)),
-            read_at=control_steps - rest,
+            read_at=read_at,
+            older_at=read_at - 1 if read_at > 1 else control_steps,
+            older_share=0.0 if late < 1e-6 else late,
+            older=np.zeros((len(Reading), lanes)),
             noise=lane_table(len(Reading), lanes) if self.noise_rms else np.zeros((len(Reading), 0)),
         )
 
@@ -52,21 +67,28 @@ class DelayedArrays(NamedTuple):
 
     past: Array  # (control steps, readings, lanes): readings on their way, the next to arrive first
     read_at: int  # plant step of a control step whose sample is read, counted from 1
+    older_at: int  # plant step whose sample, the one before, is read too
+    older_share: float  # weight of that
+    older: Array  # (readings, lanes): that sample
     noise: Array  # (readings, lanes): of the next reading, in its units; or (readings, 0) for none
 
     def reset(self, lane: int, sample: Array) -> None:
         """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""
         self.past[:, :, lane] = sample[list(SENSED)]
+        self.older[:, lane] = sample[list(SENSED)]
 
 
-@implements(take_readings, DelayedArrays)
-def _take_readings(sensors, step, block, readings, begin, count):
-    if step != sensors.read_at:
-        return
-    control_steps = sensors.past.shape[0]
+@inlined
+def read(sensors, block, readings, begin, count):
+    """Take the reading that arrives in this control step, and send off the one taken now."""
+    control_steps, share = sensors.past.shape[0], sensors.older_share
     for k in range(len(_SENSED)):
         for i in range(count):
             readings[k, i] = block[_SENSED[k], i]
+        if share > 0.0:
+            older = sensors.older[k, begin : begin + count]
+            for i in range(count):
+                readings[k, i] += share * (older[i] - readings[k, i])
         if control_steps > 0:
             past = sensors.past[:, k, begin : begin + count]
             for i in range(count):
@@ -75,6 +97,17 @@ def _take_readings(sensors, step, block, readings, begin, count):
                 for j in range(control_steps - 1):
                     past[j, i] = past[j + 1, i]
                 past[control_steps - 1, i] = taken
+
+
+@implements(take_readings, DelayedArrays)
+def _take_readings(sensors, step, block, readings, begin, count):
+    if step == sensors.read_at:
+        read(sensors, block, readings, begin, count)
+    if step == sensors.older_at and sensors.older_share > 0.0:
+        for k in range(len(_SENSED)):
+            older = sensors.older[k, begin : begin + count]
+            for i in range(count):
+                older[i] = block[_SENSED[k], i]
 
 
 @implements(take_first_readings, DelayedArrays)

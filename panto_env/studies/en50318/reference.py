@@ -11,6 +11,7 @@ from ...metrics.labels import LABELS
 from ...metrics.trajectory import Trajectory
 
 REFERENCE_MODEL = "en50318-2002"
+LINE_SPANS = 10
 SPANS = (5, 6)
 SPEEDS_KMH = (250.0, 300.0)
 ACCEPTED: dict[str, tuple[tuple[float, float], ...]] = {
@@ -49,7 +50,8 @@ class Check:
 
 def reference_runs(speeds_kmh: Sequence[float] = SPEEDS_KMH, **numerics: Any) -> list[Trajectory]:
     """The reference model's run at each speed; numerics: keys of ``Numerics``."""
-    return [simulate(REFERENCE_MODEL, REFERENCE_MODEL, speed, **numerics) for speed in speeds_kmh]
+    line = REFERENCE_MODEL
+    return [simulate(line, REFERENCE_MODEL, speed, spans=LINE_SPANS, **numerics) for speed in speeds_kmh]
 
 
 def check(runs: list[Trajectory]) -> list[Check]:

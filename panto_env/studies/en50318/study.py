@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...base.table import Table
+from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
-from . import convergence, reference, tables, wear, window
+from . import convergence, lines, reference, start, tables, wear, window
+from .lines import LineCheck
 from .reference import Check
+from .start import StartCheck
 from .wear import WearCheck
 from .window import WindowCheck
 
@@ -19,13 +22,16 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last three are empty where they were not asked for."""
+    """What was found; the last five are empty where they were not asked for."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
+    compliance: list[list[Criterion]]  # of each run, over the standard's spans
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
+    lines: list[LineCheck]
+    start: list[StartCheck]
 
     @property
     def passed(self) -> bool:
@@ -40,6 +46,8 @@ class Validation:
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
+            *([tables.lines_table(self.lines)] if self.lines else []),
+            *([tables.start_table(self.start)] if self.start else []),
         ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -47,9 +55,15 @@ class Validation:
         return {
             "passed": self.passed,
             "checks": [check.as_dict() for check in self.checks],
+            "compliance": [
+                {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
+                for run, criteria in zip(self.runs, self.compliance, strict=True)
+            ],
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
+            "lines": [vars(check) for check in self.lines],
+            "start": [vars(check) for check in self.start],
         }
 
 
@@ -59,6 +73,8 @@ def run(
     with_convergence: bool = False,
     with_windows: bool = False,
     with_wear: bool = False,
+    with_lines: bool = False,
+    with_start: bool = False,
 ) -> Validation:
     """Run the standard's table, and whatever else is asked for."""
     report("the reference model")
@@ -77,4 +93,13 @@ def run(
         for numerics in wear.DISCRETISATIONS:
             report(f"{condition}, {numerics}")
             worn.append(wear.check_wear(condition, numerics))
-    return Validation(runs, reference.check(runs), rows, windows, worn)
+    every: list[LineCheck] = []
+    for name, speed in lines.cases() if with_lines else ():
+        report(f"{name} at {speed:g} km/h")
+        every += lines.check_line(name, speed)
+    starts: list[StartCheck] = []
+    for speed in start.SPEEDS_KMH if with_start else ():
+        report(f"the start of runs at {speed:g} km/h")
+        starts += start.check_start(speed)
+    compliance = [run.compliance(reference.SPANS) for run in runs]
+    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, every, starts)

@@ -8,7 +8,7 @@ from typing import Any
 from ...base.table import Table
 from ...metrics.labels import LABELS
 from ...terminal import number
-from . import convergence, reference, wear, window
+from . import convergence, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
 
@@ -43,7 +43,7 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
         for row in at_speed:
             discretisation = (
                 f"{row['spacing']:.3g}",
-                f"{1e3 * row['time_step']:g}",
+                f"{1e3 * row['time_step']:.3g}",
                 str(row["window"] or "all"),
                 row["precision"],
             )
@@ -91,7 +91,7 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
             f"{check.wavelength:g}",
             f"{1e3 * check.depth:g}",
             f"{check.spacing:.3g}",
-            f"{1e3 * check.time_step:g}",
+            f"{1e3 * check.time_step:.3g}",
             f"{check.steps:.1f}",
         )
         forces = (_spread(values, 1) for values in (check.std, check.max, check.min, check.raw_max))
@@ -106,6 +106,55 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
             f"raw {LABELS['max'].column}",
             LABELS["contact_loss"].column,
         ),
+        rows,
+        text_columns=0,
+    )
+
+
+def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
+    """Every line at every speed beside converged figures; last the largest change of each accuracy."""
+    rows, section_ends = [], []
+    for k, check in enumerate(checks):
+        changes = (f"{value:+.2f}" for value in (check.std, check.max, check.min, check.contact_loss))
+        case = (check.catenary, f"{check.speed_kmh:g}", check.accuracy, f"{check.spacing:.3g}")
+        rows.append((*case, f"{1e3 * check.time_step:.3g}", number(check.converged, 2), *changes))
+        if k + 1 == len(checks) or checks[k + 1].catenary != check.catenary:
+            section_ends.append(k)
+    for accuracy in dict.fromkeys(check.accuracy for check in checks):
+        those = [check for check in checks if check.accuracy == accuracy]
+        largest = (
+            max(abs(getattr(check, name)) for check in those)
+            for name in ("std", "max", "min", "contact_loss")
+        )
+        rows.append(("largest", "", accuracy, "", "", "", *(f"{value:.2f}" for value in largest)))
+    first, last = lines.SPANS
+    return Table(
+        f"Every flexible line beside a grid of {lines.CONVERGED.spacing:g} m and a step of "
+        f"{1e3 * (lines.CONVERGED.time_step or 0.0):g} ms, spans {first} to {last}",
+        (
+            *("line", "km/h", "accuracy", "grid\n(m)", "step\n(ms)"),
+            f"converged\n{LABELS['std'].column}",
+            _in_percent("std"),
+            *(LABELS[name].column for name in ("max", "min")),
+            f"{LABELS['contact_loss'].short}\n(points)",
+        ),
+        rows,
+        section_ends=tuple(section_ends),
+    )
+
+
+def start_table(checks: Sequence[start.StartCheck]) -> Table:
+    """What the start does to σ, by the first span evaluated."""
+    rows = []
+    for speed in dict.fromkeys(check.speed_kmh for check in checks):
+        at_speed = [check for check in checks if check.speed_kmh == speed]
+        errors = (f"{check.rms:.1f} ({check.worst:.1f})" for check in at_speed)
+        rows.append((f"{speed:g}", str(at_speed[0].lines), *errors))
+    first, last = start.SETTLED
+    spans = (f"{check.first}-{check.last}" for check in checks[: len(start.FIRST_SPANS)])
+    return Table(
+        f"Error of σ over these spans beside spans {first} to {last} (%): rms over the lines (worst)",
+        ("km/h", "lines", *spans),
         rows,
         text_columns=0,
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
+from ...catalog import load_pantograph
 from ...metrics.low_pass import low_pass
 from ...metrics.trajectory import Trajectory
 from .convergence import WHOLE_LINE
@@ -40,11 +41,11 @@ def check_windows(
     catenary: str, pantograph: str, speed_kmh: float, windows: Sequence[int] = WINDOWS
 ) -> list[WindowCheck]:
     """Windows on a line of LINE_SPANS spans beside the whole line, over COMPARED."""
+    # The same force under every window, also of a pantograph whose mean force is prescribed.
+    panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})
 
     def run(window: int) -> Trajectory:
-        return simulate(
-            catenary, pantograph, speed_kmh, spans=LINE_SPANS, window=window, record_droppers=False
-        )
+        return simulate(catenary, panto, speed_kmh, spans=LINE_SPANS, window=window, record_droppers=False)
 
     whole = run(WHOLE_LINE)
     true, inside = whole.summary(COMPARED), whole.inside(COMPARED)

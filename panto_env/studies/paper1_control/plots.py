@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ...analysis.plots import mark_supports
+from ...analysis.plots import mark_supports, say_what_is_hidden
 from ...metrics.labels import LABELS
 from ...metrics.spans import limits
 from .angles import cost_over_angle
@@ -91,6 +91,8 @@ def forces_along_line(speed: int) -> Figure:
         mark_supports(axis, active)
         axis.legend(loc="upper right", ncols=3, fontsize="small")
     lower.set_xlim(limits(SHOWN_SPANS, active.span_length))
+    for axis in (upper, lower):
+        say_what_is_hidden(axis)
     figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: simulation at {speed} km/h, gain {GAIN}")
     return figure
 

@@ -23,6 +23,7 @@ from .cases import (
     SHOWN_SPEEDS,
     SPANS,
     SPEEDS,
+    USUAL,
     Case,
     control,
     sampled,
@@ -172,7 +173,8 @@ def _speeds(results: Results) -> Table:
 
 
 def _fine(results: Results) -> Table:
-    numerics = {False: "2 ms, 1/3 m", True: f"{1e3 * FINE['time_step']:g} ms, {FINE['spacing']:g} m"}
+    grids = ((False, USUAL), (True, FINE))
+    numerics = {fine: f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m" for fine, grid in grids}
     rows = [
         (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
         for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)

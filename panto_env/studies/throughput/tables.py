@@ -48,7 +48,11 @@ def details(result: Row) -> list[Table | str]:
     flexible = f"the flexible catenary, a line of {LINE_SPANS} spans"
     spans = [(f"{row['spans']}{', the whole line' * row['whole_line']}", row) for row in scaling["spans"]]
     grids = [
-        (f"{row['spacing']:.2f} m, {1e3 * row['time_step']:.1f} ms, {row['precision']}", row)
+        (
+            f"{row['speed_kmh']:g} km/h, {row['accuracy']}: {row['spacing']:.3g} m, "
+            f"{1e3 * row['time_step']:.3g} ms, {row['precision']}",
+            row,
+        )
         for row in scaling["discretisation"]
     ]
     environments = [(f"{row['id']}, {_lanes(row)}", row) for row in result["environments"]]
@@ -58,7 +62,7 @@ def details(result: Row) -> list[Table | str]:
         _limits(result["roofline"]),
         _plants(f"Spans computed of {flexible}", "spans", spans),
         _plants("Modes of the three-span catenary", "modes", modes),
-        _plants(f"Grid, time step and precision of {flexible}", "grid, step, precision", grids),
+        _plants(f"Speed, accuracy and precision of {flexible}", "speed, accuracy, grid, step", grids),
         _environments("Environments", environments),
         _environments("Vector environments by cores", cores)
         if cores

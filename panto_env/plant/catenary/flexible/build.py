@@ -8,15 +8,20 @@ import numpy as np
 
 from ....backend import CACHE_LINE, aligned_zeros
 from ....base.arrays import Array, Index
+from ....base.errors import InputError
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
-from .grid import nodes_per_span, spring_levels, stencil_weights, time_step
+from ...valid_range import LARGEST_SPEED
+from .grid import nodes_per_span, spring_levels, stencil_weights
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
+from .resolution import Resolution
 from .schema import FlexibleCatenaryData
 from .static_shape import StaticShape
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
+MOST_NODES = 1_000_000
+"""Of a wire on its grid: more would take the memory of a machine, and a run of them days."""
 QUIET = 1e-25
 """Load (m per step) that keeps wires at rest away from subnormal numbers, which are slow; it moves a wire by
 less than 1e-15 m."""
@@ -40,26 +45,38 @@ class Links(NamedTuple):
     mass: Array  # (links, 2): that moves with its lower and upper end (kg)
 
 
-def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans, each of a static shape.
+def constants(
+    data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
+) -> FlexibleLine:
+    """Constants of an intact line of ``spans`` spans, each of a static shape, at a stable resolution.
 
-    Raises InputError where the time step is too long for the grid to be stable.
+    Raises InputError where the nodes are too many.
     """
     window = min(numerics.window or spans, spans)
-    step, damping = time_step(data, numerics), data.damping
-    per_span = nodes_per_span(data, numerics.spacing, step)
+    step, damping = resolution.time_step, data.damping
+    per_span = nodes_per_span(data, resolution.spacing)
     dx = data.span_length / per_span
     nodes = window * per_span + 1 + 2 * PAD
+    if nodes > MOST_NODES:
+        raise InputError(
+            f"A grid of {dx:g} m over {window} spans of line '{data.name}' has {nodes:,} nodes a wire; "
+            f"{MOST_NODES:,} at most can be computed, so take a coarser spacing or a smaller window."
+        )
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
     springs, links = _springs(data, masts, step), _droppers(data, shape, window)
+    room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
+    # Masses hang on the two nearest nodes: the cubic weights would make some nodes lighter than bare wire,
+    # or of negative mass, and waves grow there.
+    right = (links.position / dx - (first + 1))[:, None]
+    shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)
     own = np.array([[wire.mass * dx] for wire in wires])
     added = np.zeros((len(wires), nodes))
     for end in (LOWER, UPPER):
-        np.add.at(added, (links.wires[:, end, None], four), weights * links.mass[:, end, None])
+        np.add.at(added, (links.wires[:, end, None], four), shares * links.mass[:, end, None])
     np.add.at(added, (springs.wire, springs.node), springs.mass)
     mass = own + added
     settle = 1.0 + damping.alpha * step / 2
@@ -91,6 +108,8 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
         inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
         mobility=mobility,
         uplift_node=CONTACT * nodes + masts.astype(np.int64),
+        free_uplift=data.free_uplift,
+        largest_move=LARGEST_SPEED * step,
         spring_node=springs.wire * nodes + springs.node,
         spring_mobility=mobility[springs.wire, springs.node],
         spring_levels=springs.levels,
@@ -101,6 +120,7 @@ def constants(data: FlexibleCatenaryData, shape: StaticShape, spans: int, numeri
         link_linear=linear.astype(real),
         link_yield=relative.astype(real),
         link_stiffness=links.stiffness.astype(real),
+        link_room=room.astype(real),
         link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
         link_gap=np.zeros((1, len(first)), dtype=real),
     )
@@ -151,8 +171,9 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
         all_increment=increment.reshape(lanes, wires * nodes),
         blend=aligned_zeros((lanes, nodes), real, place=42 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
-        position=np.zeros((lanes, CONTACTS)),
-        force=np.zeros((lanes, CONTACTS)),
+        contact_node=np.zeros((lanes, CONTACTS), dtype=np.int64),
+        contact_weight=np.zeros((lanes, CONTACTS, 4)),
+        unmoved_height=np.zeros((lanes, CONTACTS)),
         spring_past=np.zeros((lanes, len(line.spring_node))),
         extension=np.zeros((lanes, 2, links), dtype=real),
         change=np.zeros((lanes, links), dtype=real),

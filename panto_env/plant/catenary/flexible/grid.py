@@ -1,50 +1,17 @@
-"""Grid and time step of a flexible catenary, and the weights of its finite differences."""
+"""Finite differences of a flexible catenary: their weights, and with which grid and step they are stable."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ...numerics import Numerics
+from ...interpolation import stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
 
-FINEST, FINE_ENOUGH = 1 / 3, 0.375
-"""Grid (m) unless told otherwise, where it is stable, and the coarsest for which the longer time step is
-taken: docs/validation.md shows what it costs."""
-LONG_STEP, SHORT_STEP = 2.5e-3, 2e-3
-"""Time steps (s) unless told otherwise."""
 
-
-def time_step(data: FlexibleCatenaryData, numerics: Numerics) -> float:
-    """Time step (s) asked for, or the longer usual one where a grid fine enough is stable with it."""
-    if numerics.time_step is not None:
-        return numerics.time_step
-    grid = numerics.spacing or FINE_ENOUGH
-    return LONG_STEP if stable(data, data.span_length / _nodes(data, grid), LONG_STEP) else SHORT_STEP
-
-
-def nodes_per_span(data: FlexibleCatenaryData, spacing: float | None, step: float) -> int:
-    """Nodes per span of the grid asked for (m), or of the finest up to FINEST that is stable.
-
-    Raises InputError where the time step is too long for the grid to be stable.
-    """
-    if spacing is not None:
-        nodes = _nodes(data, spacing)
-        if not stable(data, data.span_length / nodes, step):
-            raise InputError(
-                f"A time step of {1e3 * step:g} ms is unstable on a grid of {data.span_length / nodes:g} m "
-                f"for line '{data.name}'; take a shorter step or a coarser grid."
-            )
-        return nodes
-    for nodes in range(_nodes(data, FINEST), 7, -1):
-        if stable(data, data.span_length / nodes, step):
-            return nodes
-    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
-
-
-def _nodes(data: FlexibleCatenaryData, spacing: float) -> int:
+def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
+    """Nodes in a span of a grid at most this coarse (m)."""
     return int(np.ceil(data.span_length / spacing - 1e-9))
 
 
@@ -57,6 +24,25 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
         if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
             return False
     return True
+
+
+def contact_gain(data: FlexibleCatenaryData, dx: float, step: float) -> float:
+    """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
+
+    With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W': the
+    larger of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1 there, an integral over
+    the waves of the grid. Waves at the grid's own limit make it infinite.
+    """
+    angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
+    near, far = stencil_weights(data.contact_wire, dx, step)
+    squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+    room = 4 - squared * (1 + 2 * data.damping.beta / step)
+    if room.min() <= 0:
+        return float(np.inf)
+    _, weights = stencil(dx * np.linspace(0.0, 0.95, 20), dx)
+    seen = np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2  # (places, waves)
+    largest = float(np.trapezoid(seen / room, angle, axis=1).max()) / np.pi
+    return step**2 / (data.contact_wire.mass * dx) * largest
 
 
 def spring_levels(stiffness: float, damping: float, step: float) -> Array:

@@ -34,6 +34,8 @@ class FlexibleLine(NamedTuple):
     inertia: Array  # (wires, nodes): mass of the bare wire over that of the node; (wires, 0) where all are 1
     mobility: Array  # (wires, nodes): displacement in one step by 1 N at the node (m/N)
     uplift_node: Index  # (supports,): among all nodes, where uplift is recorded
+    free_uplift: float  # room for it up to the steady arm's stop (m)
+    largest_move: float  # in a step, beyond which the computation has diverged (m)
     spring_node: Index  # (springs,): among all nodes, where a spring to the ground holds a wire
     spring_mobility: Array  # (springs,): mobility there (m/N)
     spring_levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
@@ -44,6 +46,7 @@ class FlexibleLine(NamedTuple):
     link_linear: Array  # (links, 2): change of tension by mean extension before and after (N/m)
     link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
     link_stiffness: Array  # (links,): in tension (N/m)
+    link_room: Array  # (links,): by which its ends may approach, as designed, until the wires touch (m)
     link_static: Array  # (rows, links of the window or the line): static tension (N)
     link_gap: Array  # likewise: how far the ends of a slack one must part before it pulls (m)
 
@@ -57,8 +60,9 @@ class FlexibleWire(NamedTuple):
     all_increment: Array  # (lanes, all nodes): the same memory as ``increment``
     blend: Array  # (lanes, nodes): what the stencil acts on, scratch (m)
     first_span: Index  # (lanes,): spans that the window has travelled
-    position: Array  # (lanes, contacts): of the contact points (m)
-    force: Array  # (lanes, contacts): contact force over the last step (N)
+    contact_node: Index  # (lanes, contacts): first of the four nodes about a contact point
+    contact_weight: Array  # (lanes, contacts, 4): of these nodes
+    unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, springs): increment before the step, scratch (m)
     # Extensions are about static, less the gap of a link that is slack there.
     extension: Array  # (lanes, 2 times, links): before the step and at its start (m)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ....base.arrays import Array
 from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
-from ..protocol import StartPoint
+from ...numerics import Numerics, Runs
+from ..protocol import StartPoint, check_speeds
 from .build import at_rest, constants, dropper_positions
 from .defects import DefectiveLine
-from .grid import time_step
+from .grid import contact_gain
+from .resolution import resolution
 from .schema import FlexibleCatenaryData
-from .static_shape import solve
+from .static_shape import hang
 
 
 class FlexibleCatenary:
@@ -29,17 +30,21 @@ class FlexibleCatenary:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line.
 
-        Raises InputError where grid and time step are not stable together, or the line has not what a
-        condition says is defective.
+        Raises InputError where the line can't hang so, grid and time step are not stable together, or the
+        line has not what a condition says is defective.
         """
-        self.time_step = time_step(data, numerics)
-        shape = solve(data)
-        self.line = constants(data, shape, spans, numerics)
+        shape = hang(data)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+        check_speeds(data.name, self.wave_speed, runs.speeds)
+        chosen = resolution(data, numerics, runs)
+        self.time_step = chosen.time_step
+        self.line = constants(data, shape, spans, numerics, chosen)
+        self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
+        self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)
@@ -47,8 +52,8 @@ class FlexibleCatenary:
         self._tension = np.tile(shape.dropper_tension, (1, spans))
         self._defective: dict[LineCondition, DefectiveLine] = {}
         self._lines_differ = False
-        if any(condition.defective for condition in conditions):
-            self._make_defective(data, spans, conditions, lanes)
+        if any(condition.defective for condition in runs.conditions):
+            self._make_defective(data, spans, runs.conditions, lanes)
         self.wire = at_rest(self.line, lanes)
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0]), 0.0, 0.0)
@@ -74,12 +79,11 @@ class FlexibleCatenary:
         line, wire = self.line, self.wire
         if self._lines_differ:
             self._write_defects(lane, drawn)
-        for array in (wire.displacement, wire.increment, wire.change, wire.position):
+        for array in (wire.displacement, wire.increment, wire.change):
             array[lane] = 0.0
         gap = line.link_gap[min(lane, len(line.link_gap) - 1)]
         wire.extension[lane] = 0.0 - gap[: len(line.link_node)]
         wire.first_span[lane] = 0
-        wire.force[lane] = force
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""

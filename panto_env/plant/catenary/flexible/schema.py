@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+import math
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ....base.settings import NonNegative, Positive, Settings
-from ..schema import CatenaryData, Wire
+from ....base.ranges import Between
+from ....base.settings import Settings
+from ..schema import LONGEST_SPAN, CatenaryData, Wire
+from .static_shape import hang
+
+CLOSEST = 0.1
+"""Least distance between two droppers, or between one and a support (m)."""
+Clamp = Annotated[float, Between(0, 10, "kg")]
 
 
 class Droppers(Settings):
     """The droppers of one span: springs that carry tension and go slack in compression."""
 
-    positions: tuple[Positive, ...] = Field(min_length=1, description="distance from support (m)")
-    sag: tuple[float, ...] = Field(
+    positions: tuple[Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")], ...] = Field(
+        min_length=1, max_length=100, description="distance from support (m)"
+    )
+    sag: tuple[Annotated[float, Between(-0.2, 0.5, "m")], ...] = Field(
         description="how far the contact wire hangs below its height at the support (m)"
     )
-    stiffness: Positive | None = Field(None, description="stiffness in tension (N/m)")
-    axial_stiffness: Positive | None = Field(
+    stiffness: Annotated[float, Between(100, 1e8, "N/m")] | None = Field(
+        None, description="stiffness in tension (N/m)"
+    )
+    axial_stiffness: Annotated[float, Between(100, 1e8, "N")] | None = Field(
         None, description="EA in tension (N); the stiffness is EA over the dropper's length"
     )
-    mass: NonNegative = Field(0.0, description="mass per length (kg/m)")
-    messenger_clamp_mass: NonNegative = Field(0.0, description="clamp on the messenger (kg)")
-    contact_clamp_mass: NonNegative = Field(0.0, description="clamp on the contact wire (kg)")
+    mass: Annotated[float, Between(0, 5, "kg/m")] = Field(0.0, description="mass per length (kg/m)")
+    messenger_clamp_mass: Clamp = Field(0.0, description="clamp on the messenger (kg)")
+    contact_clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire (kg)")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -32,8 +43,8 @@ class Droppers(Settings):
                 f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
                 f"but {len(self.sag)} sags"
             )
-        if any(b <= a for a, b in zip(self.positions, self.positions[1:], strict=False)):
-            raise ValueError("positions must increase from the support")
+        if any(b - a < CLOSEST for a, b in zip(self.positions, self.positions[1:], strict=False)):
+            raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")
         if (self.stiffness is None) == (self.axial_stiffness is None):
             raise ValueError("give either stiffness or axial_stiffness, and only one of them")
         return self
@@ -42,15 +53,17 @@ class Droppers(Settings):
 class Support(Settings):
     """What holds the messenger wire at a mast."""
 
-    stiffness: Positive = Field(description="vertical stiffness (N/m)")
-    damping: NonNegative = Field(description="vertical damping (N s/m)")
+    stiffness: Annotated[float, Between(100, 1e8, "N/m")] = Field(description="vertical stiffness (N/m)")
+    damping: Annotated[float, Between(0, 1e6, "N s/m")] = Field(description="vertical damping (N s/m)")
 
 
 class SteadyArm(Settings):
     """What holds the contact wire sideways at a mast; it balances its own weight."""
 
-    mass: NonNegative = Field(description="mass that moves with the contact wire (kg)")
-    stiffness: NonNegative = Field(description="vertical stiffness (N/m)")
+    mass: Annotated[float, Between(0, 50, "kg")] = Field(
+        description="mass that moves with the contact wire (kg)"
+    )
+    stiffness: Annotated[float, Between(0, 1e6, "N/m")] = Field(description="vertical stiffness (N/m)")
     holds_wire: bool = Field(
         False, description="whether it carries the wire's weight, so that the wire is at height 0"
     )
@@ -59,15 +72,17 @@ class SteadyArm(Settings):
 class Rayleigh(Settings):
     """Damping matrix alpha M + beta K."""
 
-    alpha: NonNegative = Field(description="mass-proportional damping (1/s)")
-    beta: NonNegative = Field(description="stiffness-proportional damping (s)")
+    alpha: Annotated[float, Between(0, 50, "1/s")] = Field(description="mass-proportional damping (1/s)")
+    beta: Annotated[float, Between(0, 0.1, "s")] = Field(description="stiffness-proportional damping (s)")
 
 
 class FlexibleCatenaryData(CatenaryData):
     """Contact and messenger wire, droppers, supports and steady arms."""
 
     kind: Literal["flexible"] = "flexible"
-    encumbrance: Positive = Field(description="height of messenger over contact wire at support (m)")
+    encumbrance: Annotated[float, Between(0.05, 10, "m")] = Field(
+        description="height of messenger over contact wire at support (m)"
+    )
     contact_wire: Wire
     messenger_wire: Wire
     droppers: Droppers
@@ -75,9 +90,23 @@ class FlexibleCatenaryData(CatenaryData):
     steady_arm: SteadyArm
     damping: Rayleigh
 
+    def reflections(self, frequency: float) -> tuple[float, float]:
+        """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
+
+        A dropper, stiff and without mass, joins two strings of impedances Z = sqrt(T m): Z_m / (Z_c + Z_m).
+        A spring k with a mass m sends back |K| / sqrt(K^2 + (2 omega Z_c)^2), K = k - omega^2 m.
+        """
+        contact, messenger = self.contact_wire.impedance, self.messenger_wire.impedance
+        omega = 2 * math.pi * frequency
+        arm = self.steady_arm.stiffness - omega**2 * self.steady_arm.mass
+        return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)
+
     @model_validator(mode="after")
-    def _droppers_inside_span(self) -> Self:
+    def _hangs(self) -> Self:
         last = self.droppers.positions[-1]
         if last >= self.span_length:
             raise ValueError(f"dropper at {last} m lies outside the span of {self.span_length} m")
+        if self.span_length - last < CLOSEST:
+            raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")
+        hang(self)
         return self

@@ -9,14 +9,28 @@ with kappa = sqrt(T/EI) and B2(s) = s^2 - s + 1/6, the second Bernoulli polynomi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.errors import InputError
 from ..schema import Wire
-from .schema import FlexibleCatenaryData
+
+if TYPE_CHECKING:
+    from .schema import FlexibleCatenaryData
 
 GRAVITY = 9.81  # m/s^2
+MOST_ROUNDS = 200
+"""In which the droppers' weight, which depends on their length, must settle; real lines take about ten."""
+HEIGHT_RANGE = 0.5
+"""Difference of the contact wire's heights (m) that is still a contact wire's; pantographs follow 0.3 m."""
+STEEPEST = 0.2
+"""Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+SETTLED, USABLE = 1e-12, 1e-9
+"""Changes of the droppers' lengths in a round (m): the one ends the rounds, the other may be rounding."""
+POINTS = 401
+"""Of a span, where heights are looked at."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +78,70 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
 
     The contact wire hangs from the droppers, and from the steady arm where that holds it at height 0
     (any arm balances its own weight). The messenger's support, unloaded, stands ``encumbrance`` above
-    height 0 and yields under the load.
+    height 0 and yields under the load. Raises InputError where no shape is found. What is found may be
+    impossible, as with a dropper that pushes: ``hang`` says so.
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _settle(line)
+
+
+def hang(line: FlexibleCatenaryData) -> StaticShape:
+    """Static shape of a line that can hang so at rest: every dropper pulls, wires are in order and level.
+
+    Raises InputError, naming the dropper or the wire, where it can't.
+    """
+    shape = solve(line)
+    _check_droppers(line, shape)
+    x = np.linspace(0.0, line.span_length, POINTS)
+    contact, messenger = shape.contact.height(x), shape.messenger.height(x)
+    below = contact - messenger
+    if below.max() >= 0:
+        raise InputError(
+            f"At rest the messenger wire of line '{line.name}' would hang {below.max():.2g} m below "
+            f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
+        )
+    if np.ptp(contact) > HEIGHT_RANGE:
+        raise InputError(
+            f"At rest the contact wire of line '{line.name}' would differ by {np.ptp(contact):.2g} m in "
+            f"height along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+        )
+    for name, height in (("contact", contact), ("messenger", messenger)):
+        slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
+        if slope > STEEPEST:
+            raise InputError(
+                f"At rest the {name} wire of line '{line.name}' would have a slope of {slope:.2g}, more than "
+                f"{STEEPEST}, and the model is of nearly level wires; give it more tension, or shorter spans."
+            )
+    return shape
+
+
+def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
+    """Raise InputError for a dropper without tension or without length."""
+    places = [
+        f"dropper {k} of line '{line.name}', at {x:g} m," for k, x in enumerate(line.droppers.positions, 1)
+    ]
+    for place, tension in zip(places, shape.dropper_tension, strict=True):
+        if tension <= 0:
+            raise InputError(
+                f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
+                "position, or the sags."
+            )
+    for place, length in zip(places, shape.dropper_length, strict=True):
+        if length <= 0:
+            raise InputError(
+                f"Unloaded, {place} would be {length:.4g} m long; give a larger encumbrance, more tension "
+                "of the messenger wire, or stiffer droppers."
+            )
+
+
+def _settle(line: FlexibleCatenaryData) -> StaticShape:
+    """The static shape, by rounds in which the lengths of the droppers, and so their weights, settle."""
     droppers = line.droppers
     x = np.array(droppers.positions)
     n = len(x)
     length = np.full(n, line.encumbrance)
     contact, messenger = line.contact_wire, line.messenger_wire
-    while True:
+    for _ in range(MOST_ROUNDS):
         dropper_mass = droppers.mass * length
         clamped = GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
         held, height = x, -np.array(droppers.sag)
@@ -90,8 +160,13 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
         new_length = loaded_length - tension / _stiffness(line, loaded_length)
         change = np.abs(new_length - length).max()
         length = new_length
-        if change < 1e-12:
+        if change < SETTLED:
             break
+    if not change < USABLE:  # nor where it is nan
+        raise InputError(
+            f"The static shape of line '{line.name}' does not settle in {MOST_ROUNDS} rounds: its droppers "
+            "or clamps are too heavy for its wires; give less mass, or more tension."
+        )
     return StaticShape(lifted, hung, tension, length, _stiffness(line, length), dropper_mass)
 
 

@@ -41,6 +41,15 @@ def locate(x, spacing, nodes):
 
 
 @inlined
+def deflection(u, d, first, weights, ago):
+    """Displacement (m) of the contact wire at a place among four nodes, by a share of a step ago."""
+    total = 0.0
+    for k in range(4):
+        total += weights[k] * (u[CONTACT, first + k] - ago * d[CONTACT, first + k])
+    return total
+
+
+@inlined
 def leapfrog(u, d, q, inertia, stencil):
     """One step of one bare wire: d <- keep d + S (u + lag d), u <- u + d, with the stencil S."""
     near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import LANES_ABREAST
 from ....base.arrays import Array
-from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
-from ..protocol import StartPoint, refuse_defects
+from ...line_condition import DrawnLine
+from ...numerics import Numerics, Runs
+from ..protocol import StartPoint, check_speeds, refuse_defects
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
@@ -39,6 +39,8 @@ class PeriodicStiffness:
     """A massless spring, which any grid and any time step can carry."""
 
     massless: bool = True
+    contact_gain: float = 0.0
+    grid: Mapping[str, float] = {}
     wave_speed: float = np.inf  # no wave runs along a spring
     length: float = np.inf  # the line has no end
 
@@ -49,11 +51,13 @@ class PeriodicStiffness:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line. Raises InputError where it is said to have defects."""
-        refuse_defects(data, conditions)
-        self.time_step = numerics.time_step or TIME_STEP
+        refuse_defects(data, runs.conditions)
+        check_speeds(data.name, self.wave_speed, runs.speeds)
+        self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
+        runs.check_wave(self.time_step)
         self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)
         self.wire: Any = PeriodicWire(np.zeros(lanes))
         self.usual_end = spans * data.span_length

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ....base.settings import Positive
+from ....base.ranges import Between
 from ..schema import CatenaryData
 
 
@@ -14,5 +14,5 @@ class PeriodicStiffnessData(CatenaryData):
     """A massless spring whose stiffness varies along the span (paper 3, Eqs 1-5)."""
 
     kind: Literal["periodic_stiffness"] = "periodic_stiffness"
-    mean_stiffness: Positive = Field(description="k_m (N/m)")
-    stiffness_variation: Annotated[float, Field(ge=0, lt=1)] = Field(description="epsilon (-)")
+    mean_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(description="k_m (N/m)")
+    stiffness_variation: Annotated[float, Between(0, 0.99)] = Field(description="epsilon (-)")

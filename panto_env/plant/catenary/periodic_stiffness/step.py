@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from ....backend import implements, inlined
 from ...trigonometry import cosine_of_turns
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from ...valid_range import ENDING
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    ending_by_wire,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .build import PeriodicLine
 
 
@@ -14,9 +24,19 @@ def stiffness(line, x):
     return line.mean * (1.0 + line.variation * cosine_of_turns(line.spans_per_metre * x))
 
 
+@implements(place_contact, PeriodicLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(rise_at_contact, PeriodicLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    return 0.0
+
+
 @implements(look_at_contact, PeriodicLine)
 def _look(line, wire, lane, contact, x):
-    return 0.0, 0.0, 1.0 / stiffness(line, x)
+    return 0.0, 0.0, 0.0, 1.0 / stiffness(line, x)
 
 
 @implements(advance_wire, PeriodicLine)
@@ -32,6 +52,11 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, PeriodicLine)
 def _end(line, wire, lane):
     pass
+
+
+@implements(ending_by_wire, PeriodicLine)
+def _ending(line, wire, lane):
+    return ENDING.NONE  # it has neither supports nor a second wire
 
 
 @implements(record_wire, PeriodicLine)

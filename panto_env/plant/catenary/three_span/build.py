@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ...line_condition import DrawnLine, LineCondition
-from ...numerics import Numerics
+from ...line_condition import DrawnLine
+from ...numerics import Numerics, Runs
 from ...state import CONTACTS
-from ..protocol import StartPoint, refuse_defects
+from ..protocol import StartPoint, check_speeds, refuse_defects
 from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
@@ -24,22 +24,24 @@ class ThreeSpanLine(NamedTuple):
     """Constants of the line; modes are scaled to unit modal mass."""
 
     span: float  # m
+    time_step: float  # s
     shape: Array  # (points, modes): mode shapes about the central span (1/sqrt(kg))
     spacing: float  # of the points (m)
     propagate: Array  # (4, modes): exact free motion over a step: q <- q, v; v <- q, v
     impulse: Array  # (2, modes): change of q and v by 1 N of modal force over a step
+    half_step: Array  # (3, modes): q at mid-step <- q, v at the step's start, 1 N of modal force
     softness: Array  # (modes,): 1 / omega^2 (s^2)
     at_support: Array  # (2, modes): mode shapes at the two supports
     project: Array  # (modes, modes): modal coordinates in the next span from those in this one
+    free_uplift: float  # room for the uplift at a support up to the steady arm's stop (m)
 
 
 class ThreeSpanWire(NamedTuple):
     """What moves, in all lanes."""
 
     modal: Array  # (lanes, 2, modes): coordinates and their rates
-    mid_shape: Array  # (lanes, contacts, modes): mode shapes at mid-step, scratch
-    scratch: Array  # (lanes, 2, modes): mode shapes at the step's end, and of the projection
-    position: Array  # (lanes, contacts): of the contact points (m)
+    contact_shape: Array  # (lanes, contacts, modes): mode shapes where the contact points are
+    scratch: Array  # (lanes, 2, modes)
     central_span: Index  # (lanes,): number of the central span along the line
 
 
@@ -47,6 +49,7 @@ class ThreeSpan:
     """Paper 2's line; the wire has mass, but neither droppers nor an end."""
 
     massless: bool = False
+    grid: Mapping[str, float] = {}
     length: float = np.inf  # the line has no end
 
     def __init__(
@@ -56,17 +59,20 @@ class ThreeSpan:
         lanes: int,
         spans: int,
         numerics: Numerics,
-        conditions: Sequence[LineCondition],
+        runs: Runs,
     ) -> None:
         """Build the line; there is no grid, and modes propagate exactly over any time step.
 
         Raises InputError where it is said to have defects.
         """
-        refuse_defects(data, conditions)
-        self.time_step = numerics.time_step or TIME_STEP
+        refuse_defects(data, runs.conditions)
+        self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
+        check_speeds(data.name, self.wave_speed, runs.speeds)
+        self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
+        runs.check_wave(self.time_step)
         self.line: Any = _constants(data, self.time_step)
         self.wire: Any = _at_rest(lanes, data.modes)
-        self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
+        self.contact_gain = contact_gain(self.line)
         self.usual_end = spans * data.span_length
         self.supports: Array = data.span_length * np.arange(1, spans)
         self.droppers: Array = np.zeros(0)
@@ -77,7 +83,6 @@ class ThreeSpan:
         """Put one lane at rest under a force (N) at the starting point."""
         self.wire.modal[lane, 0] = self.line.at_support[0] * self.line.softness * force
         self.wire.modal[lane, 1] = 0.0
-        self.wire.position[lane] = 0.0
         self.wire.central_span[lane] = 0
 
     def rest_tension(self, lane: int) -> Array:
@@ -123,15 +128,19 @@ def _constants(data: ThreeSpanData, time_step: float) -> ThreeSpanLine:
     moved[everywhere > 2 * span + 1e-9] = 0.0
     project = np.linalg.lstsq(mode_shapes(data, vectors, everywhere), moved, rcond=None)[0]
     free, forced = _propagation(frequency, data.damping_ratio, time_step)
+    free_half, forced_half = _propagation(frequency, data.damping_ratio, time_step / 2)
     return ThreeSpanLine(
         span=span,
+        time_step=time_step,
         shape=mode_shapes(data, vectors, positions),
         spacing=SHAPE_SPACING,
         propagate=free,
         impulse=forced,
+        half_step=np.array([free_half[0], free_half[1], forced_half[0]]),
         softness=1 / frequency**2,
         at_support=mode_shapes(data, vectors, np.array([span, 2 * span])),
         project=project,
+        free_uplift=data.free_uplift,
     )
 
 
@@ -147,11 +156,22 @@ def _propagation(frequency: Array, ratio: float, time_step: float) -> tuple[Arra
     return free, np.array([(1 - free[0]) / frequency**2, free[1]])
 
 
+def contact_gain(line: ThreeSpanLine) -> float:
+    """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
+
+    It grows first in a motion that changes its sign in each step, z = -1: there a mode's height at mid-step
+    follows from a force as half_step (z - A)^-1 impulse, with A the mode's exact step.
+    """
+    steps = np.moveaxis(line.propagate.reshape(2, 2, -1), -1, 0)
+    moved = np.linalg.solve(-np.eye(2) - steps, line.impulse.T[:, :, None])[:, :, 0]
+    alternating = np.sum(line.half_step[:2].T * moved, axis=1) + line.half_step[2]
+    return max(0.0, float(np.max(line.shape**2 @ -alternating)))
+
+
 def _at_rest(lanes: int, size: int) -> ThreeSpanWire:
     return ThreeSpanWire(
         modal=np.zeros((lanes, 2, size)),
-        mid_shape=np.zeros((lanes, CONTACTS, size)),
+        contact_shape=np.zeros((lanes, CONTACTS, size)),
         scratch=np.zeros((lanes, 2, size)),
-        position=np.zeros((lanes, CONTACTS)),
         central_span=np.zeros(lanes, dtype=np.int64),
     )

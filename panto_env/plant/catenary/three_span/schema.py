@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ....base.settings import Positive
+from ....base.ranges import Between
 from ..schema import CatenaryData, Wire
 
 
@@ -15,8 +15,10 @@ class ThreeSpanData(CatenaryData):
 
     kind: Literal["three_span"] = "three_span"
     wire: Wire
-    suspension_stiffness: Positive = Field(description="spring K_S at each support (N/m)")
-    modes: int = Field(ge=3, le=400, description="number of vibration modes kept")
-    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
+    suspension_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(
+        description="spring K_S at each support (N/m)"
+    )
+    modes: Annotated[int, Between(3, 400)] = Field(description="number of vibration modes kept")
+    damping_ratio: Annotated[float, Between(0, 0.99)] = Field(
         description="share of critical damping of each mode (-)"
     )

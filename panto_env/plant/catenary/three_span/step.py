@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 from ....backend import implements, inlined
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, record_wire
+from ...valid_range import ENDING
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    ending_by_wire,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    rise_at_contact,
+)
 from .build import MARGIN, ThreeSpanLine
 
 
@@ -26,42 +36,89 @@ def _advance(line, wire, lane):
         v[m] = line.propagate[2, m] * coordinate + line.propagate[3, m] * rate
 
 
+@inlined
+def deflection(shape, q):
+    """Height (m) of the wire at a place, from its mode shapes there and the modal coordinates."""
+    height = 0.0
+    for m in range(q.size):
+        height += shape[m] * q[m]
+    return height
+
+
+@inlined
+def project(line, wire, lane):
+    """Take over the wire's shape and rates into the three spans about the next one."""
+    modal, before = wire.modal[lane], wire.scratch[lane]
+    size = modal.shape[1]
+    for k in range(2):
+        for m in range(size):
+            before[k, m] = modal[k, m]
+        for m in range(size):
+            total = 0.0
+            for j in range(size):
+                total += line.project[m, j] * before[k, j]
+            modal[k, m] = total
+    wire.central_span[lane] += 1
+
+
+@implements(place_contact, ThreeSpanLine)
+def _place(line, wire, lane, contact, x):
+    if contact == 0 and x >= (wire.central_span[lane] + 1) * line.span:
+        project(line, wire, lane)
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
+    read_shape(line, wire, lane, x, shape)
+    middle = 0.0
+    for m in range(shape.size):
+        middle += shape[m] * (line.half_step[0, m] * modal[0, m] + line.half_step[1, m] * modal[1, m])
+    return deflection(shape, modal[0]), middle
+
+
+@implements(rise_at_contact, ThreeSpanLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    q, v, shape = wire.modal[lane, 0], wire.modal[lane, 1], wire.scratch[lane, 0]
+    read_shape(line, wire, lane, x1, shape)
+    rise = deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v)
+    read_shape(line, wire, lane, x0, shape)
+    return rise - (deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v))
+
+
 @implements(look_at_contact, ThreeSpanLine)
 def _look(line, wire, lane, contact, x):
-    q, middle, end = wire.modal[lane, 0], wire.mid_shape[lane, contact], wire.scratch[lane, 0]
-    # The force acts all along the step: it is as good as one at mid-step, to the second order.
-    read_shape(line, wire, lane, 0.5 * (wire.position[lane, contact] + x), middle)
-    read_shape(line, wire, lane, x, end)
-    height, compliance = 0.0, 0.0
-    for m in range(q.size):
-        height += end[m] * q[m]
-        compliance += end[m] * line.impulse[0, m] * middle[m]
-    return height, compliance, 0.0
+    shape, at_end, at_middle = wire.contact_shape[lane, contact], 0.0, 0.0
+    for m in range(shape.size):
+        at_end += shape[m] * line.impulse[0, m] * shape[m]
+        at_middle += shape[m] * line.half_step[2, m] * shape[m]
+    return deflection(shape, wire.modal[lane, 0]), at_end, at_middle, 0.0
 
 
 @implements(apply_force, ThreeSpanLine)
 def _apply(line, wire, lane, contact, x, force):
-    modal, shape = wire.modal[lane], wire.mid_shape[lane, contact]
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
     for m in range(shape.size):
         modal[0, m] += line.impulse[0, m] * shape[m] * force
         modal[1, m] += line.impulse[1, m] * shape[m] * force
-    wire.position[lane, contact] = x
 
 
 @implements(end_step, ThreeSpanLine)
 def _end(line, wire, lane):
-    if wire.position[lane, 0] >= (wire.central_span[lane] + 1) * line.span:
-        modal, before = wire.modal[lane], wire.scratch[lane]
-        size = modal.shape[1]
-        for k in range(2):
-            for m in range(size):
-                before[k, m] = modal[k, m]
-            for m in range(size):
-                total = 0.0
-                for j in range(size):
-                    total += line.project[m, j] * before[k, j]
-                modal[k, m] = total
-        wire.central_span[lane] += 1
+    pass
+
+
+@inlined
+def support_uplift(line, wire, lane, side):
+    """Uplift (m) at the support before the central span (side 0) or behind it (1)."""
+    total = 0.0
+    for m in range(line.at_support.shape[1]):
+        total += line.at_support[side, m] * wire.modal[lane, 0, m]
+    return total
+
+
+@implements(ending_by_wire, ThreeSpanLine)
+def _ending(line, wire, lane):
+    for side in range(2):
+        if support_uplift(line, wire, lane, side) > line.free_uplift:
+            return ENDING.STOP
+    return ENDING.NONE
 
 
 @implements(record_wire, ThreeSpanLine)
@@ -69,7 +126,4 @@ def _record(line, wire, lane, uplift, tension):
     for side in range(2):
         support = wire.central_span[lane] - 1 + side
         if 0 <= support < uplift.size:
-            total = 0.0
-            for m in range(line.at_support.shape[1]):
-                total += line.at_support[side, m] * wire.modal[lane, 0, m]
-            uplift[support] = total
+            uplift[support] = support_uplift(line, wire, lane, side)

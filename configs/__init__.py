@@ -1,0 +1,32 @@
+"""Trainings and benchmarks that come with the project; commands take them by name or any file by its path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.names import suggest
+
+FOLDER = Path(__file__).parent
+KINDS = {"training": "algorithm", "benchmark": "lines"}
+"""A key that every file of a kind has."""
+
+
+def names(kind: Literal["training", "benchmark"]) -> list[str]:
+    """Names of the files of a kind that come with the project."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml") if KINDS[kind] in read_toml(path))
+
+
+def find(source: str | Path, kind: Literal["training", "benchmark"]) -> Path:
+    """The file of a path, or of a name here: "ppo" is ppo.toml. Raises InputError where there is none."""
+    path = Path(source)
+    if path.is_file():
+        return path
+    if str(source) in names(kind):
+        return FOLDER / f"{source}.toml"
+    raise InputError(
+        f"The {kind} file {source} does not exist; give a TOML file's path, or a name: "
+        f"{suggest(path.stem, names(kind))}."
+    )

@@ -1,0 +1,15 @@
+"""A run's requirements, as commands print them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..metrics.criterion import Criterion, criteria_table, remarks
+from ..terminal import console, print_table
+
+
+def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
+    """Print the table of what has limits, then how they are meant and what has none."""
+    print_table(criteria_table(criteria, title))
+    for line in remarks(criteria):
+        console.print(line, soft_wrap=True)

@@ -1,0 +1,130 @@
+"""What is wrong with a table of settings, in words: the key, what it must be, what was given."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from .errors import InputError
+from .names import nearest
+
+WORDS = {
+    "float_parsing": "must be a number",
+    "float_type": "must be a number",
+    "int_parsing": "must be a whole number",
+    "int_type": "must be a whole number",
+    "bool_parsing": "must be true or false",
+    "bool_type": "must be true or false",
+    "too_short": "must not be empty",
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "string_type": "must be a text",
+}
+"""By pydantic's names of what is wrong; for others its own words are taken."""
+
+
+class Complaint(NamedTuple):
+    """What is wrong at one key."""
+
+    key: str  # dotted, "" for the table as a whole
+    words: str  # "must be ...", or a clause of its own
+    given: str  # what was given, "" where that says nothing
+    clause: bool  # whether the words stand alone
+
+
+def explain(error: ValidationError, kind: type[BaseModel]) -> str:
+    """One clause per key of a table of ``kind`` that is wrong."""
+    clauses = []
+    for key, words, given, clause in complaints(error, kind):
+        place = "" if not key else f"key '{key}': " if clause else f"key '{key}' "
+        clauses.append(f"{place}{words}{f' (given: {given})' if given else ''}")
+    return "; ".join(clauses)
+
+
+def sentence(error: ValidationError, kind: type[BaseModel]) -> str:
+    """What is wrong with keyword arguments, in one sentence without its full stop."""
+    clauses = []
+    for key, words, given, clause in complaints(error, kind):
+        clauses.append(words if clause else f"{key} {words}{f', not {given}' if given else ''}")
+    return "; ".join(clauses)
+
+
+def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]:
+    """One complaint per key; alternatives of a union, which complain one by one, are joined."""
+    found: dict[str, Complaint] = {}
+    for problem in error.errors():
+        if problem["type"] == "too_short" and problem["input"] and len(error.errors()) > 1:
+            continue  # entries that are wrong are not counted; what is wrong with them is told
+        one = _complaint(problem, kind)
+        before = found.get(one.key)
+        if before is not None:
+            one = before._replace(words=f"{before.words} or {one.words.removeprefix('must be ')}")
+        found[one.key] = one
+    return list(found.values())
+
+
+def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
+    place, fields = _place(problem, kind)
+    key, given = ".".join(map(str, place)), reprlib.repr(problem["input"])
+    match problem["type"]:
+        case "missing":
+            field = fields.get(str(place[-1]))  # none where a list is too short
+            words = f": {field.description or _table_of(field)}" if field is not None else ""
+            return Complaint(key, f"is missing{words}", "", False)
+        case "extra_forbidden":
+            known = [name for name in fields if name != "sources"]
+            near = nearest(str(place[-1]), known)
+            words = f"did you mean '{near}'" if near else f"known are {', '.join(known)}"
+            return Complaint(key, f"is not known: {words}", "", False)
+        case "value_error":
+            words = problem["msg"].removeprefix("Value error, ").removesuffix(".")
+            cause = problem.get("ctx", {}).get("error")
+            whole = isinstance(cause, InputError) or not words.startswith("must ")
+            return Complaint(key, words, "" if whole else given, whole)
+        case "tuple_type":
+            return Complaint(key, f"must be a list, as [{given}]", "", False)
+        case "too_long":
+            return Complaint(key, f"must hold at most {problem['ctx']['max_length']} values", "", False)
+        case other:
+            words = WORDS.get(other, problem["msg"].replace("Input should be", "must be"))
+            return Complaint(key, words, given, False)
+
+
+def _place(problem: ErrorDetails, kind: type[BaseModel]) -> tuple[list[int | str], dict[str, FieldInfo]]:
+    """The keys and places that lead to a problem, and the fields of the table that holds it.
+
+    Between them pydantic tells which alternative of a union it tried, which nobody asked for.
+    """
+    place: list[int | str] = []
+    fields: dict[str, FieldInfo] = kind.model_fields
+    inner: type[BaseModel] | None = kind
+    last = len(problem["loc"]) - 1
+    for number, part in enumerate(problem["loc"]):
+        if isinstance(part, int):
+            place.append(part)
+            continue
+        if inner is not None:
+            fields, inner = inner.model_fields, None
+        if part in fields:
+            place.append(part)
+            inner = next(_tables_in(fields[part].annotation), None)
+        elif number == last and problem["type"] == "extra_forbidden":
+            place.append(part)
+    return place, fields
+
+
+def _tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables_in(part)
+
+
+def _table_of(field: FieldInfo) -> str:
+    table = next(_tables_in(field.annotation), None)
+    return "a value" if table is None else f"a table of {', '.join(table.model_fields)}"

@@ -1,0 +1,48 @@
+"""Names and values in one line, as ``gain=0.5,places=[(4, 5)]``: of policies and of presets."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import Any
+
+from .errors import InputError
+
+OPENING, CLOSING, QUOTES = "([{", ")]}", "'\""
+
+
+def parse_inline(text: str) -> dict[str, Any]:
+    """Values by name of "name=value,name=value"; a value is a Python literal, or else a word.
+
+    Commas within brackets and quotes belong to a value. Raises InputError where a part has no "=", or a
+    name stands twice.
+    """
+    values: dict[str, Any] = {}
+    for part in filter(None, map(str.strip, _parts(text))):
+        key, equals, value = part.partition("=")
+        name = key.strip()
+        if not (equals and name):
+            raise InputError(f"'{part}' must read name=value.")
+        if name in values:
+            raise InputError(f"'{name}' is given twice.")
+        try:
+            values[name] = ast.literal_eval(value.strip())
+        except (ValueError, SyntaxError):
+            values[name] = value.strip()
+    return values
+
+
+def _parts(text: str) -> Iterator[str]:
+    """Pieces between the commas that stand in no bracket and no quotes."""
+    depth, quote, begin = 0, "", 0
+    for place, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in QUOTES:
+            quote = letter
+        elif letter == "," and depth <= 0:
+            yield text[begin:place]
+            begin = place + 1
+        else:
+            depth += (letter in OPENING) - (letter in CLOSING)
+    yield text[begin:]

@@ -1,0 +1,23 @@
+"""Misspelt names: the nearest known one, as a clause for an error's message."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+
+def suggest(name: str, known: Sequence[str]) -> str:
+    """A clause with the nearest known name, if any is near, and all of them."""
+    return f"{hint(name, known)}known are {', '.join(known)}"
+
+
+def hint(name: str, known: Sequence[str]) -> str:
+    """A question that names the nearest known name, or nothing if none is near."""
+    near = nearest(name, known)
+    return "" if near is None else f"did you mean '{near}'? "
+
+
+def nearest(name: str, known: Sequence[str]) -> str | None:
+    """The known name that is nearest to a misspelt one, if any is near."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return near[0] if near else None

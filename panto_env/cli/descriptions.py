@@ -1,0 +1,127 @@
+"""What can be named on the command line, described: lines, pantographs, policies, presets of settings."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from ..base.errors import InputError
+from ..base.files import read_toml
+from ..base.names import suggest
+from ..catalog import available, load_catenary, load_pantograph
+from ..catalog.loader import SCHEMAS
+from ..plant.actuators import ACTUATOR_PRESETS
+from ..plant.catenary.schema import CatenaryData
+from ..plant.line_condition import LINE_CONDITIONS
+from ..plant.pantograph.schema import PantographData
+from ..plant.sensors import SENSOR_PRESETS
+from ..policies import maker_of, parameters_of, policy_names
+
+Entry = CatenaryData | PantographData
+LOADERS: Mapping[str, Callable[[str], Entry]] = {"catenary": load_catenary, "pantograph": load_pantograph}
+PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
+    "line_condition": LINE_CONDITIONS,
+    "actuator": ACTUATOR_PRESETS,
+    "sensors": SENSOR_PRESETS,
+}
+"""By the settings that they are of."""
+POLICY = "policy"
+NOT_VALUES = ("sources", "name", "kind", "description")
+
+
+class Description(NamedTuple):
+    """One thing that can be named."""
+
+    family: str
+    name: str
+    text: str  # paragraphs
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    data: Any  # the same for machines
+
+
+def everything() -> dict[str, list[Description]]:
+    """All that can be named, by family."""
+    return {
+        **{
+            family: [_entry(family, load(name)) for name in available(family)]
+            for family, load in LOADERS.items()
+        },
+        POLICY: [_policy(name) for name in policy_names()],
+        **{family: [_preset(family, name) for name in presets] for family, presets in PRESETS.items()},
+    }
+
+
+def described(name: str) -> list[Description]:
+    """All that is called so, or the entry of a TOML file. Raises InputError where there is none."""
+    if name.endswith(".toml"):
+        family = _family_of(name)
+        return [_entry(family, LOADERS[family](name))]
+    found = [_entry(family, load(name)) for family, load in LOADERS.items() if name in available(family)]
+    found += [_policy(name)] if name in policy_names() else []
+    found += [_preset(family, name) for family, presets in PRESETS.items() if name in presets]
+    if not found:
+        known = [*(each for family in LOADERS for each in available(family)), *policy_names()]
+        known += [each for presets in PRESETS.values() for each in presets]
+        raise InputError(
+            f"Unknown name '{name}': {suggest(name, list(dict.fromkeys(known)))}; or a TOML file."
+        )
+    return found
+
+
+def _family_of(path: str) -> str:
+    """The family that a TOML file's kind belongs to; a line's where it has none or an unknown one."""
+    kind = read_toml(path).get("kind")
+    return next((family for family, schemas in SCHEMAS.items() if kind in schemas), next(iter(LOADERS)))
+
+
+def _entry(family: str, entry: Entry) -> Description:
+    rows = [
+        (key, str(value), meaning, entry.sources.get(key, "")) for key, value, meaning in _leaves(entry, "")
+    ]
+    headings = ("key", "value", "meaning", "source")
+    return Description(family, entry.name, entry.description, headings, rows, entry.model_dump())
+
+
+def _leaves(entry: BaseModel, prefix: str) -> Iterator[tuple[str, Any, str]]:
+    """Keys, values and meanings of all values of an entry, its tables opened."""
+    for key, field in type(entry).model_fields.items():
+        value = getattr(entry, key)
+        if isinstance(value, BaseModel):
+            yield from _leaves(value, f"{prefix}{key}.")
+        elif value is not None and key not in NOT_VALUES:
+            yield prefix + key, value, field.description or ""
+
+
+def _policy(name: str) -> Description:
+    maker = maker_of(name)
+    texts = [inspect.getdoc(maker) or ""]
+    made = maker.__init__ if inspect.isclass(maker) and maker.__init__ is not object.__init__ else None
+    texts += [inspect.getdoc(made) or ""] if made is not None else []
+    text = "\n\n".join(filter(None, texts))
+    defaults = {
+        key: None if each.default is each.empty else each.default
+        for key, each in parameters_of(maker).items()
+    }
+    rows = [(key, repr(value)) for key, value in defaults.items()]
+    data = {"name": name, "description": text, "parameters": defaults}
+    return Description(POLICY, name, text, ("parameter", "default"), rows, data)
+
+
+def _preset(family: str, name: str) -> Description:
+    preset = PRESETS[family][name]
+    usual = type(preset)()
+    rows = [
+        (key, str(getattr(preset, key)), str(getattr(usual, key)), field.description or "")
+        for key, field in type(preset).model_fields.items()
+    ]
+    others = ", ".join(PRESETS[family])
+    option = f"--{family.replace('_', '-')}"
+    first = next(key for key, value in usual if isinstance(value, float))
+    text = f"A preset of {option}; presets are {others}. With values of your own: {option} {name}:{first}=..."
+    return Description(
+        family, name, text, ("key", "value", "usually", "meaning"), rows, preset.model_dump(mode="json")
+    )

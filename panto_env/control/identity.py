@@ -1,0 +1,38 @@
+"""What identifies a run: every setting as plain data, with the grid and the time step that it came to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel
+
+from ..base.files import finite
+from ..base.version import __version__
+from ..plant.plant import Plant
+from .settings import RunSettings
+
+NOT_OF_A_RUN = ("observation", "reward")
+"""Settings that only a policy sees."""
+
+
+def plain(settings: RunSettings) -> dict[str, Any]:
+    """Settings by name as plain data; a line and a pantograph by their names alone."""
+    values = {
+        name: getattr(settings, name) for name in type(settings).model_fields if name not in NOT_OF_A_RUN
+    }
+    names = {name: values[name].name for name in ("catenary", "pantograph")}
+    table: dict[str, Any] = finite({name: _data(value) for name, value in (values | names).items()})
+    return table
+
+
+def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, Any]:
+    """The same of a run along ``distance`` (m), with its time step (s), spans and grid, and the version."""
+    came_to = {"time_step": plant.time_step, "spans": plant.spans, "distance": distance}
+    grid = plant.model.grid or dict.fromkeys(("spacing", "window", "precision"))
+    return {"version": __version__, **plain(settings), **came_to, **grid}
+
+
+def _data(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json")
+    return [_data(item) for item in value] if isinstance(value, tuple) else value

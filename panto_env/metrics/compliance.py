@@ -1,0 +1,101 @@
+"""What a run is held against, EN 50367 and EN 50119, and what is told beside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..base.arrays import Array
+from ..plant.catenary.schema import CatenaryData
+from . import en50367
+from .criterion import Criterion
+from .figures import Figures
+
+SHARE_OF_WAVE_SPEED = 0.7
+"""Largest speed of a train over that of waves in the contact wire."""
+WAVE_SOURCE = "EN 50119, seen"
+WAVE_NOTE = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
+
+
+@dataclass(frozen=True)
+class LineFacts:
+    """What of a line a run is judged by."""
+
+    system: str = "AC"  # of power supply
+    wave_speed: float = math.inf  # of the contact wire (m/s), infinite where no wave runs along it
+    free_uplift: float = math.nan  # room for the uplift at a support (m)
+    free_uplift_source: str = ""
+    dropper_reflection: float = math.nan  # of a wave at a dropper (-)
+    support_reflection: float = math.nan  # of a wave at a support, as often as the train passes one (-)
+
+    @classmethod
+    def of(cls, line: CatenaryData, wave_speed: float, speed: float) -> LineFacts:
+        """Of a line and a train on it; both speeds in m/s."""
+        dropper, support = line.reflections(speed / line.span_length)
+        return cls(
+            system=line.system,
+            wave_speed=wave_speed,
+            free_uplift=line.free_uplift,
+            free_uplift_source=line.sources.get("free_uplift", "default (recalled)"),
+            dropper_reflection=dropper,
+            support_reflection=support,
+        )
+
+
+def compliance(
+    figures: Figures,
+    arcing: float,
+    line: LineFacts,
+    speed: float,
+    span_length: float,
+    tension: Array,
+    tension_near: Array,
+) -> list[Criterion]:
+    """All criteria of a run, then what is told beside them.
+
+    arcing: NQ (%); speed: of the train (m/s); span_length: m; tension, tension_near: all samples of all
+    droppers, and those of the span that the train is in (N), empty where they were not recorded.
+    """
+    return [
+        *en50367.criteria(figures, arcing, speed, line.system),
+        *_uplift(figures, line),
+        *_waves(line, speed, speed / span_length),
+        *_droppers(tension, tension_near),
+    ]
+
+
+def _uplift(figures: Figures, line: LineFacts) -> list[Criterion]:
+    if math.isnan(figures.max_uplift) or math.isnan(line.free_uplift):
+        return []
+    twice, room = 2e3 * figures.max_uplift, 1e3 * line.free_uplift
+    note = f"of the supports; limit: the room up to the steady arm's stop, {line.free_uplift_source}"
+    return [Criterion("uplift", "twice the uplift", "mm", twice, None, room, "EN 50119, recalled", note)]
+
+
+def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
+    if math.isinf(line.wave_speed):
+        return []
+    ratio = speed / line.wave_speed
+    told = [
+        Criterion(
+            "speed", "v/c, train over wave", "", ratio, None, SHARE_OF_WAVE_SPEED, WAVE_SOURCE, WAVE_NOTE
+        ),
+        Criterion("doppler", "Doppler factor (c − v)/(c + v)", "", (1 - ratio) / (1 + ratio)),
+    ]
+    if not math.isnan(line.dropper_reflection):
+        support = f"wave reflection at a support, at {frequency:.2g} Hz (one per span)"
+        told += [
+            Criterion("dropper reflection", "wave reflection at a dropper", "", line.dropper_reflection),
+            Criterion("support reflection", support, "", line.support_reflection),
+        ]
+    return told
+
+
+def _droppers(tension: Array, tension_near: Array) -> list[Criterion]:
+    if not tension_near.size:
+        return []
+    slack = float(100 * (tension_near <= 0).mean())
+    return [
+        Criterion("dropper force", "largest dropper force", "N", float(tension.max())),
+        Criterion("slack", "droppers of the train's span slack", "% of time", slack),
+    ]

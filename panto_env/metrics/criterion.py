@@ -1,0 +1,91 @@
+"""One requirement on a run: a figure beside its limits, with where the limits come from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..base.table import Table
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A figure in ``unit``; limits are None where there is none, as of what is told beside the others."""
+
+    key: str
+    name: str
+    unit: str
+    value: float
+    lowest: float | None = None
+    highest: float | None = None
+    source: str = ""  # of the limits: the standard, and whether it was seen or is recalled
+    note: str = ""  # how value and limits are meant
+
+    @property
+    def margin(self) -> float:
+        """To the nearer limit, negative beyond it; nan without one."""
+        margins = []
+        if self.highest is not None:
+            margins.append(self.highest - self.value)
+        if self.lowest is not None:
+            margins.append(self.value - self.lowest)
+        return min(margins, default=math.nan)
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether the limits are kept; None without one."""
+        return None if math.isnan(self.margin) else self.margin >= 0
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return vars(self) | {"margin": self.margin, "kept": self.kept}
+
+
+def worst(runs: Sequence[Sequence[Criterion]]) -> list[Criterion]:
+    """Of several runs under the same criteria, each where its margin is least."""
+    return [min(same, key=lambda criterion: criterion.margin) for same in zip(*runs, strict=True)]
+
+
+def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
+    """For people, of the criteria that have limits: value, limit, margin, verdict and source."""
+    verdicts = {True: "kept", False: "[bold red]broken[/]"}
+    rows = [
+        (
+            criterion.heading,
+            _digits(criterion.value),
+            _limits(criterion),
+            _digits(criterion.margin),
+            verdicts[criterion.kept],
+            criterion.source,
+        )
+        for criterion in criteria
+        if criterion.kept is not None
+    ]
+    return Table(title, ("criterion", "value", "limit", "margin", "verdict", "source"), rows)
+
+
+def remarks(criteria: Sequence[Criterion]) -> list[str]:
+    """Lines for people: how criteria are meant, and what has no limit."""
+    notes = [f"{criterion.name}: {criterion.note}." for criterion in criteria if criterion.note]
+    told = (criterion for criterion in criteria if criterion.kept is None)
+    return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in told)]
+
+
+def _limits(criterion: Criterion) -> str:
+    if criterion.lowest is None:
+        return "" if criterion.highest is None else f"at most {_digits(criterion.highest)}"
+    if criterion.highest is None:
+        return f"at least {_digits(criterion.lowest)}"
+    return f"{_digits(criterion.lowest)} to {_digits(criterion.highest)}"
+
+
+def _digits(value: float) -> str:
+    """One figure after the comma of what is large, three of what is small."""
+    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.3f}"

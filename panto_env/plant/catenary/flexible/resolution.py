@@ -1,0 +1,132 @@
+"""Grid and time step of a flexible catenary: what is fine enough for the runs that it is built for.
+
+A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what happens at
+f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple
+of this period, which the filter of 20 Hz hides only while it is short. And droppers that go slack and taut
+again want a time step well below the milliseconds in which they do so: slow trains excite this most.
+docs/validation.md shows the figures at every speed, on every line, beside converged ones.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from ....base.errors import AccuracyWarning, InputError
+from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
+from .grid import nodes_per_span, stable
+from .schema import FlexibleCatenaryData
+
+GRIDS = ((0.735, 0.25), (0.87, 0.15), (1.0, 0.125))
+"""Up to which share of the wave speed a grid (m) is fine enough."""
+NODES_HZ = 60.0
+"""How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
+SLOWEST_HZ = 22.0
+"""Below which (Hz) a ripple is in the filtered force."""
+FINEST_GRID = 0.1
+"""Grid (m) that the slowest trains get."""
+SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1.25e-3))
+"""Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
+HARD_CONTACT_GRID = 0.15
+"""Grid (m) that a hard contact wants."""
+DEEP = 0.5e-3
+"""Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
+FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
+"""Grid (m) for ``accuracy="fast"``, where it is stable, and the coarsest for which the longer of the two time
+steps is taken."""
+FAST_STEPS = (2.5e-3, 2e-3)
+FAST_SAMPLES_PER_WAVE = 3
+
+
+class Resolution(NamedTuple):
+    """How finely a line is computed."""
+
+    spacing: float  # of the grid (m)
+    time_step: float  # s
+
+
+def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Resolution:
+    """Grid and time step: those asked for, or those that the accuracy asks for, and stable together.
+
+    Warns where what is asked for is coarser than figures within 1 % want. Raises InputError where grid and
+    step are not stable together, or waves of the wire are too short for the step.
+    """
+    fast = numerics.accuracy == "fast"
+    wanted = _fast(data, runs) if fast else fine_enough(data, runs)
+    found = _stable(data, numerics, runs, wanted)
+    runs.check_wave(found.time_step)
+    if not fast:
+        _warn_if_coarse(data, found, wanted, runs)
+    passed = runs.speeds[0] / found.spacing
+    if passed < SLOWEST_HZ:
+        warnings.warn(
+            f"At {3.6 * runs.speeds[0]:.3g} km/h a train passes the nodes of a grid of {found.spacing:.3g} m "
+            f"{passed:.2g} times a second: a ripple of about 1 N at this frequency, which no line has, is in "
+            "the contact force.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
+    """The coarsest grid and the longest step, stable or not, that give figures within 1 % of converged."""
+    slow, quick = runs.speeds
+    wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+    spacing = next((grid for share, grid in GRIDS if quick <= share * wave_speed), GRIDS[-1][1])
+    spacing = min(spacing, max(slow / NODES_HZ, FINEST_GRID))
+    deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
+    if deep:  # two nodes in a wave that runs ahead of the train at the rate at which it passes the waves
+        ahead = min(deep) * (wave_speed - quick) / quick
+        spacing = min(spacing, max(ahead / 2, GRIDS[-1][1]))
+    if runs.hard_contact:
+        spacing = min(spacing, HARD_CONTACT_GRID)
+    grid, step = next(fine for speed, *fine in SLOW if slow < speed)
+    return Resolution(min(spacing, grid), min(step, runs.wave_step(SAMPLES_PER_WAVE)))
+
+
+def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
+    longer, shorter = FAST_STEPS
+    grid = data.span_length / nodes_per_span(data, FAST_FINE_ENOUGH)
+    step = longer if stable(data, grid, longer) else shorter
+    return Resolution(FAST_GRID, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
+
+
+def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: Resolution) -> Resolution:
+    """Nodes evenly over a span, and a step of which the control interval is a whole number."""
+    span, given = data.span_length, numerics.spacing
+    finest = nodes_per_span(data, given or wanted.spacing)
+    if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
+        step = runs.whole_part(wanted.time_step)
+        while not stable(data, span / finest, step):
+            step = runs.whole_part(0.95 * step)
+        return Resolution(span / finest, step)
+    step = numerics.time_step or runs.whole_part(wanted.time_step)
+    if given is not None and not stable(data, span / finest, step):
+        raise InputError(
+            f"A time step of {1e3 * step:g} ms is unstable on a grid of {span / finest:g} m "
+            f"for line '{data.name}'; take a shorter step or a coarser grid."
+        )
+    for count in range(finest, 7, -1):
+        if stable(data, span / count, step):
+            return Resolution(span / count, step)
+    raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
+
+
+def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, wanted: Resolution, runs: Runs) -> None:
+    """Say which error to expect: of third order in the grid and of second order in the step, from 1 % on."""
+    grid, step = found.spacing / wanted.spacing, found.time_step / wanted.time_step
+    if max(grid, step) < 1.01:
+        return
+    error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
+    slow, quick = (3.6 * speed for speed in runs.speeds)
+    speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
+    warnings.warn(
+        f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
+        f"line '{data.name}' needs at {speeds} ({wanted.spacing:.3g} m, {1e3 * wanted.time_step:.3g} ms): "
+        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
+        AccuracyWarning,
+        stacklevel=2,
+    )

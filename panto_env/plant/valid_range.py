@@ -1,0 +1,46 @@
+"""Where a run ends early: the bounds within which the plant is valid, and what is said beyond them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from ..backend import constants
+
+HEAD_RANGE = 0.3
+"""Height of the head (m), either way, beyond which a run ends: outside the wire's clearance."""
+LOSS_TIME = 0.5
+"""Time without contact (s) after which a run ends."""
+FREE_UPLIFT = 0.24
+"""Room for the contact wire's uplift at a support (m), up to the steady arm's stop, where a line does not
+say: twice the 120 mm for which lines of high speed are designed (recalled)."""
+
+LARGEST_SPEED = 20.0
+"""Speed of a wire (m/s) where it leaves its range, beyond which, ten times any real one, not the wire but the
+computation has."""
+
+
+class Ending(IntEnum):
+    """Why a run ended early."""
+
+    NONE = 0  # it did not
+    HEAD = 1  # the head left HEAD_RANGE, or its height is no number
+    LOSS = 2  # contact was lost for LOSS_TIME
+    STOP = 3  # the contact wire reached the steady arm's stop
+    WIRES = 4  # contact wire and messenger wire touched
+    DIVERGED = 5  # the computation did: there is no result
+
+
+ENDING = constants(Ending)
+
+
+def reason(ending: Ending, free_uplift: float) -> str:
+    """Why a run ended, as a clause; free_uplift: of the line (m)."""
+    return {
+        Ending.HEAD: f"the collector head left the range of ±{1e3 * HEAD_RANGE:.0f} mm about the contact "
+        "wire's height at the support",
+        Ending.LOSS: f"contact was lost for {LOSS_TIME:g} s",
+        Ending.STOP: "the contact wire rose to the steady arm's stop, "
+        f"{1e3 * free_uplift:.0f} mm above its rest at a support",
+        Ending.WIRES: "contact wire and messenger wire touched",
+        Ending.DIVERGED: "the computation diverged",
+    }[ending]

@@ -1,0 +1,252 @@
+"""What a run is held against: each limit, its margin and verdict, and where it comes from."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from panto_env import Trajectory, simulate
+from panto_env.catalog import load_catenary
+from panto_env.catalog.loader import FOLDERS
+from panto_env.metrics import en50367
+from panto_env.metrics.criterion import Criterion, criteria_table, remarks, worst
+from panto_env.metrics.figures import Figures, arcing, contact_loss
+
+from .test_summary import RUN, SPAN, replace
+
+PANTO = Path(sys.executable).with_name("panto")
+
+
+def by_key(criteria):
+    return {criterion.key: criterion for criterion in criteria}
+
+
+def figures(**given):
+    zeros = dict.fromkeys(Figures.none().as_dict(), 0.0)
+    return Figures(**zeros | given)
+
+
+# --- EN 50367 ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("system", "speed", "largest", "smallest"),
+    [
+        ("AC", 100, 94.7, 64.7),
+        ("AC", 200, 108.8, 78.8),
+        ("AC", 201, 0.00097 * 201**2 + 70, 0.00047 * 201**2 + 60),
+        ("AC", 300, 157.3, 102.3),
+        ("DC 1.5 kV", 150, 150.05, None),
+        ("DC 1.5 kV", 250, 232.5, None),
+        ("DC 3 kV", 100, 119.7, None),
+        ("DC 3 kV", 250, 170.625, None),
+    ],
+)
+def test_mean_force_is_limited_by_speed_and_system(system, speed, largest, smallest):
+    assert en50367.largest_mean(speed / 3.6, system) == pytest.approx(largest)
+    found = en50367.smallest_mean(speed / 3.6, system)
+    assert found == (None if smallest is None else pytest.approx(smallest))
+    for mean, kept in ((largest - 0.01, True), (largest + 0.01, False)):
+        criterion = by_key(en50367.criteria(figures(mean=mean), 0.0, speed / 3.6, system))["mean"]
+        assert criterion.kept is kept
+        assert criterion.margin == pytest.approx(largest - mean, abs=1e-9)
+    if smallest is not None:
+        too_low = by_key(en50367.criteria(figures(mean=smallest - 1), 0.0, speed / 3.6, system))["mean"]
+        assert (too_low.kept, too_low.margin) == (False, pytest.approx(-1.0))
+
+
+def test_formulas_of_both_ranges_meet_at_200_kmh():
+    for system, (slow, fast) in en50367.LARGEST_MEAN.items():
+        assert slow[0] * 200**2 + slow[1] == pytest.approx(fast[0] * 200**2 + fast[1]), system
+
+
+def test_other_limits_at_both_sides_of_their_speeds():
+    at = figures(mean=100.0, std=31.0, max=320.0)
+    slow, medium, fast = (by_key(en50367.criteria(at, 0.15, v / 3.6)) for v in (190, 240, 280))
+    assert [each["max"].highest for each in (slow, medium, fast)] == [300, 350, 350]
+    assert [each["arcing"].highest for each in (slow, medium, fast)] == [0.1, 0.1, 0.2]
+    assert [each["arcing"].kept for each in (slow, medium, fast)] == [False, False, True]
+    assert [each["max"].kept for each in (slow, medium, fast)] == [False, True, True]
+    assert (fast["std"].highest, fast["std"].kept) == (pytest.approx(30.0), False)
+    assert fast["std"].margin == pytest.approx(-1.0)
+    assert [en50367.maximum_limit(v / 3.6) for v in (200, 205)] == [300, 350]
+
+
+def test_an_arc_is_a_loss_of_more_than_5_ms():
+    """Of 40 steps of 2.5 ms: losses of one, two, and three steps, and four at the very end."""
+    force = np.full(40, 100.0)
+    force[[0, 10, 11, 20, 21, 22, 36, 37, 38, 39]] = 0.0
+    assert arcing(force, 2.5e-3) == pytest.approx(100 * 7 / 40)
+    assert arcing(force, 6e-3) == pytest.approx(100 * 10 / 40)
+    assert arcing(force, 1e-3) == 0.0
+    assert contact_loss(force) == pytest.approx(100 * 10 / 40)
+    assert arcing(np.full(5, 1.0), 1e-2) == 0.0
+    assert arcing(np.zeros(5), 1e-2) == 100.0
+
+
+def test_sources_say_what_is_recalled():
+    criteria = en50367.criteria(figures(mean=100.0), 0.0, 70.0, "DC 3 kV")
+    assert all("recalled" in criterion.source for criterion in criteria)
+    assert "no formula is known" in by_key(criteria)["mean"].note
+    assert "contact loss CL counts all" in by_key(criteria)["arcing"].note
+
+
+# --- criteria ------------------------------------------------------------------------------------
+
+
+def test_margin_is_to_the_nearer_limit():
+    between = Criterion("a", "a", "N", 7.0, 5.0, 10.0)
+    assert (between.margin, between.kept) == (2.0, True)
+    assert (
+        Criterion("a", "a", "N", 4.0, 5.0, 10.0).margin,
+        Criterion("a", "a", "N", 12.0, 5.0, 10.0).margin,
+    ) == (-1, -2)
+    told = Criterion("a", "a", "N", 4.0)
+    assert math.isnan(told.margin)
+    assert told.kept is None
+    assert Criterion("a", "a", "N", 4.0, 4.0, None).kept
+
+
+def test_of_several_runs_the_worst_is_shown():
+    one, two = ([Criterion("a", "a", "N", value, None, 10.0)] for value in (9.0, 11.0))
+    assert worst([one, two]) == two
+
+
+def test_tables_show_limits_and_lines_the_rest():
+    criteria = [
+        Criterion("a", "mean", "N", 101.0, 80.0, 100.0, "EN 1", "as one reads it"),
+        Criterion("b", "Doppler", "", 0.25),
+    ]
+    table = criteria_table(criteria, "title")
+    assert table.cells == [("mean (N)", "101.0", "80.0 to 100.0", "-1.000", "[bold red]broken[/]", "EN 1")]
+    assert remarks(criteria) == ["mean: as one reads it.", "Doppler: 0.250"]
+
+
+# --- of a run ------------------------------------------------------------------------------------
+
+
+def test_every_criterion_of_a_run(reference_run):
+    run, speed = reference_run, 300 / 3.6
+    found, whole = by_key(run.compliance()), run.summary()
+    wave = math.sqrt(20e3 / 1.35)
+    assert found["mean"].value == whole.mean
+    assert (found["mean"].lowest, found["mean"].highest) == (pytest.approx(102.3), pytest.approx(157.3))
+    assert found["std"].highest == pytest.approx(0.3 * whole.mean)
+    assert found["max"].value == whole.max
+    assert found["arcing"].value == 0.0
+    assert found["uplift"].value == pytest.approx(2e3 * whole.max_uplift)
+    assert found["uplift"].highest == 240.0
+    assert "default (recalled)" in found["uplift"].note
+    assert (found["speed"].value, found["speed"].highest) == (pytest.approx(speed / wave), 0.7)
+    assert found["doppler"].value == pytest.approx((wave - speed) / (wave + speed))
+    assert found["doppler"].kept is None
+    inside = run.inside()
+    tension = run.dropper_force[inside]
+    assert found["dropper force"].value == tension.max()
+    slack = [
+        np.mean(tension[here][:, (run.dropper_position // 60) == span] <= 0)
+        for span in range(9, 19)
+        if (here := run.position[inside] // 60 == span).any()
+    ]
+    assert found["slack"].value == pytest.approx(100 * np.mean(slack), rel=0.01)
+    assert 0 < found["slack"].value < 20
+
+
+def test_spans_are_those_asked_for(reference_run):
+    assert by_key(reference_run.compliance((5, 6)))["std"].value == reference_run.summary((5, 6)).std
+
+
+def test_a_run_made_up_by_hand():
+    line = replace(RUN.line, system="DC 3 kV", wave_speed=100.0, free_uplift=0.4)
+    slack = np.ones((40, 4))
+    slack[:, 1:] = 50.0
+    slack[10:15, 1] = 0.0  # while the train is in that dropper's span
+    slack[25:30, 0] = 0.0  # while it is elsewhere
+    position = SPAN * np.array([0.5, 1.5, 2.5, 3.5])
+    run = replace(RUN, line=line, dropper_force=slack, dropper_position=position)
+    found = by_key(run.compliance("all"))
+    assert found["mean"].highest == pytest.approx(0.00097 * 180**2 + 110)
+    assert found["mean"].lowest is None
+    assert found["speed"].value == pytest.approx(0.5)
+    assert found["doppler"].value == pytest.approx(1 / 3)
+    assert found["dropper force"].value == 50.0
+    assert found["slack"].value == pytest.approx(100 * 5 / 40)
+    assert found["uplift"].value == pytest.approx(2e3 * 0.239)
+    assert not found["uplift"].kept
+    bare = by_key(RUN.compliance("all"))  # nothing is known of its line
+    assert set(bare) == {"mean", "std", "max", "arcing"}
+
+
+def test_waves_come_back_from_what_they_meet():
+    """A dropper as stiff as can be between equal strings sends back half; a stiff or heavy arm, all."""
+    line = load_catenary("benchmark-2015")
+    dropper, support = line.reflections(1.5)
+    contact, messenger = math.sqrt(22e3 * 1.35), math.sqrt(16e3 * 1.08)
+    assert dropper == pytest.approx(messenger / (contact + messenger))
+    equal = line.model_copy(update={"messenger_wire": line.contact_wire})
+    assert equal.reflections(1.5)[0] == pytest.approx(0.5)
+    arm = line.steady_arm
+    # What comes back and what goes on share the wave's power.
+    omega = 2 * math.pi * 1.5
+    spring = arm.stiffness - omega**2 * arm.mass
+    passed = abs(2j * omega * contact / (spring + 2j * omega * contact))
+    assert support**2 + passed**2 == pytest.approx(1.0)
+
+    def with_arm(**given):
+        return line.model_copy(update={"steady_arm": arm.model_copy(update=given)})
+
+    assert with_arm(stiffness=1e9).reflections(1.5)[1] == pytest.approx(1.0, abs=1e-3)
+    assert with_arm(mass=1e6).reflections(1.5)[1] == pytest.approx(1.0, abs=1e-3)
+    assert with_arm(stiffness=0.0, mass=0.0).reflections(1.5)[1] == 0.0
+
+
+def test_a_line_without_wires_is_held_against_the_force_alone():
+    run = simulate("periodic-stiffness", "three-mass", 250.0)
+    assert set(by_key(run.compliance())) == {"mean", "std", "max", "arcing"}
+
+
+def test_a_saved_run_knows_its_line(tmp_path, reference_run):
+    reference_run.save(tmp_path / "run.parquet")
+    again = Trajectory.load(tmp_path / "run.parquet")
+    assert again.line == reference_run.line
+    assert again.compliance() == reference_run.compliance()
+
+
+# --- commands ------------------------------------------------------------------------------------
+
+
+def panto(*arguments):
+    result = subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_a_line_says_its_system_and_its_room(tmp_path):
+    text = (FOLDERS["catenary"] / "en50318-2002.toml").read_text()
+    mine = tmp_path / "dc.toml"
+    room = 'free_uplift = { value = 0.2, source = "seen: my drawing" }\n'
+    mine.write_text(text.replace("[contact_wire]", f'system = "DC 3 kV"\n{room}[contact_wire]', 1))
+    told = json.loads(panto("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
+    found = {criterion["key"]: criterion for criterion in told}
+    assert found["mean"]["highest"] == pytest.approx(0.00097 * 160**2 + 110)
+    assert found["mean"]["lowest"] is None
+    assert found["uplift"]["highest"] == pytest.approx(200.0)
+    assert "seen: my drawing" in found["uplift"]["note"]
+    assert {"value", "margin", "kept", "source", "unit"} <= set(found["std"])
+
+
+def test_simulate_validate_and_evaluate_print_the_same_table():
+    light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
+    for output in (panto("simulate", *light), panto("evaluate", "p", *light), panto("validate")):
+        for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
+            assert words in output
+    validation = json.loads(panto("validate", "--json"))["compliance"]
+    assert [entry["speed_kmh"] for entry in validation] == [250.0, 300.0]
+    assert {criterion["key"] for criterion in validation[0]["criteria"]} > {"mean", "std", "doppler", "slack"}
+    (entry,) = json.loads(panto("evaluate", "p", *light, "--json"))["passes"]
+    assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
+    assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]

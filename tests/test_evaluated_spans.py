@@ -1,0 +1,105 @@
+"""Figures leave out the start of a run by default, and say which spans they cover."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from panto_env import InputError, Trajectory, simulate
+from panto_env.analysis.options import parse_spans
+from panto_env.analysis.sweep import sweep
+from panto_env.metrics.spans import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
+from panto_env.studies.en50318 import start
+
+PANTO = Path(sys.executable).with_name("panto")
+USUAL = (FIRST_SETTLED, LAST_USUAL)
+
+
+@pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")])
+def test_a_pass_goes_on_until_ten_spans_after_its_start_are_covered(line):
+    run = simulate(*line, record_droppers=False)
+    assert run.spans() == USUAL == (10, 19)
+    assert run.summary() == run.summary(USUAL) != run.summary("all")
+    assert run.summary().distance == pytest.approx(10 * run.span_length, abs=2 * run.stride)
+    assert run.distance == pytest.approx(LAST_USUAL * run.span_length, abs=1.0)
+
+
+def test_what_was_asked_for_is_kept():
+    assert simulate(distance=300.0).distance == pytest.approx(300.0, abs=1.0)
+    assert simulate(spans=10).distance == pytest.approx(9 * 60.0, abs=1.0)
+    assert simulate(distance=2000.0, record_droppers=False).spans() == (10, 33)
+
+
+@pytest.mark.parametrize("speed", [250.0, 300.0])
+def test_the_default_is_near_what_a_long_run_comes_to(speed):
+    """With the start in it σ is much farther off."""
+    (all_spans, default) = start.check_start(speed, (1, FIRST_SETTLED))
+    assert default.rms < 1.0
+    assert default.worst < 2.5
+    assert all_spans.rms > 2 * default.rms
+    assert (default.first, default.last) == USUAL
+    assert default.lines >= 10
+
+
+def test_a_short_run_has_no_figures_but_of_spans_that_are_named():
+    run = simulate(distance=300.0)
+    with pytest.raises(InputError, match="ends before its start has died out") as caught:
+        run.summary()
+    assert "9 spans (540 m)" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert run.summary((2, 5)).std > 0
+    assert run.summary("all").distance == pytest.approx(300.0, abs=1.0)
+    with pytest.raises(InputError, match="start has died out"):
+        sweep({"speed_kmh": [250.0]}, distance=300.0)
+
+
+def test_a_saved_run_covers_the_same_spans(tmp_path, reference_run):
+    reference_run.save(tmp_path / "run.parquet")
+    assert Trajectory.load(tmp_path / "run.parquet").summary() == reference_run.summary()
+
+
+def test_choices():
+    assert chosen_spans(None, 600.0, 60.0) == (10, 10)
+    assert chosen_spans(None, 600.0 * (1 - 1e-12), 60.0) == (10, 10)
+    assert chosen_spans((5, 6), 120.0, 60.0) == (5, 6)
+    assert chosen_spans("all", 120.0, 60.0) is None
+    assert (in_words((5, 6)), in_words(None)) == ("5-6", "all")
+    assert (parse_spans("5-6"), parse_spans("all"), parse_spans(None)) == ((5, 6), "all", None)
+    for text in ("0-3", "6-5", "5", "last"):
+        with pytest.raises(InputError, match="spans must"):
+            parse_spans(text)
+
+
+def test_tables_say_which_spans_are_evaluated():
+    def shown(*arguments):
+        result = subprocess.run([PANTO, *arguments], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass")
+    assert "spans 10-19" in shown("simulate", *light).splitlines()[0]
+    assert "spans all" in shown("simulate", *light, "--spans", "all").splitlines()[0]
+    assert json.loads(shown("simulate", *light, "--json"))["spans"] == [10, 19]
+    table = shown("sweep", "speed_kmh=250,300", *light)
+    assert "spans 10-19" in table.splitlines()[0]
+    rows = json.loads(shown("sweep", "speed_kmh=250,300", *light, "--json"))["rows"]
+    assert [row["spans"] for row in rows] == ["10-19", "10-19"]
+    evaluated = shown("evaluate", "p", *light, "--speed", "250")
+    assert "spans 10-19" in evaluated.splitlines()[0]
+
+
+def test_an_episode_is_as_long_as_its_line(reference_run):
+    """Only passes go on; an environment's episode stays at its line's end."""
+    import gymnasium
+
+    env = gymnasium.make("panto_env:Pantograph-v0").unwrapped
+    env.reset(seed=0)
+    ended = False
+    while not ended:
+        *_, truncated, info = env.step(np.zeros(1, dtype=np.float32))
+        ended = truncated
+    assert info["position"] == pytest.approx(540.0, abs=1.0)
+    assert info["figures"]["std"] == pytest.approx(reference_run.summary((1, 9)).std, rel=0.02)

@@ -1,0 +1,243 @@
+"""A mean force that is asked for is met by trimming the static force, once, and kept."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+from panto_env import InputError, Trajectory, simulate
+from panto_env.analysis.sweep import sweep
+from panto_env.backend import cache_folder
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.control import Task, mean_force, passive_mean, trim_of_pass
+from panto_env.control.settings import far_enough, run_settings
+from panto_env.metrics.en50367 import largest_mean
+
+PANTO = Path(sys.executable).with_name("panto")
+LIGHT = {"catenary": "periodic-stiffness", "pantograph": "identified-2dof"}
+"""A line that costs little, and a pantograph whose spring pulls back by a fifth."""
+
+
+@pytest.fixture
+def empty_store(tmp_path, monkeypatch):
+    """The folder of what is kept, empty; and how often a passive run has been made."""
+    monkeypatch.setattr(mean_force, "cache_folder", lambda: tmp_path)
+    runs = []
+    run_passively = Task.run_passively
+    monkeypatch.setattr(Task, "run_passively", lambda self: (runs.append(1), run_passively(self))[1])
+    return tmp_path / "mean_force", runs
+
+
+@pytest.mark.parametrize(
+    ("line", "pantograph", "speed", "wanted", "target"),
+    [
+        ("en50318-2002", "dsa250", 250.0, "en50367", 0.00097 * 250**2 + 70),
+        ("en50318-2002", "en50318-2002", 180.0, "en50367", 0.00047 * 180**2 + 90),
+        ("shinkansen-simple", "identified-2dof", 300.0, 54.0, 54.0),
+        ("ohl-three-span", "dsa350", 250.0, 130.0, 130.0),
+        ("periodic-stiffness", "identified-2dof", 300.0, "60", 60.0),
+    ],
+)
+def test_the_mean_is_met_over_the_evaluated_spans(line, pantograph, speed, wanted, target):
+    run = simulate(line, pantograph, speed, mean_force=wanted, record_droppers=False)
+    assert run.target_mean == pytest.approx(target)
+    assert run.summary().mean == pytest.approx(target, abs=0.1)
+    free = simulate(line, pantograph, speed, record_droppers=False)
+    assert np.isnan(free.target_mean)
+    assert free.nominal_force == pytest.approx(load_pantograph(pantograph).nominal_force(speed / 3.6))
+    assert abs(free.summary().mean - target) > 0.5
+
+
+def test_it_is_met_over_the_spans_that_are_named_and_on_ones_own_line():
+    own = {"speed_kmh": 300.0, "mean_force": 110.0, "seed": 3, "line_condition": "worn"}
+    run = simulate(**own, evaluated=(5, 6), distance=400.0)
+    assert run.summary((5, 6)).mean == pytest.approx(110.0, abs=0.1)
+    other = simulate(**own | {"seed": 4}, evaluated=(5, 6), distance=400.0)
+    assert other.nominal_force != run.nominal_force
+
+
+def test_under_a_policy_the_passive_pantograph_meets_it():
+    passive, driven = (simulate(**LIGHT, mean_force=60.0, policy=policy) for policy in (None, "p"))
+    assert driven.nominal_force == passive.nominal_force
+    assert driven.target_mean == 60.0
+    assert driven.frame_force.any()
+
+
+def test_a_dc_line_has_another_target():
+    line = load_catenary("en50318-2002").model_copy(update={"system": "DC 3 kV"})
+    run = simulate(line, speed_kmh=160.0, mean_force="en50367", record_droppers=False)
+    assert run.target_mean == pytest.approx(0.00097 * 160**2 + 110)
+    assert run.compliance()[0].margin == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_pantograph_says_whether_its_force_is_applied_or_the_mean():
+    """The benchmark of 2015 prescribes the mean; EN 50318:2002 has 120 N applied."""
+    assert load_pantograph("en50318-2002").force == "applied"
+    run = simulate("benchmark-2015", "benchmark-2015", 300.0, record_droppers=False)
+    assert run.target_mean == pytest.approx(157.3)
+    assert run.summary().mean == pytest.approx(157.3, abs=0.1)
+    assert run.nominal_force > 160.0
+    told = simulate("benchmark-2015", "benchmark-2015", 300.0, mean_force=130.0, record_droppers=False)
+    assert told.summary().mean == pytest.approx(130.0, abs=0.1)
+
+
+def test_nothing_changes_where_nothing_is_asked_for(reference_run):
+    assert reference_run.nominal_force == 120.0
+    assert np.isnan(reference_run.target_mean)
+
+
+def test_what_was_found_is_kept_and_found_again(empty_store):
+    folder, runs = empty_store
+    first = simulate(**LIGHT, mean_force=60.0)
+    tried = len(runs)
+    assert 3 <= tried <= 6  # the last is the run itself
+    again = simulate(**LIGHT, mean_force=60.0)
+    assert len(runs) == tried + 1
+    np.testing.assert_array_equal(first.contact_force, again.contact_force)
+    (file,) = folder.iterdir()
+    assert json.loads(file.read_text())["static_force"] == first.nominal_force
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"mean_force": 61.0},
+        {"speed_kmh": 301.0},
+        {"time_step": 2.5e-3},
+        {"seed": 1},
+        {"evaluated": (11, 12)},
+        {"catenary": load_catenary("periodic-stiffness").model_copy(update={"mean_stiffness": 4100.0})},
+        {"pantograph": load_pantograph("identified-2dof").model_copy(update={"masses": (5.1, 10.38)})},
+        {"line_condition": "fair"},
+        {"distance": 1000.0},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_whatever_the_run_is_made_of_is_trimmed_anew(empty_store, change):
+    folder, _ = empty_store
+    simulate(**LIGHT, mean_force=60.0)
+    simulate(**LIGHT | {"mean_force": 60.0} | change)
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_what_a_passive_run_does_not_depend_on_needs_no_other(empty_store):
+    folder, _ = empty_store
+    simulate(**LIGHT, mean_force=60.0)
+    simulate(**LIGHT, mean_force=60.0, sensors="realistic", actuator="realistic", policy="pd")
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.mark.parametrize("damage", ["half", "digit", "empty", "other"])
+def test_a_damaged_file_is_made_anew(empty_store, damage):
+    folder, runs = empty_store
+    force = simulate(**LIGHT, mean_force=60.0).nominal_force
+    (file,) = folder.iterdir()
+    whole = file.read_text()
+    digit = whole.replace(repr(force), repr(force + 1.0))
+    assert digit != whole
+    file.write_text({"half": whole[:20], "digit": digit, "empty": "", "other": "[1, 2]"}[damage])
+    tried = len(runs)
+    assert simulate(**LIGHT, mean_force=60.0).nominal_force == force
+    assert len(runs) > tried + 1
+    assert file.read_text() == whole
+
+
+def test_it_is_kept_under_the_hash_of_the_sources():
+    simulate(**LIGHT, mean_force=60.0)
+    assert any((cache_folder() / "mean_force").iterdir())
+
+
+def test_it_is_written_whole_or_not_at_all(empty_store, monkeypatch):
+    folder, _ = empty_store
+
+    def interrupted(path, text):
+        path.write_bytes(text.encode()[:10])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "write_text", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(**LIGHT, mean_force=60.0)
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("speeds", [300.0, (290.0, 301.0)])
+def test_an_environment_meets_it_at_any_speed_it_draws(speeds):
+    env = gymnasium.make("panto_env:Pantograph-v0", **LIGHT, speed_kmh=speeds, mean_force=60.0).unwrapped
+    _, info = env.reset(seed=5)
+    applied, speed = env.context.nominal_force, info["speed_kmh"]
+    exact = simulate(**LIGHT, speed_kmh=speed, mean_force=60.0).nominal_force
+    assert applied == pytest.approx(exact, abs=0.3)
+    assert applied > 65.0
+    lanes = gymnasium.make_vec(
+        "panto_env:Pantograph-v0", num_envs=2, **LIGHT, speed_kmh=speeds, mean_force=60.0
+    )
+    lanes.reset(seed=5)
+    assert lanes.unwrapped.task.plant.nominal_force[0] == applied
+
+
+def test_an_environment_is_not_slowed_down_before_it_is_used(empty_store):
+    _, runs = empty_store
+    env = gymnasium.make("panto_env:Pantograph-v0", **LIGHT, mean_force=60.0)
+    assert not runs
+    env.reset(seed=0)
+    assert runs
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"mean_force": -5}, "mean_force must be a positive number"),
+        ({"mean_force": "much"}, "mean_force must be a positive number .* not 'much'"),
+        ({"mean_force": True}, "mean_force must be a positive number"),
+        ({"mean_force": float("nan")}, "mean_force must be a positive number"),
+        ({"mean_force": 900.0, "catenary": "en50318-2002"}, "cannot be met .* ended early"),
+        ({"mean_force": 50.0, "pantograph": "three-mass"}, "aerodynamic uplift alone is 87.3 N"),
+    ],
+)
+def test_what_cannot_be_met_is_refused_in_one_sentence(given, message):
+    with pytest.raises(InputError, match=message) as caught:
+        simulate(**LIGHT | given)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_result_keeps_it(tmp_path):
+    run = simulate(**LIGHT, mean_force=60.0)
+    run.save(tmp_path / "run.parquet")
+    again = Trajectory.load(tmp_path / "run.parquet")
+    assert (again.target_mean, again.nominal_force) == (60.0, run.nominal_force)
+
+
+def test_a_sweep_meets_it_at_every_value():
+    rows = sweep({"speed_kmh": [250.0, 300.0]}, **LIGHT, mean_force="60", spans=(5, 8))
+    assert [row["mean"] for row in rows] == pytest.approx([60.0, 60.0], abs=0.1)
+    assert rows[0]["nominal_force"] != rows[1]["nominal_force"]
+
+
+def test_the_command_takes_it_and_says_what_it_applied():
+    light = ("--catenary", "periodic-stiffness", "--pantograph", "identified-2dof")
+    command = [PANTO, "simulate", *light, "--spans", "5-8", "--mean-force"]
+    text = subprocess.run([*command, "60"], capture_output=True, text=True)
+    assert text.returncode == 0, text.stderr
+    assert "trimmed for a passive mean of 60.0 N" in text.stdout
+    told = json.loads(subprocess.run([*command, "en50367", "--json"], capture_output=True, text=True).stdout)
+    assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6))
+    assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=0.1)
+    assert told["nominal_force"] > told["target_mean"]
+    bad = subprocess.run([*command, "much"], capture_output=True, text=True)
+    assert bad.returncode == 2
+    assert len(bad.stderr.splitlines()) == 1
+
+
+def test_a_trim_by_speed_is_near_that_of_each_speed():
+    """Between the speeds that are trimmed the mean is within a few tenths of a newton."""
+    given = {"catenary": "en50318-2002", "pantograph": "dsa250", "mean_force": "en50367"}
+    settings = run_settings(given | {"speed_kmh": (240.0, 250.0)})
+    trim = mean_force.trim_as_designed(settings, (240 / 3.6, 250 / 3.6), passive_mean)
+    assert 3.6 * np.diff(trim.speeds).max() <= mean_force.KNOT_DISTANCE
+    between = far_enough(run_settings(given | {"speed_kmh": 247.3}))
+    exact = trim_of_pass(between, 0, None, passive_mean)
+    assert trim.static_force(247.3 / 3.6) == pytest.approx(exact.static_forces[0], abs=0.3)

@@ -1,0 +1,104 @@
+"""Plots draw the filtered force in its place, with supports and limits, and say what they leave out."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from panto_env import simulate
+from panto_env.analysis.plots import plot_forces, plot_run, say_what_is_hidden
+from panto_env.catalog import load_pantograph
+from panto_env.metrics.low_pass import low_pass, low_pass_in_place
+
+
+def lag(first, second):
+    """By how many samples the second series is behind the first."""
+    first, second = first - first.mean(), second - second.mean()
+    correlation = np.correlate(second, first, "full")
+    return int(np.argmax(correlation)) - (len(first) - 1)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate("periodic-stiffness", "three-mass", 300.0, "p")
+
+
+def curve(axis, label):
+    (line,) = [line for line in axis.lines if line.get_label() == label]
+    return line
+
+
+def test_the_filter_of_pictures_attenuates_as_much_and_does_not_delay(reference_run):
+    force, step = reference_run.contact_force, reference_run.time_step
+    late, in_place = low_pass(force, step), low_pass_in_place(force, step)
+    inside = reference_run.inside()
+    assert in_place[inside].std() == pytest.approx(late[inside].std(), rel=0.01)
+    assert in_place[inside].mean() == pytest.approx(late[inside].mean(), rel=0.001)
+    assert lag(force[inside], in_place[inside]) == 0
+    assert lag(force[inside], late[inside]) * step == pytest.approx(0.031, abs=0.006)
+
+
+def test_at_20_hz_and_beyond_it_attenuates_as_the_figures_filter():
+    time = np.arange(0, 20, 1e-3)
+    for frequency in (2.0, 20.0, 30.0):
+        wave = np.sin(2 * np.pi * frequency * time)
+        middle = slice(5000, 15000)
+        late, in_place = (f(wave, 1e-3)[middle].std() for f in (low_pass, low_pass_in_place))
+        assert in_place == pytest.approx(late, rel=1e-3)
+
+
+def test_it_takes_any_length_and_keeps_what_is_constant():
+    for count in (1, 2, 50, 1000):
+        assert low_pass_in_place(np.full(count, 120.0), 2e-3) == pytest.approx(120.0)
+
+
+def test_a_run_s_plot_shows_the_evaluated_spans_their_supports_and_limits(run):
+    figure = plot_run(run)
+    contact, height, actuator = figure.axes
+    assert actuator.get_xlim() == (450.0, 950.0)
+    drawn = curve(contact, "low-passed at 20 Hz, not delayed")
+    inside = run.inside()
+    np.testing.assert_array_equal(drawn.get_xdata(), run.position[inside])
+    np.testing.assert_array_equal(
+        drawn.get_ydata(), low_pass_in_place(run.contact_force, run.time_step)[inside]
+    )
+    assert curve(contact, "EN 50367: at most 350 N").get_ydata()[0] == 350
+    assert curve(contact, "nominal").get_ydata()[0] == run.nominal_force
+    supports = {line.get_xdata()[0] for line in contact.lines if line.get_xdata()[0] == line.get_xdata()[-1]}
+    assert {500.0, 550.0, 900.0} <= supports
+    told = actuator.get_xlabel()
+    assert "supports" in told
+    assert "spans 10-19; the rest of the run's 950 m is not shown" in told
+    assert [text.get_text() for text in actuator.get_legend().get_texts()] == ["on the frame"]
+    low, high = height.get_ylim()
+    assert low < 1e3 * run.head[inside].min() < 1e3 * run.head[inside].max() < high
+
+
+def test_all_of_a_run_can_be_drawn_and_one_that_ended_early():
+    heavy = load_pantograph("en50318-2002").model_copy(update={"static_force": 600.0})
+    short = simulate(pantograph=heavy)
+    assert short.terminated
+    figure = plot_run(short, "all")
+    assert figure.axes[-1].get_xlim() == pytest.approx((0.0, short.distance))
+    assert f"all {short.distance:.0f} m of the run" in figure.axes[-1].get_xlabel()
+
+
+def test_forces_of_several_runs_say_which_ended_early(run):
+    heavy = load_pantograph("three-mass").model_copy(update={"static_force": 5000.0})
+    ended = simulate("periodic-stiffness", heavy, 300.0)
+    first, second = plot_forces((run, ended), ("p", "heavy"), (10, 11), "both").axes
+    assert first.get_title("left") == "p"
+    assert second.get_title("left") == "heavy, ended early"
+    assert second.get_xlim() == (450.0, 550.0)
+
+
+def test_a_panel_of_fixed_limits_says_what_it_hides():
+    axis = Figure().subplots()
+    axis.plot([0, 1, 2, 3], [10.0, 500.0, -200.0, 9000.0])
+    axis.set(xlim=(0, 2.5), ylim=(-100, 400))
+    say_what_is_hidden(axis)
+    (note,) = axis.texts
+    assert note.get_text() == "not shown: up to 500, down to -200"
+    full = Figure().subplots()
+    full.plot([0, 1, 2], [10.0, 20.0, 30.0])
+    say_what_is_hidden(full)
+    assert len(full.texts) == 0

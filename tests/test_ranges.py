@@ -1,0 +1,199 @@
+"""Every number of every schema has a range; what lies outside is refused by one sentence that names it."""
+
+import json
+import math
+import re
+from typing import get_args, get_origin
+
+import numpy as np
+import pytest
+from pydantic import BaseModel
+
+from panto_env import InputError, simulate
+from panto_env.base.ranges import Between, ranges_of
+from panto_env.base.settings import parse
+from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.plant.actuators import ACTUATORS, actuator_settings
+from panto_env.plant.catenary import CATENARIES
+from panto_env.plant.line_condition import LineCondition
+from panto_env.plant.pantograph.schema import PantographData
+from panto_env.plant.sensors import SENSORS, sensor_settings
+
+ABSURD = (-1e9, 1e9, math.nan, math.inf, -math.inf, "12", True)
+LINES = {load_catenary(name).kind: load_catenary(name) for name in available("catenary")}
+"""A line of each kind, to change one value of."""
+ALONE = {  # of settings that are not files: how they are read
+    "line condition": ((LineCondition,), lambda value: parse(LineCondition, value, "line_condition")),
+    "actuator": (ACTUATORS.values(), actuator_settings),
+    "sensors": (SENSORS.values(), sensor_settings),
+}
+
+
+def places(annotation):
+    """Where numbers stand in an annotation: () for a number, (0,) for those of a list, and so on."""
+    if annotation in (int, float):
+        yield ()
+    elif get_origin(annotation) is tuple:
+        for place, part in enumerate(part for part in get_args(annotation) if part is not ...):
+            yield from ((place, *rest) for rest in places(part))
+    elif not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+        for part in get_args(annotation):
+            if not isinstance(part, Between):
+                yield from places(part)
+
+
+def table_in(annotation):
+    return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
+
+
+def numbers(schema, prefix=()):
+    """The keys that lead to each field that holds numbers, the field's annotation, and places in it."""
+    for key, field in schema.model_fields.items():
+        annotation = field.rebuild_annotation()
+        if table_in(annotation) is not None:
+            yield from numbers(annotation, (*prefix, key))
+        else:
+            for place in places(annotation):
+                yield (*prefix, key), annotation, place
+
+
+def with_absurd(annotation, place, absurd):
+    """A value of an annotation, all in the middle of its ranges but for one number in it."""
+    if not place:
+        return absurd
+    parts = [part for part in get_args(strip(annotation)) if part is not ...]
+    return [
+        with_absurd(part, place[1:], absurd) if k == place[0] else middle(part)
+        for k, part in enumerate(parts)
+    ]
+
+
+def strip(annotation):
+    """The tuple within an annotation, or the annotation."""
+    if get_origin(annotation) is tuple:
+        return annotation
+    return next(
+        (strip(part) for part in get_args(annotation) if get_origin(strip(part)) is tuple), annotation
+    )
+
+
+def middle(annotation):
+    if get_origin(strip(annotation)) is tuple:
+        return [middle(part) for part in get_args(strip(annotation)) if part is not ...]
+    (between,) = set(ranges_of(annotation))
+    value = (between.low + between.high) / 2
+    return int(value) if int in get_args(annotation) else value
+
+
+def toml(value):
+    """A value as TOML has it."""
+    if isinstance(value, dict):
+        pairs = (f"{key} = {toml(item)}" for key, item in value.items() if item is not None)
+        return f"{{ {', '.join(pairs)} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    return json.dumps(value).replace("NaN", "nan").replace("Infinity", "inf")
+
+
+def put(table, keys, value):
+    key, *rest = keys
+    return table | {key: put(table.get(key) or {}, rest, value) if rest else value}
+
+
+def one_sentence(message, key):
+    assert message.endswith(".")
+    assert not re.search(r"[.?!]\s|\n", message), message
+    assert re.search(rf"\b{re.escape(key)}\b", message), message
+
+
+def cases():
+    for kind, schema in (
+        *((k, kind.schema) for k, kind in CATENARIES.items()),
+        ("pantograph", PantographData),
+    ):
+        for keys, annotation, place in numbers(schema):
+            yield pytest.param(kind, keys, annotation, place, id=".".join((kind, *keys, *map(str, place))))
+
+
+@pytest.mark.parametrize(("kind", "keys", "annotation", "place"), list(cases()))
+def test_an_absurd_number_of_a_file_is_refused(kind, keys, annotation, place, tmp_path):
+    """A new field without a range fails here."""
+    pantograph = kind == "pantograph"
+    entry = (load_pantograph("en50318-2002") if pantograph else LINES[kind]).model_dump(exclude={"sources"})
+    path = tmp_path / "mine.toml"
+    for absurd in ABSURD:
+        table = put(entry, keys, with_absurd(annotation, place, absurd))
+        path.write_text("\n".join(f"{k} = {toml(v)}" for k, v in table.items() if v is not None))
+        with pytest.raises(InputError) as caught:
+            (load_pantograph if pantograph else load_catenary)(str(path))
+        message = str(caught.value)
+        one_sentence(message.replace(str(path), "FILE"), ".".join(map(str, (*keys, *place))))
+        (between,) = set(ranges_of(annotation))
+        assert f"from {between.low:,g} to {between.high:,g}" in message
+        path.unlink()
+
+
+def alone():
+    for family, (schemas, read) in ALONE.items():
+        for schema in schemas:
+            for keys, annotation, place in numbers(schema):
+                name = ".".join((family, schema.__name__, *keys, *map(str, place)))
+                yield pytest.param(read, keys, annotation, place, id=name)
+
+
+@pytest.mark.parametrize(("read", "keys", "annotation", "place"), list(alone()))
+def test_an_absurd_number_of_a_table_is_refused(read, keys, annotation, place):
+    for absurd in ABSURD:
+        with pytest.raises(InputError, match=r"must be a (whole )?number from") as caught:
+            read(put({}, keys, with_absurd(annotation, place, absurd)))
+        one_sentence(str(caught.value), ".".join(map(str, (*keys, *place))))
+
+
+def test_units_of_ranges_are_those_of_the_descriptions():
+    schemas = [kind.schema for kind in CATENARIES.values()] + [PantographData, LineCondition]
+    schemas += [*ACTUATORS.values(), *SENSORS.values()]
+
+    def fields(schema):
+        for field in schema.model_fields.values():
+            annotation = field.rebuild_annotation()
+            if table_in(annotation) is not None:
+                yield from fields(annotation)
+            else:
+                yield field, annotation
+
+    told = [
+        (field.description, between)
+        for schema in schemas
+        for field, annotation in fields(schema)
+        for between in ranges_of(annotation)
+    ]
+    assert len(told) > 40
+    for description, between in told:
+        assert between.low < between.high
+        if between.unit:
+            assert f"({between.unit})" in description
+
+
+def test_any_kind_of_number_is_one_and_whole_ones_are_whole():
+    wire = {"mass": np.float32(1.5), "tension": np.int64(20_000), "bending_stiffness": 0}
+    entry = LINES["flexible"].model_dump() | {"contact_wire": wire, "spans": 12.0}
+    line = type(LINES["flexible"]).model_validate(entry)
+    assert (line.contact_wire.mass, line.contact_wire.tension, line.spans) == (1.5, 20_000.0, 12)
+    assert type(line.spans) is int
+    assert type(line.contact_wire.tension) is float
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"control_interval": math.nan}, "control_interval must be a number from 0.0001 to 10 s, not nan"),
+        ({"control_interval": "0.01"}, "control_interval must be a number from 0.0001 to 10 s, not '0.01'"),
+        ({"time_step": "0.002"}, "time_step must be a number, not '0.002'"),
+        ({"speed_kmh": "300"}, r"speed_kmh must be a number or a range of two \(km/h\), not '300'"),
+        ({"speed_kmh": True}, "speed_kmh must be a number or a range of two"),
+        ({"reward": {"effort": "0.1"}}, "key 'effort' must be a number"),
+    ],
+)
+def test_text_and_nan_are_no_settings_of_a_run(settings, message):
+    with pytest.raises(InputError, match=message):
+        simulate(**settings)

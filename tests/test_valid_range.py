@@ -1,0 +1,158 @@
+"""A run that leaves the plant's valid range ends there, under a policy or none, and says so."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.analysis.sweep import sweep
+from panto_env.backend import kernel
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog.loader import FOLDERS
+from panto_env.metrics.spans import LAST_USUAL
+from panto_env.plant.catenary import CATENARIES
+from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.protocol import ending_by_wire
+from panto_env.plant.line_condition import DrawnLine, LineCondition
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.valid_range import FREE_UPLIFT, Ending
+
+PANTO = Path(sys.executable).with_name("panto")
+
+
+def pressed(force):
+    """The reference pantograph under another static force (N)."""
+    return load_pantograph("en50318-2002").model_copy(update={"static_force": force})
+
+
+def with_room(uplift, line="en50318-2002"):
+    return load_catenary(line).model_copy(update={"free_uplift": uplift})
+
+
+@pytest.mark.parametrize("force", [600.0, 2000.0])
+def test_a_passive_run_ends_where_one_under_a_policy_does(force):
+    alone, driven = (simulate(pantograph=pressed(force), policy=policy) for policy in (None, "passive"))
+    assert alone.terminated
+    np.testing.assert_array_equal(alone.contact_force, driven.contact_force)
+    assert alone.ending == driven.ending
+    assert np.abs(alone.head).max() < 0.4
+    assert f"at {alone.position[-1] + alone.stride / 2:.1f} m (span 1, " in alone.ending
+    assert alone.ending.endswith("left the range of ±300 mm about the contact wire's height at the support.")
+
+
+def test_contact_lost_for_long_ends_a_passive_run():
+    falling = pressed(0.0)
+    run = simulate(pantograph=falling)
+    assert run.terminated
+    assert "contact was lost for 0.5 s" in run.ending
+    assert (run.contact_force[-round(0.5 / run.time_step) :] == 0).all()
+
+
+def test_a_run_within_the_range_goes_to_its_end(reference_run):
+    assert (reference_run.terminated, reference_run.ending) == (False, "")
+    assert reference_run.position[-1] == pytest.approx(LAST_USUAL * 60.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "pantograph"), [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")]
+)
+def test_the_steady_arm_s_stop_ends_a_run(line, pantograph):
+    free = simulate(line, pantograph)
+    assert not free.terminated
+    room = 0.7 * free.uplift.max()
+    run = simulate(with_room(room, line), pantograph)
+    assert "steady arm's stop" in run.ending
+    assert f"{1e3 * room:.0f} mm" in run.ending
+    beyond = np.flatnonzero((free.uplift > room).any(axis=1))[0]
+    assert 0 <= len(run.time) - 1 - beyond <= round(0.01 / run.time_step)
+
+
+def test_a_line_that_does_not_say_has_the_usual_room():
+    assert load_catenary("re250").free_uplift == FREE_UPLIFT == 0.24
+    assert simulate(pantograph=pressed(400.0)).terminated
+
+
+@kernel
+def _ask(line, wire, answer):
+    answer[0] = ending_by_wire(line, wire, 0)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_wires_that_touch_at_a_dropper_end_a_run(precision):
+    """Mid-span the dropper is 0.741 m long: the messenger may sink by so much, and no more."""
+    data = load_catenary("benchmark-2015")
+    numerics = Numerics(window=5, precision=precision)
+    model = CATENARIES["flexible"].model(data, lanes=1, spans=10, numerics=numerics, runs=Runs())
+    model.settle(0, DrawnLine(LineCondition()), 0.0)
+    line, wire, answer = model.line, model.wire, np.zeros(1, dtype=np.int64)
+    wire.increment[:] = 0.01  # m in a step: 4 m/s
+    middle = PAD + round(2.5 * data.span_length / line.spacing) + np.arange(-3, 4)
+    for wires, moved, expected in (
+        ([MESSENGER], -0.73, Ending.NONE),
+        ([MESSENGER], -0.75, Ending.WIRES),
+        ([CONTACT], 0.75, Ending.WIRES),
+        ([CONTACT], -0.75, Ending.NONE),
+        ([CONTACT, MESSENGER], 0.75, Ending.NONE),  # together
+    ):
+        wire.displacement[:] = 0.0
+        for each in wires:
+            wire.displacement[0, each, middle] = moved
+        _ask(line, wire, answer)
+        assert answer[0] == expected, (wires, moved)
+    wire.increment[0, MESSENGER, middle] = -0.7  # from step to step: no wire does so
+    wire.displacement[0, MESSENGER, middle] = -0.75
+    _ask(line, wire, answer)
+    assert answer[0] == Ending.DIVERGED
+
+
+def test_a_run_that_ended_early_has_no_figures_but_those_of_spans_before():
+    """Without the droppers beside support 5 the wire rises there by half as much again."""
+    condition = {"broken_droppers": [(5, 8), (5, 9), (6, 1), (6, 2)]}
+    whole, run = (simulate(line, line_condition=condition) for line in ("en50318-2002", with_room(0.1)))
+    with pytest.raises(InputError, match=r"ended early at .* \(span [56], .* steady arm's stop") as caught:
+        run.summary()
+    assert "\n" not in str(caught.value)
+    assert run.summary((2, 4)) == whole.summary((2, 4))
+    with pytest.raises(InputError, match="The run ended early"):
+        run.summary((2, 6))
+
+
+def test_a_sweep_says_where_and_why_a_run_ended():
+    good, bad = sweep({"pantograph.static_force": [120.0, 600.0]})
+    assert (good["terminated"], good["ending"]) == (False, "")
+    assert good["std"] > 0
+    assert bad["terminated"]
+    assert "head left the range" in bad["ending"]
+    assert np.isnan([bad[name] for name in ("mean", "std", "max", "min", "contact_loss")]).all()
+
+
+def test_the_command_prints_one_sentence_and_no_figures(tmp_path):
+    text = (FOLDERS["pantograph"] / "en50318-2002.toml").read_text().replace("value = 120.0", "value = 700.0")
+    mine = tmp_path / "heavy.toml"
+    mine.write_text(text)
+    command = [PANTO, "simulate", "--pantograph", mine]
+    table, machine = (
+        subprocess.run([*command, *more], capture_output=True, text=True) for more in ([], ["--json"])
+    )
+    assert (table.returncode, machine.returncode) == (1, 1)
+    assert table.stdout.startswith("The run ended early at ")
+    assert len(table.stdout.splitlines()) == 1
+    told = json.loads(machine.stdout)
+    assert told["terminated"]
+    assert told["figures"] is None
+    assert told["ending"] in table.stdout
+
+
+def test_there_is_nothing_to_compare_with_where_the_passive_run_ends_early():
+    from panto_agents.evaluation import in_words, pair
+
+    heavy = simulate(pantograph=pressed(600.0))
+    compared = pair(simulate(), heavy)
+    assert np.isnan(compared.ratio)
+    assert not compared.qualified
+    assert "nothing to compare with" in in_words([compared])
+    assert "head left the range" in compared.as_dict()["passive_ending"]

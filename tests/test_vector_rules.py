@@ -1,0 +1,279 @@
+"""What Gymnasium asks of vector environments, and what its own answer, on all our ids."""
+
+import warnings
+from itertools import combinations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import DictInfoToList, NormalizeReward, RecordEpisodeStatistics
+
+from panto_env import InputError
+from panto_env.envs import IDS
+
+LIVELY = {"sensors": "realistic", "line_condition": "fair", "speed_kmh": (200, 300), "distance": 20.0}
+MODES = list(AutoresetMode)
+
+
+@pytest.fixture(autouse=True)
+def _warnings_are_errors():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def native(name, lanes=3, **settings):
+    return gymnasium.make_vec(name, lanes, **LIVELY | settings)
+
+
+def of_singles(name, lanes=3, mode=AutoresetMode.NEXT_STEP, kind="sync", **settings):
+    vector = {"autoreset_mode": mode}
+    return gymnasium.make_vec(name, lanes, vectorization_mode=kind, vector_kwargs=vector, **LIVELY | settings)
+
+
+def actions_of(envs, count):
+    shape = envs.action_space.shape
+    return np.random.default_rng(0).uniform(-1, 1, (count, *shape)).astype(np.float32)
+
+
+def assert_same(ours, theirs, where="infos"):
+    """The same keys and values; of figures, those of the lanes that ours says have some."""
+    assert set(ours) <= set(theirs), where
+    assert {key.removeprefix("_") for key in set(theirs) - set(ours)} <= {"figures"}, where
+    for key, value in ours.items():
+        if isinstance(value, dict):
+            assert_same(value, theirs[key], f"{where}[{key}]")
+        elif "figures" in where or "figures" in key:
+            # Each of the single environments has figures in each info: of no episode until one ends.
+            mask = ours[key if key[0] == "_" else f"_{key}"]
+            np.testing.assert_allclose(value[mask], theirs[key][mask], rtol=1e-9, atol=1e-9)
+        elif key == "final_obs":
+            for mine, other in zip(value, theirs[key], strict=True):
+                np.testing.assert_array_equal(mine, other)
+        else:
+            assert value.dtype == theirs[key].dtype, f"{where}[{key}]"
+            np.testing.assert_array_equal(value, theirs[key], f"{where}[{key}]")
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", IDS)
+def test_native_vector_environment_answers_as_gymnasium_s_does(name, mode):
+    """Observations, rewards, ends, and infos with their masks, over the ends of episodes."""
+    ours, theirs = native(name, autoreset_mode=mode), of_singles(name, mode=mode)
+    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"] == mode
+    for space in ("observation_space", "action_space", "single_observation_space", "single_action_space"):
+        assert getattr(ours, space) == getattr(theirs, space)
+    (mine, my_infos), (other, infos) = ours.reset(seed=5), theirs.reset(seed=5)
+    np.testing.assert_array_equal(mine, other)
+    assert_same(my_infos, infos)
+    ends = 0
+    for action in actions_of(ours, 90):
+        mine, other = ours.step(action), theirs.step(action)
+        for k in range(4):
+            np.testing.assert_array_equal(mine[k], other[k])
+            assert mine[k].dtype == other[k].dtype
+        assert_same(mine[4], other[4])
+        ended = mine[2] | mine[3]
+        ends += ended.sum()
+        if mode == AutoresetMode.DISABLED and ended.any():
+            options = {"reset_mask": ended}
+            mine, other = ours.reset(options=options), theirs.reset(options=dict(options))
+            np.testing.assert_array_equal(mine[0], other[0])
+            assert_same(mine[1], other[1])
+    assert ends > 6
+
+
+def test_asynchronous_environments_answer_the_same():
+    name = "PantographStiffness-v0"
+    ours, theirs = native(name), of_singles(name, kind="async")
+    assert isinstance(theirs, AsyncVectorEnv)
+    try:
+        for mine, other in zip(ours.reset(seed=5), theirs.reset(seed=5), strict=True):
+            if isinstance(mine, dict):
+                assert_same(mine, other)
+            else:
+                np.testing.assert_array_equal(mine, other)
+        for action in actions_of(ours, 40):
+            mine, other = ours.step(action), theirs.step(action)
+            np.testing.assert_array_equal(mine[0], other[0])
+            assert_same(mine[4], other[4])
+    finally:
+        theirs.close()
+
+
+@pytest.mark.parametrize("kind", [SyncVectorEnv, None])
+def test_lanes_are_seeded_as_gymnasium_seeds_them(kind):
+    name = "PantographStiffness-v0"
+    envs = native(name) if kind is None else of_singles(name)
+    unseeded = envs.np_random_seed
+    assert len(set(unseeded)) == 3
+    envs.reset()
+    assert envs.np_random_seed == unseeded
+    envs.reset(seed=42)
+    assert envs.np_random_seed == (42, 43, 44)
+    state = [random.bit_generator.state for random in envs.np_random]
+    envs.reset()
+    assert envs.np_random_seed == (42, 43, 44)
+    envs.reset(seed=[7, None, np.int64(9)] if kind is None else [7, None, 9])
+    assert envs.np_random_seed == (7, 43, 9)
+    envs.reset(seed=42)
+    assert [random.bit_generator.state for random in envs.np_random] == state
+    with pytest.raises((ValueError, AssertionError)):
+        envs.reset(seed=[1, 2])
+
+
+def test_a_bad_seed_changes_nothing():
+    envs = native("PantographStiffness-v0")
+    envs.reset(seed=1)
+    with pytest.raises(gymnasium.error.Error, match="Seed must be"):
+        envs.reset(seed=[4, -1, 4])
+    assert envs.np_random_seed == (1, 2, 3)
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [
+        [True, False, True],
+        np.array([True]),
+        np.array([[True, True, True]]),
+        np.array([1, 1, 0]),
+        np.array([False, False, False]),
+        "all",
+    ],
+)
+def test_reset_mask_is_an_array_of_booleans_with_one_true(mask):
+    envs = native("PantographStiffness-v0")
+    with pytest.raises(InputError, match="first reset must begin episodes in all lanes"):
+        envs.reset(options={"reset_mask": np.array([True, True, False])})
+    envs.reset(seed=0, options={"reset_mask": np.ones(3, bool)})
+    with pytest.raises(InputError, match="reset_mask must be 3 booleans, an array with one true or more"):
+        envs.reset(options={"reset_mask": mask})
+
+
+def test_masked_reset_leaves_the_other_lanes_and_the_user_s_options_alone():
+    envs = native("PantographStiffness-v0", autoreset_mode="Disabled")
+    start, _ = envs.reset(seed=[0, 1, 2])
+    for action in actions_of(envs, 3):
+        before, *_ = envs.step(action)
+    mask = np.array([True, True, False])
+    options = {"reset_mask": mask}
+    observations, infos = envs.reset(seed=[0, 1, 0], options=options)
+    assert options["reset_mask"] is mask
+    np.testing.assert_array_equal(observations[:2], start[:2])
+    np.testing.assert_array_equal(observations[2], before[2])
+    assert envs.np_random_seed == (0, 1, 2)
+    np.testing.assert_array_equal(infos["_head"], mask)
+    np.testing.assert_array_equal(infos["reward_terms"]["_effort"], mask)
+    assert infos["contact_force"][2] == 0
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_what_is_returned_is_the_user_s(mode):
+    """No answer shares memory with a later one, which would change it."""
+
+    def arrays(data):
+        if isinstance(data, np.ndarray) and data.dtype != object:
+            return [data]
+        several = data.values() if isinstance(data, dict) else data
+        return [each for item in several if item is not None for each in arrays(item)]
+
+    envs = native("PantographStiffness-v0", autoreset_mode=mode)
+    answers = [envs.reset(seed=1)]
+    for k, action in enumerate(actions_of(envs, 40)):
+        answer = envs.step(action)
+        if k < 2 or (answer[2] | answer[3]).any():
+            answers.append(answer)
+    assert len(answers) > 4
+    for one, other in combinations(answers, 2):
+        assert not any(np.shares_memory(a, b) for a in arrays(one) for b in arrays(other))
+
+
+def test_wrappers_that_read_infos_work():
+    envs = DictInfoToList(NormalizeReward(native("PantographStiffness-v0")))
+    _, infos = envs.reset(seed=0)
+    assert infos[1]["speed_kmh"] != infos[2]["speed_kmh"]
+    ends, figures = 0, []
+    for action in actions_of(envs, 90):
+        _, _, terminated, truncated, infos = envs.step(action)
+        ends += (terminated | truncated).sum()
+        figures += [info["figures"]["mean"] for info in infos if "figures" in info]
+    assert len(figures) == ends > 3
+    assert np.all(np.array(figures) > 50)
+    envs = RecordEpisodeStatistics(native("PantographStiffness-v0"))
+    envs.reset(seed=0)
+    for action in actions_of(envs, 90):
+        infos = envs.step(action)[4]
+        if "episode" in infos:
+            np.testing.assert_array_equal(infos["_episode"], infos["_figures"])
+            ends -= infos["_episode"].sum()
+    assert ends == 0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_time_limit_of_the_vector_environment_is_gymnasium_s(mode):
+    limit = {"max_episode_steps": 26}  # within some of the episodes, beyond others
+    ours = native("PantographStiffness-v0", autoreset_mode=mode, **limit)
+    theirs = of_singles("PantographStiffness-v0", mode=mode, **limit)
+    ours.reset(seed=2)
+    theirs.reset(seed=2)
+    lengths, steps = set(), np.zeros(3, int)
+    for action in actions_of(ours, 90):
+        mine, other = ours.step(action), theirs.step(action)
+        for k in range(4):
+            np.testing.assert_array_equal(mine[k], other[k])
+        ended = mine[2] | mine[3]
+        steps += 1
+        lengths |= set(steps[ended].tolist())
+        steps[ended] = -1 if mode == AutoresetMode.NEXT_STEP else 0
+        if mode == AutoresetMode.DISABLED and ended.any():
+            for envs in (ours, theirs):
+                envs.reset(options={"reset_mask": ended})
+    assert 26 in lengths
+    assert min(lengths) < 26
+    with pytest.raises(InputError, match="max_episode_steps must be greater than or equal to 1"):
+        native("PantographStiffness-v0", max_episode_steps=0)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_options_are_of_one_episode_in_the_lanes_begun(name):
+    """What the single environment takes, another line or control interval even; autoreset forgets them."""
+    ours, theirs = native(name), of_singles(name)
+    ours.reset(seed=5)
+    theirs.reset(seed=5)
+    ends = 0
+    changes = {
+        4: {"speed_kmh": 250, "sensors": "ideal", "reset_mask": np.array([True, False, True])},
+        9: {"control_interval": 0.02, "line_condition": "worn", "reset_mask": np.array([False, True, False])},
+        40: {"distance": np.float32(7.0)},
+    }
+    for k, action in enumerate(actions_of(ours, 90)):
+        if k in changes:
+            mine, other = ours.reset(options=changes[k]), theirs.reset(options=dict(changes[k]))
+            np.testing.assert_array_equal(mine[0], other[0])
+            assert_same(mine[1], other[1])
+        mine, other = ours.step(action), theirs.step(action)
+        for part in range(4):
+            np.testing.assert_array_equal(mine[part], other[part])
+        assert_same(mine[4], other[4])
+        ends += (mine[2] | mine[3]).sum()
+        if k == 5:
+            assert mine[4]["speed_kmh"][0] == pytest.approx(250)
+    assert ends > 6
+
+
+def test_options_that_are_not_valid_change_nothing():
+    envs = native("PantographStiffness-v0")
+    before, _ = envs.reset(seed=1)
+    for options, message in (
+        ({"sped_kmh": 200}, "Unknown option 'sped_kmh': did you mean 'speed_kmh'"),
+        ({"speed_kmh": -5}, "speed must lie above 0"),
+        ({"observation": "full"}, "would change the observation or action space"),
+        ({"actuator": {"place": "both"}}, "would change the observation or action space"),
+        ({"num_envs": 4}, "Unknown option 'num_envs'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            envs.reset(seed=8, options=options)
+    assert envs.np_random_seed == (1, 2, 3)
+    assert (envs.unwrapped.task.plant.steps_done == 0).all()
+    np.testing.assert_array_equal(envs.reset(seed=1)[0], before)
