@@ -80,7 +80,8 @@ def test_the_likely_mistake_is_named(factors, message):
     [
         ({"k1T": 32.992}, "k1T must be a number from 1,000 to 1e.06 N/m, not 32.992"),
         ({"m2": 5000.0}, "m2 must be a number from 0.1 to 200 kg, not 5000"),
-        ({"k1T": 32.992e5}, "the compression of the contact spring does: is k1T in N/m"),
+        ({"k1T": 32.992e5}, r"k1T must be a number from 1,000 to 1e\+06 N/m, not 3.2992e\+06"),
+        ({"k1T": 1.0e3}, "the compression of the contact spring does: is k1T in N/m"),
     ],
 )
 def test_known_values_in_other_units_are_named(known, message):

@@ -136,12 +136,12 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
         data,
         load_pantograph(BENCHMARK),
         spans=5,
-        numerics=Numerics(**WHOLE),
+        numerics=Numerics(**WHOLE, spacing=0.2),
         runs=Runs(conditions=[condition]),
     )
     at, system = 2 * 55 + 21.75, build(data, 5, 0.25)
     node = int(np.argmin(np.abs(system.nodes - at)))
-    heights, slack = np.zeros(9000), []
+    heights, slack = np.zeros(12000), []
     for force in (0.0, -10.0, -200.0):
         load = np.zeros(system.free.size)
         load[4 * node + 2] = force

@@ -112,8 +112,8 @@ def test_defects_from_the_command_line_take_effect(panto):
         panto("simulate", "--distance", "120", "--spans", "all", "--line-condition", condition, "--json")
     )
     table = {"broken_droppers": [(2, 4)], "raised_supports": [(1, 0.02)]}
-    assert told["figures"]["std"] == simulate(**SHORT, line_condition=table).summary().std
-    assert told["figures"]["std"] != simulate(**SHORT).summary().std
+    assert told["figures"]["std"] == simulate(**SHORT, line_condition=table).summary("all").std
+    assert told["figures"]["std"] != simulate(**SHORT).summary("all").std
     swept = json.loads(
         panto(
             "sweep",
@@ -180,11 +180,11 @@ def test_a_sweep_and_an_evaluation_carry_it_too(panto):
             "--json",
         )
     )
-    assert (told["version"], told["seed"], told["spans"]) == (__version__, 0, None)
+    assert (told["version"], told["seed"], told["spans"]) == (__version__, 0, "all")
     assert told["settings"]["distance"] == 120.0
     assert [row["spacing"] for row in told["rows"]] == sorted(row["spacing"] for row in told["rows"])
     assert all(row["time_step"] > 0 for row in told["rows"])
-    told = json.loads(panto("evaluate", "p", "--speed", "300", "--distance", "310", "--json"))
+    told = json.loads(panto("evaluate", "p", "--speed", "300", "--distance", "610", "--json"))
     assert told["settings"]["version"] == __version__
     assert told["settings"]["time_step"] > 0
     assert set(told["verdict"]) == {"ratio", "qualified"}

@@ -125,8 +125,8 @@ def test_vector_environment_counts_changes_of_action_in_each_lane():
         before[ended] = 0.0
         expected = ((0.5 * (actions - before)) ** 2).sum(axis=1)
         assert rewards == pytest.approx(-expected)
-        assert infos["rate"][~ended] == pytest.approx(expected[~ended])
-        assert infos["effort"][~ended] == pytest.approx((actions[~ended] ** 2).sum(axis=1))
+        assert infos["reward_terms"]["rate"][~ended] == pytest.approx(expected[~ended])
+        assert infos["reward_terms"]["effort"][~ended] == pytest.approx((actions[~ended] ** 2).sum(axis=1))
         before, ended = actions, terminated | truncated
         ends += ended.sum()
     assert ends >= 6

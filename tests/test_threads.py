@@ -10,8 +10,8 @@ import pytest
 from panto_env.backend import LaneThreads
 
 
-def count():
-    return sum(thread.name == "panto" for thread in threading.enumerate())
+def running():
+    return {thread for thread in threading.enumerate() if thread.name == "panto"}
 
 
 def test_each_lane_is_worked_on_once_in_each_work():
@@ -44,14 +44,13 @@ def test_an_error_in_any_thread_is_the_caller_s_and_spoils_no_later_work(here):
 
 
 def test_threads_end_with_their_owner():
-    before = count()
+    before = running()
     threads = LaneThreads(100, 7, 3)
     threads.run(lambda first, last: None)
-    assert count() == before + 2
+    ours = running() - before
+    assert len(ours) == 2
     del threads
     gc.collect()
-    for _ in range(100):
-        if count() == before:
-            break
-        time.sleep(0.01)
-    assert count() == before
+    for thread in ours:
+        thread.join(timeout=10)
+    assert not any(thread.is_alive() for thread in ours)

@@ -157,7 +157,7 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
         offset = support - float(deflection[0])
         hung = PeriodicWire(messenger, line.span_length, points, forces, offset)
         loaded_length = hung.height(x) + np.array(droppers.sag)
-        new_length = loaded_length - tension / _stiffness(line, loaded_length)
+        new_length = _unloaded(line, loaded_length, tension)
         change = np.abs(new_length - length).max()
         length = new_length
         if change < SETTLED:
@@ -177,6 +177,13 @@ def _stiffness(line: FlexibleCatenaryData, length: Array) -> Array:
         return np.full(len(length), droppers.stiffness)
     assert droppers.axial_stiffness is not None  # the schema asks for one of the two
     return droppers.axial_stiffness / length
+
+
+def _unloaded(line: FlexibleCatenaryData, loaded: Array, tension: Array) -> Array:
+    """Length (m) of each dropper without load, of which its stiffness is that of ``_stiffness``."""
+    if line.droppers.axial_stiffness is not None:
+        return loaded / (1 + tension / line.droppers.axial_stiffness)
+    return loaded - tension / _stiffness(line, loaded)
 
 
 def _hold(wire: Wire, span: float, x: Array, height: Array) -> PeriodicWire:
