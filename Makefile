@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs coverage mutants same oldest ptx rllib libraries clean
+.PHONY: demo test lint proofs coverage mutants same nonsense oldest ptx rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -51,6 +51,11 @@ same: $(READY)
 # The source is broken on purpose, place by place: a test must notice (an hour on two cores).
 mutants: $(READY)
 	$(BIN)/python -m tests.mutants
+
+# Thousands of random lines, pantographs and speeds: each refused, or finite, balanced and nearly converged.
+NONSENSE := 3000
+nonsense: $(READY)
+	NONSENSE=$(NONSENSE) $(BIN)/pytest -s -m slow tests/test_nonsense.py
 
 # The oldest Gymnasium and Numba that are supported, without the extra 'agents'. The newest are in constraints.txt.
 OLDEST := .venv-oldest

@@ -1,21 +1,25 @@
 """A search for silent nonsense: a run of any valid line, pantograph and speed is refused in a sentence, or is
-finite, balances its forces, and is nearly the same on a grid twice as fine.
+finite, balances its forces and its energy, and is nearly the same on a grid twice as fine.
 """
 
+import os
 import warnings
+from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.resolution import HARD_CONTACT_ERROR
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 LINES = ("en50318-2002", "benchmark-2015", "re250", "shinkansen-simple", "ln2")
 PANTOGRAPHS = ("en50318-2002", "dsa380", "identified-2dof", "three-mass", "benchmark-2015")
-SPANS = (4, 6)
+SLOW, SLOW_SPANS, USUAL_SPANS = 100.0, (2, 3), (4, 6)
+"""Speed (km/h) below which fewer spans are evaluated, and spans."""
 
 
 def scaled(data, factors):
@@ -34,60 +38,61 @@ def scaled(data, factors):
     return type(data).model_validate(table)
 
 
-def factor(low, high):
-    return st.floats(np.log(low), np.log(high)).map(np.exp).map(float)
+LINE_FACTORS = {
+    "contact_wire.tension": (0.3, 3.0),
+    "contact_wire.mass": (0.3, 3.0),
+    "contact_wire.bending_stiffness": (0.01, 5.0),
+    "messenger_wire.tension": (0.3, 3.0),
+    "messenger_wire.mass": (0.3, 3.0),
+    "support.stiffness": (0.01, 10.0),
+    "support.damping": (0.01, 10.0),
+    "damping.alpha": (0.1, 30.0),
+    "damping.beta": (0.1, 30.0),
+}
+PANTOGRAPH_FACTORS = {
+    "masses": (0.3, 3.0),
+    "stiffnesses": (0.2, 5.0),
+    "dampings": (0.1, 10.0),
+    "static_force": (0.3, 2.0),
+}
 
 
-LINE_FACTORS = st.fixed_dictionaries(
-    {},
-    optional={
-        "contact_wire.tension": factor(0.3, 3.0),
-        "contact_wire.mass": factor(0.3, 3.0),
-        "contact_wire.bending_stiffness": factor(0.01, 5.0),
-        "messenger_wire.tension": factor(0.3, 3.0),
-        "messenger_wire.mass": factor(0.3, 3.0),
-        "support.stiffness": factor(0.01, 10.0),
-        "support.damping": factor(0.01, 10.0),
-        "damping.alpha": factor(0.1, 30.0),
-        "damping.beta": factor(0.1, 30.0),
-    },
-)
-PANTOGRAPH_FACTORS = st.fixed_dictionaries(
-    {},
-    optional={
-        "masses": factor(0.3, 3.0),
-        "stiffnesses": factor(0.2, 5.0),
-        "dampings": factor(0.1, 10.0),
-        "static_force": factor(0.3, 2.0),
-    },
-)
-CLAMPS, STIFFNESSES = st.sampled_from([0.0, 0.2, 3.0]), st.sampled_from([20e3, 50e3, 200e3, 1e6])
-
-
-@st.composite
-def cases(draw):
-    line = load_catenary(draw(st.sampled_from(LINES)))
-    assert isinstance(line, FlexibleCatenaryData)
-    clamp = draw(CLAMPS)
-    droppers = line.droppers.model_copy(update={"contact_clamp_mass": clamp, "messenger_clamp_mass": clamp})
-    contact = {
-        "contact_stiffness": draw(STIFFNESSES),
-        "contact_damping": draw(st.sampled_from([0.0, 100.0, 1000.0])),
-    }
-    pantograph = load_pantograph(draw(st.sampled_from(PANTOGRAPHS))).model_copy(update=contact)
+def factors(random, ranges):
+    """Of a third of the values."""
     return {
-        "line": (line.model_copy(update={"droppers": droppers}), draw(LINE_FACTORS)),
-        "pantograph": (pantograph, draw(PANTOGRAPH_FACTORS)),
-        "speed_kmh": draw(st.floats(20.0, 420.0)),
-        "line_condition": draw(
-            st.sampled_from(["new", "worn", {"wear_depth": 2e-3, "wear_wavelength": 0.4}])
-        ),
-        "actuator": draw(st.sampled_from(["ideal", "realistic"])),
+        name: float(np.exp(random.uniform(*np.log(ends))))
+        for name, ends in ranges.items()
+        if random.random() < 1 / 3
     }
+
+
+def case_of(seed):
+    """Evenly drawn: Hypothesis by itself prefers few values, and the ends of ranges."""
+    random = np.random.default_rng(seed)
+    line = load_catenary(LINES[random.integers(len(LINES))])
+    assert isinstance(line, FlexibleCatenaryData)
+    clamp = random.choice([0.0, 0.2, 3.0])
+    droppers = line.droppers.model_copy(update={"contact_clamp_mass": clamp, "messenger_clamp_mass": clamp})
+    changed = {
+        "force": "applied",  # a mean to be met would want longer runs
+        "contact_stiffness": random.choice([20e3, 50e3, 200e3, 1e6]),
+        "contact_damping": random.choice([0.0, 100.0, 1000.0]),
+    }
+    pantograph = load_pantograph(PANTOGRAPHS[random.integers(len(PANTOGRAPHS))])
+    conditions = ("new", "worn", {"wear_depth": 2e-3, "wear_wavelength": 0.4})
+    return {
+        "line": (line.model_copy(update={"droppers": droppers}), factors(random, LINE_FACTORS)),
+        "pantograph": (pantograph.model_copy(update=changed), factors(random, PANTOGRAPH_FACTORS)),
+        "speed_kmh": random.uniform(20.0, 420.0),
+        "line_condition": conditions[random.integers(3)],
+    }
+
+
+SEEDS = st.integers(0, 2**32 - 1)
 
 
 def momentum(run, pantograph):
-    """What is left of the balance of the whole pantograph's forces, as a mean force (N)."""
+    """What is left of the balance of the whole pantograph's forces, as a mean force (N), and what may be."""
     duration = run.time_step * len(run.time)
     spring, damper = pantograph.stiffnesses[-1], pantograph.dampings[-1]
     lift = run.nominal_force - spring * run.frame.mean() - damper * (run.frame[-1] - run.frame[0]) / duration
@@ -95,16 +100,46 @@ def momentum(run, pantograph):
     return lift - run.contact_force.mean(), 2 * swing / duration
 
 
+def energy(run, pantograph):
+    """What is left of the balance of a pantograph of two masses, and its turnover (J)."""
+    head, frame, v, w = run.head, run.frame, run.head_velocity, run.frame_velocity
+    (m, n), (k, base), (c, damper) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
+    stored = 0.5 * (m * v**2 + n * w**2 + k * (head - frame) ** 2 + base * frame**2)
+    gained = run.nominal_force * w - run.contact_force * v
+    lost = c * (v - w) ** 2 + damper * w**2
+    left = stored[-1] - stored[0] - run.time_step * (gained - lost)[1:].sum()
+    return left, run.time_step * np.abs(gained).sum() + stored.max()
+
+
+def finer(line, pantograph, case, run, **numbers):
+    """The same run on a grid twice as fine, with at most half the time step."""
+    for part in (2, 4, 8, 16, 32):
+        numerics = {"spacing": run.settings["spacing"] / 2, "time_step": run.time_step / part}
+        try:
+            with warnings.catch_warnings(action="ignore"):
+                return simulate(line, pantograph, case["speed_kmh"], seed=1, **numbers, **numerics)
+        except InputError as error:
+            if "is unstable on a grid" not in str(error):
+                raise
+    raise AssertionError("no time step is short enough")
+
+
 def check(case):
+    """Which of its ways a case goes; AssertionError where it is nonsense."""
     try:
         line, pantograph = (scaled(*case[name]) for name in ("line", "pantograph"))
     except ValueError:
         return "schema"
-    distance = (SPANS[1] + 0.5) * line.span_length
-    numbers = {"line_condition": case["line_condition"], "record_droppers": False, "distance": distance}
-    numbers["actuator"] = case["actuator"]
+    spans = USUAL_SPANS if case["speed_kmh"] > SLOW else SLOW_SPANS
+    numbers = {
+        "line_condition": case["line_condition"],
+        "record_droppers": False,
+        "distance": (spans[1] + 0.5) * line.span_length,
+    }
     try:
-        run = simulate(line, pantograph, case["speed_kmh"], seed=1, **numbers)
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            run = simulate(line, pantograph, case["speed_kmh"], seed=1, **numbers)
     except InputError as error:
         message = str(error)
         assert message.endswith(".")
@@ -114,28 +149,51 @@ def check(case):
         assert np.isfinite(getattr(run, name)).all(), name
     left, allowed = momentum(run, pantograph)
     assert abs(left) < allowed + 0.01 * run.nominal_force
+    if len(pantograph.masses) == 2:
+        left, turned = energy(run, pantograph)
+        assert abs(left) < 0.02 * turned
     if run.terminated:
         return "ended"
-    finer = numbers | {"spacing": run.settings["spacing"] / 2, "time_step": run.time_step / 4}
-    with warnings.catch_warnings(action="ignore"):
-        fine = simulate(line, pantograph, case["speed_kmh"], seed=1, **finer)
+    fine = finer(line, pantograph, case, run, **numbers)
     assert not fine.terminated
-    ours, true = run.summary(SPANS), fine.summary(SPANS)
+    ours, true = run.summary(spans), fine.summary(spans)
     assert ours.mean == pytest.approx(true.mean, rel=0.005, abs=0.2)
-    # The catalogue's lines are within 1 %; what is far from any of them within 5 %.
-    assert ours.std == pytest.approx(true.std, rel=0.05, abs=0.3)
-    assert ours.contact_loss == pytest.approx(true.contact_loss, abs=1.0)
+    if pantograph.hard_contact:
+        assert any("contact stiffer" in str(each.message) for each in warned)
+        assert ours.std == pytest.approx(true.std, rel=HARD_CONTACT_ERROR / 100, abs=0.5)
+        return "agreed, as warned"
+    # The catalogue's lines are within 1 % and 0.1 points; these are far from any of them.
+    assert ours.std == pytest.approx(true.std, rel=0.03, abs=0.3)
+    assert ours.contact_loss == pytest.approx(true.contact_loss, abs=2.0)
     return "agreed"
 
 
-@settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(cases())
-def test_a_few_random_runs_are_refused_or_right(case):
-    check(case)
+SEARCH = {
+    "deadline": None,
+    "derandomize": True,
+    "database": None,
+    "phases": (Phase.explicit, Phase.generate),
+    "suppress_health_check": list(HealthCheck),
+}
+
+
+@settings(max_examples=5, **SEARCH)
+@given(SEEDS)
+def test_a_few_random_runs_are_refused_or_right(seed):
+    check(case_of(seed))
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(cases())
-def test_random_runs_are_refused_or_right(case):
-    check(case)
+def test_random_runs_are_refused_or_right():
+    """As many as the variable NONSENSE says; `make nonsense` runs thousands."""
+    ways = Counter()
+
+    @settings(max_examples=int(os.environ.get("NONSENSE", "100")), **SEARCH)
+    @given(SEEDS)
+    def search(seed):
+        ways[check(case_of(seed))] += 1
+
+    search()
+    print(dict(ways))
+    assert ways["agreed"] > 0.1 * ways.total()
+    assert ways["agreed"] + ways["agreed, as warned"] > 0.5 * ways.total()

@@ -295,7 +295,10 @@ def test_the_command_says_its_version(tmp_path):
         (["benchmark", "--config", "e.toml"], "This benchmark has 360,000 passes; 100,000 at most"),
         (["benchmark", "--config", "f.toml"], r"'seed' is not known: did you mean 'seeds'\.$"),
         (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, as \[250\]\.$"),
-        (["benchmark", "--config", "none.toml"], "The benchmark file none.toml does not exist; give a TOML file"),
+        (
+            ["benchmark", "--config", "none.toml"],
+            "The benchmark file none.toml does not exist; give a TOML file",
+        ),
         (["train", "h.toml"], r"h.toml: unknown algorithm \['ppo'\]: did you mean 'ppo'"),
         (["train", "i.toml"], r"i.toml: \[environment\]: unknown id 3: known are Pantograph-v0"),
         (["train", "j.toml"], "key 'lanes' must be less than or equal to 65536"),

@@ -27,7 +27,7 @@ def chosen(runs, **numerics):
 
 def test_grid_and_step_go_by_the_slowest_and_the_fastest_train():
     ordinary, near_the_waves, slow = (chosen(runs(speed)) for speed in (300, 400, 60))
-    assert ordinary == Resolution(0.25, 1.25e-3)
+    assert ordinary == Resolution(0.25, 1e-3)
     assert near_the_waves.spacing == GRIDS[-1][1]
     assert slow.time_step < ordinary.time_step
     both = chosen(runs(60, 400))
@@ -39,7 +39,7 @@ def test_the_control_interval_is_a_whole_number_of_steps():
     for interval in (0.01, 0.004, 0.0017):
         step = chosen(runs(300, control_interval=interval)).time_step
         assert interval / step == pytest.approx(round(interval / step))
-        assert step <= 1.25e-3
+        assert step <= 1e-3
 
 
 def test_short_waves_are_passed_in_eight_steps_and_deep_ones_want_a_finer_grid():
@@ -62,7 +62,7 @@ def test_a_step_that_cannot_carry_the_waves_is_refused():
 
 @pytest.mark.parametrize(
     ("settings", "error"),
-    [({"spacing": 0.5}, 8), ({"time_step": 2.5e-3}, 6), ({"speed_kmh": 400, "spacing": 0.25}, 8)],
+    [({"spacing": 0.5}, 8), ({"time_step": 2.5e-3}, 9), ({"speed_kmh": 400, "spacing": 0.25}, 8)],
     ids=str,
 )
 def test_what_is_coarser_than_needed_is_used_with_a_warning_of_the_error(settings, error):
@@ -100,6 +100,6 @@ def test_figures_are_within_one_per_cent_of_converged(name, speed):
     """Of the maximum and the minimum in per cent of the mean force, of contact loss in points."""
     full, fast = lines.check_line(name, speed)
     assert abs(full.std) < 1.0
-    assert max(abs(full.max), abs(full.min)) < 1.7
+    assert max(abs(full.max), abs(full.min)) < 0.01 * full.mean
     assert abs(full.contact_loss) < 0.1
     assert full.spacing <= fast.spacing

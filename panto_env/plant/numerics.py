@@ -14,6 +14,8 @@ from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
+WINDOW = {"full": 10, "fast": 8}
+"""Spans computed about the train, by accuracy."""
 
 
 class Numerics(Settings):
@@ -31,10 +33,11 @@ class Numerics(Settings):
         None,
         description="grid of the flexible catenary (m), instead of the one that the accuracy asks for",
     )
-    window: int = Field(
-        8,
+    window: int | None = Field(
+        None,
         description="spans of the flexible catenary computed about the train, of an even number one more "
-        "ahead than behind; 0: the whole line",
+        f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
+        "0: the whole line",
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
@@ -42,10 +45,15 @@ class Numerics(Settings):
 
     @field_validator("window")
     @classmethod
-    def _wide_enough(cls, value: int) -> int:
-        if value != 0 and value < 3:
+    def _wide_enough(cls, value: int | None) -> int | None:
+        if value is not None and value != 0 and value < 3:
             raise ValueError("must be a number of spans from 3 up, or 0 for the whole line")
         return value
+
+    @property
+    def window_in_use(self) -> int:
+        """The window asked for, or that of the accuracy; 0: the whole line."""
+        return WINDOW[self.accuracy] if self.window is None else self.window
 
 
 class Runs(NamedTuple):

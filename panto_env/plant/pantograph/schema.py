@@ -13,7 +13,7 @@ Mass = Annotated[float, Between(0.1, 200, "kg")]
 Spring = Annotated[float, Between(0, 1e7, "N/m")]
 Damper = Annotated[float, Between(0, 1e5, "N s/m")]
 
-HARD_STIFFNESS, HARD_DAMPING = 250e3, 300.0
+HARD_STIFFNESS, HARD_DAMPING = 100e3, 300.0
 """Of a contact (N/m, N s/m) beyond which it needs a finer grid: see ``PantographData.hard_contact``."""
 STIFFEST_CONTACT = 1e6
 """Contact spring (N/m): beyond it, rounding and a moving point of contact can make a force that grows."""

@@ -37,13 +37,13 @@ def in_use(
     condition: LineCondition = NEW,
     name: str = reference.REFERENCE_MODEL,
 ) -> Numerics:
-    """The same with the grid and the time step that a line takes at a speed where they are None."""
+    """The same with grid, time step and window as a line takes them at a speed, where they are None."""
     line = load_catenary(name)
     assert isinstance(line, FlexibleCatenaryData)  # others have no grid
     speed = speed_kmh / 3.6
     with warnings.catch_warnings(action="ignore"):  # of coarse grids: what they cost is the question here
         chosen = resolution(line, numerics, Runs((speed, speed), conditions=(condition,)))
-    return numerics.model_copy(update=chosen._asdict())
+    return numerics.model_copy(update=chosen._asdict() | {"window": numerics.window_in_use})
 
 
 def converge(numerics: Numerics) -> list[dict[str, Any]]:

@@ -36,6 +36,7 @@ class LineCheck:
     accuracy: str
     spacing: float  # grid (m)
     time_step: float  # s
+    mean: float  # force, converged (N)
     converged: float  # standard deviation (N)
     std: float  # change (%)
     max: float  # change (N)
@@ -79,6 +80,7 @@ def check_line(name: str, speed_kmh: float) -> list[LineCheck]:
                 accuracy=numerics.accuracy,
                 spacing=used.spacing,
                 time_step=used.time_step,
+                mean=true.mean,
                 converged=true.std,
                 std=100 * (ours.std / true.std - 1),
                 max=ours.max - true.max,

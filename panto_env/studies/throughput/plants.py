@@ -20,7 +20,7 @@ COUNTED = "Pantograph-v0"
 SPEED_KMH = 300.0
 LINE_SPANS = 12
 """Spans of the flexible line whose settings are compared, so that the widest window has room."""
-WINDOWS = (3, 5, 7, 11, 0)
+WINDOWS = (3, 5, 8, 10, 0)
 """Spans computed about the train; 0: the whole line."""
 MODES = (10, 20, 40, 80)
 DISCRETISATIONS: tuple[dict[str, Any], ...] = (

@@ -52,7 +52,7 @@ def constants(
 
     Raises InputError where the nodes are too many.
     """
-    window = min(numerics.window or spans, spans)
+    window = min(numerics.window_in_use or spans, spans)
     step, damping = resolution.time_step, data.damping
     per_span = nodes_per_span(data, resolution.spacing)
     dx = data.span_length / per_span

@@ -16,21 +16,24 @@ import numpy as np
 
 from ....base.errors import AccuracyWarning, InputError
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
+from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 
-GRIDS = ((0.735, 0.25), (0.87, 0.15), (1.0, 0.125))
-"""Up to which share of the wave speed a grid (m) is fine enough."""
+GRIDS = ((0.69, 0.25, 1e-3), (0.735, 0.25, 0.625e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
+"""Up to which share of the wave speed a grid (m) is fine and a time step (s) is short enough."""
 NODES_HZ = 60.0
 """How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
 SLOWEST_HZ = 22.0
 """Below which (Hz) a ripple is in the filtered force."""
 FINEST_GRID = 0.1
 """Grid (m) that the slowest trains get."""
-SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1.25e-3))
+SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1e-3))
 """Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
 HARD_CONTACT_GRID = 0.15
 """Grid (m) that a hard contact wants."""
+HARD_CONTACT_ERROR = 20
+"""Of the standard deviation (%) where a hard contact is lost and the grid is ``HARD_CONTACT_GRID``."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
 FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
@@ -59,6 +62,15 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
     runs.check_wave(found.time_step)
     if not fast:
         _warn_if_coarse(data, found, wanted, runs)
+    if runs.hard_contact:
+        warnings.warn(
+            f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
+            f"N s/m, bounces in waves shorter than a grid of {found.spacing:.3g} m carries: where contact is "
+            f"lost, the standard deviation may be wrong by up to about {HARD_CONTACT_ERROR} %, and the "
+            "contact-loss ratio be several times too large; see what half the spacing gives.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
     passed = runs.speeds[0] / found.spacing
     if passed < SLOWEST_HZ:
         warnings.warn(
@@ -75,7 +87,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     """The coarsest grid and the longest step, stable or not, that give figures within 1 % of converged."""
     slow, quick = runs.speeds
     wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
-    spacing = next((grid for share, grid in GRIDS if quick <= share * wave_speed), GRIDS[-1][1])
+    spacing, longest = next((fine for share, *fine in GRIDS if quick <= share * wave_speed), GRIDS[-1][1:])
     spacing = min(spacing, max(slow / NODES_HZ, FINEST_GRID))
     deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
     if deep:  # two nodes in a wave that runs ahead of the train at the rate at which it passes the waves
@@ -84,7 +96,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
-    return Resolution(min(spacing, grid), min(step, runs.wave_step(SAMPLES_PER_WAVE)))
+    return Resolution(min(spacing, grid), min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)))
 
 
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
