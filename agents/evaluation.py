@@ -15,9 +15,9 @@ from panto_env.metrics import spans
 from panto_env.metrics.criterion import Criterion
 from panto_env.metrics.figures import Figures
 
-NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans")
+NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans", "run_in")
 """Arguments of an environment that a pass does not take over: it has a speed of its own and no reward, and
-runs until its start has died out."""
+runs from the line's start until that has died out."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Needs(Settings):
     """What a policy was trained with and needs in every task that it runs in."""
 
     observation: str  # kind of the layout
-    entries: tuple[tuple[str, float], ...]  # name and scale of each observation
+    entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
     channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
     force_limit: float  # N
     control_interval: float  # s
@@ -45,7 +45,7 @@ class Needs(Settings):
         """What an episode offers a policy."""
         return cls(
             observation=context.layout.kind,
-            entries=tuple((entry.name, entry.scale) for entry in context.layout.entries),
+            entries=tuple((entry.name, entry.centre, entry.scale) for entry in context.layout.entries),
             channels=context.channels,
             force_limit=context.force_limit,
             control_interval=context.control_interval,
@@ -55,7 +55,7 @@ class Needs(Settings):
 class Facts(Settings):
     """What a model file says about itself."""
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     version: str = __version__  # of panto_env
     algorithm: str
     seed: int

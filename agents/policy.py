@@ -23,6 +23,7 @@ class TrainedPolicy:
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
         """path: of the model file, for messages of errors."""
         self.path, self.facts, self._actor = path, facts, actor
+        self.observation = facts.needs.observation
 
     def reset(self, context: Context) -> None:
         """Raises InputError where the episode's observation, actuator or control interval differs."""
@@ -73,4 +74,4 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
 
 
 def _entries(needs: Needs) -> str:
-    return ", ".join(f"{name} / {scale:g}" for name, scale in needs.entries)
+    return ", ".join(f"{name} / {scale:g}" for name, _, scale in needs.entries)

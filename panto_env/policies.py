@@ -22,7 +22,10 @@ from .control.context import Context
 
 
 class Policy(Protocol):
-    """Anything with these two methods. It sees observations, never the environment."""
+    """Anything with these two methods. It sees observations, never the environment.
+
+    It may have an attribute ``observation``: the kind that it sees, unless a run is told another.
+    """
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
@@ -62,6 +65,12 @@ def find_policy(source: Any) -> Policy:
         f"Unknown policy '{source}': {suggest(name, list(known))}; or give the path of a model file "
         f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
     )
+
+
+def wishes(policy: Any) -> dict[str, Any]:
+    """Settings that a policy asks for, by name, where a run is not told others."""
+    observation = getattr(policy, "observation", None)
+    return {} if observation is None else {"observation": observation}
 
 
 def with_parameters(source: str, parameters: str) -> str:

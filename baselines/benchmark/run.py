@@ -18,6 +18,7 @@ from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
 from panto_env.policies import find_policy
 
+from .controls import policy_of
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
 from .statistics import Cell, compare
@@ -74,7 +75,7 @@ def run(
     passes = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
     check_passes(passes * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
-        find_policy(policy)
+        find_policy(policy_of(policy))
     spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
     jobs = [
         partial(run_pass, settings, line, covered, policy, speed, seed)

@@ -71,8 +71,9 @@ class BenchmarkSettings(Settings):
 
     policies: tuple[str, ...] = Field(
         ("passive", "p", "pd", "fb+ff"),
-        description="names, with parameters (p:gain=0.5) or without, or model files; "
-        "the passive pantograph always runs",
+        description="names, with parameters (p:gain=0.5) or without, or model files, or controls of such: "
+        "'blind of pd' sees nothing, 'tape of pd' plays its actions from another line; the passive "
+        "pantograph always runs",
     )
     lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, with pantograph and speeds")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(

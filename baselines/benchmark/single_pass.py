@@ -15,8 +15,9 @@ from panto_env import Trajectory, simulate
 from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.spans import within
-from panto_env.policies import Policy, find_policy
+from panto_env.policies import Policy, find_policy, wishes
 
+from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, policy_of
 from .settings import BenchmarkSettings, Line
 
 Array = NDArray[np.float64]
@@ -81,7 +82,14 @@ def drive(
     settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
 ) -> tuple[Trajectory, Array]:
     """The record of a pass, and the commanded forces (N), (control steps, actions)."""
-    recorder = _CommandRecorder(find_policy(policy), policy)
+    run, recorder = _record(settings, line, policy, speed_kmh, seed)
+    return run, recorder.forces()
+
+
+def _record(
+    settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
+) -> tuple[Trajectory, _CommandRecorder]:
+    recorder = _CommandRecorder(_player(settings, line, policy, speed_kmh, seed), policy)
     with _torch_on_one_thread():
         run = simulate(
             line.catenary,
@@ -96,7 +104,16 @@ def drive(
             distance=line.distance,
             record_droppers=False,
         )
-    return run, recorder.forces()
+    return run, recorder
+
+
+def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:
+    """The policy of a pass, which may be a control of another one."""
+    if policy.startswith(TAPE):
+        _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
+        return Tape(recorder.actions())
+    found = find_policy(policy_of(policy))
+    return Blind(found) if policy.startswith(BLIND) else found
 
 
 class _CommandRecorder:
@@ -104,6 +121,7 @@ class _CommandRecorder:
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self.name = policy, name
+        self.observation = wishes(policy).get("observation")
         self._actions: list[Array] = []
 
     def reset(self, context: Context) -> None:
@@ -115,9 +133,13 @@ class _CommandRecorder:
         self._actions.append(np.array(action, dtype=float))  # a copy: a policy may change it later
         return action
 
+    def actions(self) -> Array:
+        """What was asked for, (control steps, actions), each in -1..1."""
+        return np.clip(np.array(self._actions), -1, 1)
+
     def forces(self) -> Array:
         """Commanded forces (N), (control steps, actions)."""
-        return np.asarray(self._force_limit * np.clip(np.array(self._actions), -1, 1))
+        return self._force_limit * self.actions()
 
 
 @contextmanager

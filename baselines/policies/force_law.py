@@ -21,14 +21,10 @@ class ForceLaw(ABC):
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
         self.context = context
-        self._entries = {
-            entry.name: (index, entry.scale) for index, entry in enumerate(context.layout.entries)
-        }
 
     def read(self, observation: NDArray[np.float32], name: str) -> float:
         """Physical value of an entry of the observation."""
-        index, scale = self._entries[name]
-        return float(observation[index]) * scale
+        return self.context.layout.read(observation, name)
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""

@@ -16,7 +16,7 @@ from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
-from ..policies import Policy, errors_name, find_policy
+from ..policies import Policy, errors_name, find_policy, wishes
 
 _LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
 
@@ -36,7 +36,8 @@ def simulate(
     """Simulate one pass of a pantograph along a line.
 
     policy: None, a name ("pd"), a model file, or an object with reset and act, which is called by its
-    ``name`` if it has one, else by its class. seed: of the line's irregularity and the sensors' noise.
+    ``name`` if it has one, else by its class; it is shown the observation that it asks for by an attribute
+    ``observation``, unless that is among the settings. seed: of all that is drawn and the sensors' noise.
     progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
     spans over which a mean force is met, as ``Trajectory.summary`` takes them. catenary, pantograph,
     speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
@@ -50,16 +51,19 @@ def simulate(
     check_arguments(settings, RunSettings, "simulate")
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed must be a whole number from 0 up, not {seed!r}.")
-    given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh} | settings
+    driver = None if policy is None else find_policy(policy)
+    given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
+    given |= wishes(driver) | settings
     checked = far_enough(run_settings(given))
     trim = trim_of_pass(checked, seed, evaluated, passive_mean)
     task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, np.random.default_rng(seed))
-    if policy is None:
+    task.run_in()
+    if driver is None:
         task.run_passively()
         return task.trajectory(0, seed=seed)
     name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
-    run_policy(task, find_policy(policy), name, progress)
+    run_policy(task, driver, name, progress)
     return task.trajectory(0, policy=name, seed=seed)
 
 

@@ -19,18 +19,31 @@ from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .state import TASK_ROW
 
-MEASURED, FULL = "measured", "full"
-"""Kinds of observation: what a train can measure; that and more, free of noise and delay."""
+MEASURED, FULL, CENTRED = "measured", "full", "centred"
+"""Kinds of observation: what a train can measure; that and more, free of noise and delay; what it can
+measure and the nominal force, each entry with a mean near 0 and a spread near 1 in a passive run."""
+CENTRES = {
+    "head displacement": (0.056, 0.012),
+    "frame displacement": (0.084, 0.013),
+    "head velocity": (0.0, 0.1),
+    "frame velocity": (0.0, 0.1),
+    "speed": (70.0, 10.0),
+    "nominal force": (120.0, 30.0),
+}
+"""Centre and scale in "centred" of entries that "measured" has too, from passive runs of Pantograph-v0."""
+KINDS: dict[str, tuple[str, ...]] = {MEASURED: (MEASURED, FULL, CENTRED), FULL: (FULL,), CENTRED: (CENTRED,)}
+"""Kinds of observation that have an entry, by where it is said to belong."""
 
 
 class Entry(NamedTuple):
-    """One entry of an observation: physical value = entry * scale."""
+    """One entry of an observation: physical value = centre + entry * scale."""
 
     name: str
     scale: float
     unit: str
     writer: int  # place in WRITERS
     number: int = 0
+    centre: float = 0.0
 
 
 Writer = Callable[..., Any]
@@ -44,7 +57,7 @@ _LISTINGS: list[tuple[str, Listing]] = []
 def entry(
     kind: str, name: str, scale: float, unit: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator of the writer of one entry; kind: MEASURED, or FULL for the full observation alone."""
+    """Decorator of the writer of one entry; kind: MEASURED, which all have, or the only one that has it."""
     return entries(kind, lambda actuator, pantograph: [(name, scale, unit, 0)])
 
 
@@ -61,11 +74,20 @@ def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
 
 def entries_of(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
     """All entries of an observation, in order."""
-    return [
+    entries = [
         Entry(name, scale, unit, writer, number)
         for writer, (belongs_to, listing) in enumerate(_LISTINGS)
-        if kind == FULL or belongs_to == MEASURED
+        if kind in KINDS[belongs_to]
         for name, scale, unit, number in listing(actuator, pantograph)
+    ]
+    if kind != CENTRED:
+        return entries
+    centred = [entry for entry in entries if entry.name != "contact force"]  # its deviation stands for it
+    return [
+        entry._replace(centre=CENTRES[entry.name][0], scale=CENTRES[entry.name][1])
+        if entry.name in CENTRES
+        else entry
+        for entry in centred
     ]
 
 
@@ -107,6 +129,16 @@ def _span_cosine(episode, block, task, lane, number, i):
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, block, task, lane, number, i):
     return block[ROW.STRIDE, i] / episode.time_step
+
+
+@entry(CENTRED, "force deviation", 0.3, "of the nominal force")
+def _force_deviation(episode, block, task, lane, number, i):
+    return task[TASK_ROW.READING + READING.CONTACT_FORCE, i] / block[ROW.NOMINAL_FORCE, i] - 1.0
+
+
+@entry(CENTRED, "nominal force", 30.0, "N")
+def _nominal_force(episode, block, task, lane, number, i):
+    return block[ROW.NOMINAL_FORCE, i]
 
 
 def _actions(actuator: ActuatorSettings, _: PantographData) -> list[tuple[str, float, str, int]]:

@@ -27,9 +27,11 @@ class Episode(NamedTuple):
     truncated: Flags  # (lanes,): whether the end of the run is reached
     observation: NDArray[np.float32]  # (lanes, entries)
     writers: Index  # (entries, 2): writer and number of each entry of the observation
+    centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
     spans_per_metre: float  # 1/m
     time_step: float  # s
     control_steps: int  # plant steps in a control step
+    mean_share: float  # of the running mean of the force that a control step replaces
     loss_limit: int  # plant steps without contact that end an episode
     head_range: float  # height of the head (m), either way, that ends an episode

@@ -16,7 +16,7 @@ from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
 from ..plant.state import ROW
-from .entries import FULL, MEASURED, WRITERS, Entry, entries_of
+from .entries import CENTRED, FULL, MEASURED, WRITERS, Entry, entries_of
 from .state import MAX_ENTRIES, TASK_ROW
 
 BOUND = 10.0
@@ -36,6 +36,11 @@ class Layout:
         return np.array([entry.scale for entry in self.entries])
 
     @property
+    def centre(self) -> Array:
+        """What each entry, (entries,), is counted from, in its unit."""
+        return np.array([entry.centre for entry in self.entries])
+
+    @property
     def writers(self) -> Index:
         """Writer and number of each entry, (entries, 2)."""
         return np.array([(entry.writer, entry.number) for entry in self.entries])
@@ -48,12 +53,19 @@ class Layout:
         return names.index(name)
 
     def read(self, observation: NDArray[np.float32], name: str) -> float:
-        """Physical value of an entry. Raises InputError where there is none of this name."""
+        """Physical value of an entry. Raises InputError where there is none of this name.
+
+        "contact force" (N) may be asked for of every kind: from a deviation it is computed.
+        """
+        if name == "contact force" and self.kind == CENTRED:
+            nominal_force = self.read(observation, "nominal force")
+            return nominal_force * (1 + self.read(observation, "force deviation"))
         place = self.index(name)
-        return float(observation[place]) * self.entries[place].scale
+        entry = self.entries[place]
+        return entry.centre + float(observation[place]) * entry.scale
 
 
-OBSERVATIONS = (MEASURED, FULL)
+OBSERVATIONS = (MEASURED, FULL, CENTRED)
 """Kinds of observation."""
 
 
@@ -71,11 +83,11 @@ def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
     Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
     """
     names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
-    lines = ["def write(chosen, episode, block, task, begin, number, per_unit, row, count):"]
+    lines = ["def write(chosen, episode, block, task, begin, number, centre, per_unit, row, count):"]
     for place in range(len(writers)):
         value = f"writer_{place}(episode, block, task, (begin + i) & {NOT_NEGATIVE}, number, i)"
         lines += [f"    if chosen == {place}:", "        for i in range(count):"]
-        lines += [f"            row[i] = {value} * per_unit"]
+        lines += [f"            row[i] = ({value} - centre) * per_unit"]
     exec("\n".join(lines), names)
     write: Callable[..., Any] = subroutine(names["write"])
     return write
@@ -97,7 +109,8 @@ def observe(episode, sensors, block, task, begin, count):
         task[TASK_ROW.SPANS, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i] * episode.spans_per_metre
     for k in range(episode.writers.shape[0]):
         chosen, number = episode.writers[k, 0], episode.writers[k, 1]
-        _write(chosen, episode, block, task, begin, number, episode.per_unit[k], entries[k], count)
+        centre, per_unit = episode.centre[k], episode.per_unit[k]
+        _write(chosen, episode, block, task, begin, number, centre, per_unit, entries[k], count)
     for k in range(episode.writers.shape[0]):
         seen = episode.observation[begin : begin + count, k]
         for i in range(count):

@@ -11,16 +11,25 @@ from ..base.settings import NonNegative, Settings
 from ..plant.state import ROW
 from .state import TASK_ROW, TERM, TERMS
 
+MEAN_TIME = 1.0
+"""Time constant (s) of the running mean of the contact force: a few spans at speed."""
+
 
 class Reward(Settings):
     """Weights of the terms. A control step costs 1 for each term at: a mean deviation as large as
-    the nominal force; contact lost all along; full force; full force reversed within the step.
+    the nominal force; contact lost all along; full force; full force reversed within the step; a running
+    mean of the contact force that is wrong by the nominal force.
     """
 
     cost_function: NonNegative = Field(1.0, description="weight of CF, Eq. 14 of paper 1 (-)")
     contact_loss: NonNegative = Field(1.0, description="weight of CL, Eq. 13 of paper 1 (-)")
     effort: NonNegative = Field(0.0, description="weight of the squared action (-)")
     rate: NonNegative = Field(0.0, description="weight of the squared change of action (-)")
+    mean_force: NonNegative = Field(
+        0.0,
+        description=f"weight of the squared deviation of a running mean of the contact force, over "
+        f"{MEAN_TIME:g} s, from the nominal force (-)",
+    )
 
     @property
     def weights(self) -> Array:
@@ -35,6 +44,7 @@ def begin_terms(block, task, count):
         task[TASK_ROW.FORCE_BEFORE, i] = block[ROW.FORCE, i]
         task[TASK_ROW.COST, i] = 0.0
         task[TASK_ROW.LOSS_STEPS, i] = 0.0
+        task[TASK_ROW.SIGNED_DEVIATION, i] = 0.0
 
 
 @inlined
@@ -51,6 +61,7 @@ def add_sample_to_terms(block, task, count):
         task[TASK_ROW.LOSS_STEPS, i] += lost
         task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] = lost * (task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] + 1.0)
         task[TASK_ROW.FORCE_BEFORE, i] = force
+        task[TASK_ROW.SIGNED_DEVIATION, i] += force - nominal_force
 
 
 @inlined
@@ -74,14 +85,19 @@ def compute_reward(episode, block, task, begin, count):
             last_action[i] = action[i]
     for i in range(count):
         cost, loss_steps = 0.5 * task[TASK_ROW.COST, i], task[TASK_ROW.LOSS_STEPS, i]
-        stride = block[ROW.STRIDE, i]
+        stride, nominal_force = block[ROW.STRIDE, i], block[ROW.NOMINAL_FORCE, i]
+        change = task[TASK_ROW.SIGNED_DEVIATION, i] / steps - task[TASK_ROW.MEAN_DEVIATION, i]
+        task[TASK_ROW.MEAN_DEVIATION, i] += episode.mean_share * change
+        mean_deviation = task[TASK_ROW.MEAN_DEVIATION, i] / nominal_force
+        task[TASK_ROW.TERM + TERM.MEAN_FORCE, i] = mean_deviation * mean_deviation
         task[TASK_ROW.TERM + TERM.COST_FUNCTION, i] = stride * cost
         task[TASK_ROW.TERM + TERM.CONTACT_LOSS, i] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE, i]
         task[TASK_ROW.REWARD, i] = -(
-            weights[TERM.COST_FUNCTION] * cost / (block[ROW.NOMINAL_FORCE, i] * steps)
+            weights[TERM.COST_FUNCTION] * cost / (nominal_force * steps)
             + weights[TERM.CONTACT_LOSS] * loss_steps / steps
             + weights[TERM.EFFORT] * task[TASK_ROW.TERM + TERM.EFFORT, i]
             + weights[TERM.RATE] * task[TASK_ROW.TERM + TERM.RATE, i]
+            + weights[TERM.MEAN_FORCE] * task[TASK_ROW.TERM + TERM.MEAN_FORCE, i]
         )
 
 

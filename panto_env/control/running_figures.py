@@ -30,9 +30,15 @@ class RunningFigures(NamedTuple):
         self.peak[lane] = -np.inf
 
     def figures(
-        self, lane: int, nominal_force: float, stride: float, time_step: float, supports: Array
+        self,
+        lane: int,
+        nominal_force: float,
+        stride: float,
+        time_step: float,
+        supports: Array,
+        steps: float,
     ) -> Figures:
-        """Figures of one lane's run so far; supports: their positions (m)."""
+        """Figures of one lane's run so far; supports: their positions (m); steps: since the line's start."""
 
         def row(name: TaskRow) -> float:
             return float(self.table[name - EPISODE_ROWS, lane])
@@ -41,7 +47,9 @@ class RunningFigures(NamedTuple):
         shift = row(TaskRow.DEVIATION) / samples
         mean = nominal_force + shift
         std = float(np.sqrt(max(row(TaskRow.SQUARED_DEVIATION) / samples - shift**2, 0.0)))
-        passed = self.peak[lane, : len(supports)][supports < (samples - 0.5) * stride + 1e-6]
+        peak = self.peak[lane, : len(supports)]
+        first, last = (steps - samples - 0.5) * stride, (steps - 0.5) * stride  # where the train was
+        passed = peak[(supports > first - 1e-6) & (supports < last + 1e-6)]
         rate = np.sqrt(row(TaskRow.SQUARED_CHANGE) / (samples - 1)) / time_step if samples > 1 else 0.0
         return Figures(
             mean=float(mean),

@@ -134,6 +134,11 @@ class RunSettings(Numerics):
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
         "standard's largest; by default as the pantograph says: its force applied, or met by the mean",
     )
+    run_in: Annotated[float, Between(0, 20, "spans")] = Field(
+        0.0,
+        description="spans that the train runs without control before the episode begins: drawn per run from "
+        "0 up to this",
+    )
     pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
     )

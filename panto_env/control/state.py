@@ -18,6 +18,7 @@ class Term(IntEnum):
     CONTACT_LOSS = 1  # %
     EFFORT = 2  # -
     RATE = 3  # -
+    MEAN_FORCE = 4  # -
 
 
 TERMS = tuple(term.name.lower() for term in Term)
@@ -33,8 +34,9 @@ class TaskRow(IntEnum):
     LOSS_STEPS_IN_A_ROW = 2  # plant steps since contact was lost
     REWARD = 3  # of the last control step
     TERM = 4  # of the last control step, one row per term
+    MEAN_DEVIATION = TERM + len(Term)  # running mean of the contact force less the nominal one (N)
     # Of ``RunningFigures.table``.
-    FILTER_STATE = TERM + len(Term)  # of EN 50317's filter, two rows for each of three sections
+    FILTER_STATE = MEAN_DEVIATION + 1  # of EN 50317's filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6
     DEVIATION = FILTER_STATE + 7  # sum of the filtered contact force less the nominal one (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum (N^2)
@@ -51,7 +53,8 @@ class TaskRow(IntEnum):
     LOSS_STEPS = FILTER_STATE + 19  # plant steps without contact in this control step
     FILTERED_FORCE = FILTER_STATE + 20  # contact force (N)
     SPANS = FILTER_STATE + 21  # travelled since the start (-)
-    READING = FILTER_STATE + 22  # what the sensors read, one row per ``Reading``
+    SIGNED_DEVIATION = FILTER_STATE + 22  # sum of the contact force less the nominal one (N)
+    READING = FILTER_STATE + 23  # what the sensors read, one row per ``Reading``
     ENTRY = READING + len(Reading)  # of the observation
 
 

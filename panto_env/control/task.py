@@ -28,6 +28,7 @@ from .identity import identity
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
 from .observation import layout
+from .reward import MEAN_TIME
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
@@ -97,6 +98,7 @@ class Task:
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
         self._all_lanes = np.arange(lanes)
+        self._steps_of_run_in = np.zeros(lanes, dtype=np.int64)  # control steps still to be made
         self._record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
@@ -115,7 +117,7 @@ class Task:
 
     def _bind(self) -> None:
         """Look at the arrays by name, and bind the kernels to them."""
-        self.reward_and_terms = self.episode.table[TaskRow.REWARD : EPISODE_ROWS, : self.lanes]
+        self.reward_and_terms = self.episode.table[TaskRow.REWARD : TaskRow.MEAN_DEVIATION, : self.lanes]
         self._action = self.episode.action
         self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
         packed = pack(*self.plant.arrays, *self._arrays)
@@ -146,10 +148,12 @@ class Task:
             truncated=np.zeros(lanes, dtype=np.bool_),
             observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
             writers=self.layout.writers,
+            centre=self.layout.centre,
             per_unit=1 / self.layout.scale,
             spans_per_metre=1.0 / float(self.plant.catenary.span_length),
             time_step=time_step,
             control_steps=self.control_steps,
+            mean_share=1 - math.exp(-self.control_interval / MEAN_TIME),
             loss_limit=round(LOSS_TIME / time_step),
             head_range=HEAD_RANGE,
         )
@@ -174,13 +178,19 @@ class Task:
         return self._steps(self.speed_range[0]) // self.control_steps
 
     def reset(self, lane: int, random: np.random.Generator) -> None:
-        """Start an episode in one lane: draw its speed, its line and its pantograph."""
+        """Start an episode in one lane: draw its speed, its line, its pantograph and how far it runs in.
+
+        Lanes that run in are at the beginning of their episodes only after ``run_in``.
+        """
         low, high = self.speed_range
         speed = low if low == high else float(random.uniform(low, high))
         plant, episode, scatter = self.plant, self.episode, self.settings.pantograph_scatter
         line = draw(self.settings.line_condition, random, len(plant.model.droppers))
         own = with_scatter(plant.pantograph, scatter, random) if scatter else None
         plant.start(lane, speed, line, own, self._static_force(speed))
+        if self.settings.run_in > 0:
+            way = random.uniform(0, self.settings.run_in) * plant.catenary.span_length
+            self._steps_of_run_in[lane] = round(way / (speed * self.control_interval))
         self.speed[lane] = speed
         end = self._steps(speed)
         column = episode.table[:, lane]
@@ -200,6 +210,26 @@ class Task:
             self._noise.start(lane, random)
             self._noise.write(self.sensors.noise, np.array([lane]))
         self._observe_start(lane, lane + 1)
+
+    def run_in(self) -> None:
+        """Run lanes just reset without control as far as drawn; the figures of their episodes begin there.
+
+        Raises InputError where a run leaves the plant's valid range before its episode has begun.
+        """
+        running, left = self._steps_of_run_in > 0, self._steps_of_run_in
+        begun, idle = np.flatnonzero(running), np.zeros_like(self._action)
+        while running.any():
+            self.step(idle, skip=~running)
+            left[running] -= 1
+            running = left > 0
+        for lane in begun.tolist():
+            if self.episode.terminated[lane]:
+                raise InputError(self.ending(lane))
+            column, end = self.episode.table[:, lane], self.end(lane)
+            column[:] = 0.0
+            column[TaskRow.END] = end
+            column[TaskRow.DISTANCE] = (end - self.plant.steps_done[lane]) * self.plant.stride[lane]
+            self.running.clear(lane)
 
     def _static_force(self, speed: float) -> float | None:
         """Static force (N) at a speed (m/s) where a mean force is to be met, else None."""
@@ -262,7 +292,8 @@ class Task:
         """
         plant = self.plant
         nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
-        figures = self.running.figures(lane, nominal_force, stride, plant.time_step, plant.model.supports)
+        steps, supports = float(plant.steps_done[lane]), plant.model.supports
+        figures = self.running.figures(lane, nominal_force, stride, plant.time_step, supports, steps)
         deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
         self._refuse_divergence(lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
         return figures

@@ -34,7 +34,7 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     Each key holds an array with a value per lane, or a dictionary of such; "_key" marks who has it.
     """
     _, rewards, sample, position, speed_kmh, _, _, lanes = answer
-    _, cost_function, contact_loss, effort, rate = rewards
+    _, cost_function, contact_loss, effort, rate, mean_force = rewards
     return {
         "contact_force": sample[CONTACT_FORCE],
         "_contact_force": lanes,
@@ -59,6 +59,8 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
             "_effort": lanes,
             "rate": rate,
             "_rate": lanes,
+            "mean_force": mean_force,
+            "_mean_force": lanes,
         },
         "_reward_terms": lanes,
     }

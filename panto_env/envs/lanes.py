@@ -55,6 +55,7 @@ class Lanes:
             self._others.append((task, lanes.copy()))
         for lane in np.flatnonzero(lanes).tolist():
             task.reset(lane, random[lane])
+        task.run_in()
 
     def step(self, action: Array, waiting: Flags | None) -> None:
         """One control step of all lanes, but those that wait, under actions, (lanes, actions)."""

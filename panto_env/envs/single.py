@@ -17,7 +17,7 @@ from ..control import Context, Task
 from ..control.arguments import table, takes
 from ..control.observation import BOUND, layout
 from ..control.settings import default, read_settings
-from ..control.state import EPISODE_ROWS, TaskRow
+from ..control.state import TaskRow
 from ..metrics.trajectory import Trajectory
 from ..plant.actuators import actuator_settings
 from ..plant.state import Row
@@ -144,6 +144,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if task is not self.task:
             self._watch(task)
         task.reset(0, self.np_random)
+        task.run_in()
         self._speed_kmh = 3.6 * float(task.speed[0])
         self._running = True
         return self._observation.copy(), first_info(task)
@@ -154,7 +155,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._shape = episode.action.shape[1:]
         self._observation = episode.observation[0]
         self._plant_column = task.plant.run.table[0, : STRIDE + 1, 0]
-        self._reward_and_terms = episode.table[TaskRow.REWARD : EPISODE_ROWS, 0]
+        self._reward_and_terms = episode.table[TaskRow.REWARD : TaskRow.MEAN_DEVIATION, 0]
         self._terminated, self._truncated = episode.terminated, episode.truncated
 
     def __getstate__(self) -> dict[str, Any]:
@@ -174,7 +175,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task.step(checked(action, self._shape))
         terminated, truncated = self._terminated.item(), self._truncated.item()
         plant = self._plant_column.tolist()
-        reward, cost_function, contact_loss, effort, rate = self._reward_and_terms.tolist()
+        reward, cost_function, contact_loss, effort, rate, mean_force = self._reward_and_terms.tolist()
         info: dict[str, Any] = {
             "contact_force": plant[CONTACT_FORCE],
             "head": plant[HEAD],
@@ -188,6 +189,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 "contact_loss": contact_loss,
                 "effort": effort,
                 "rate": rate,
+                "mean_force": mean_force,
             },
             "figures": FIGURES_TO_COME.copy(),
         }

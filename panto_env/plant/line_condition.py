@@ -79,6 +79,8 @@ class LineCondition(Settings):
 LINE_CONDITIONS = {
     "new": LineCondition(),
     "fair": LineCondition(irregularity=1.0),
+    # EN 50119 lets neighbouring droppers differ by 10 mm (recalled), taken as two standard deviations.
+    "as-built": LineCondition(irregularity=1.0, dropper_scatter=5e-3),
     # Wear waves: the published range is 0.2-3 mm at 0.4-1.2 m.
     "worn": LineCondition(irregularity=1.0, wear_depth=0.3e-3),
 }
