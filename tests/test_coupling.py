@@ -91,7 +91,7 @@ def test_a_stiff_contact_loses_no_contact_by_grid_or_step(catenary, pantograph, 
     ours = simulate(catenary, pantograph, speed, record_droppers=False, accuracy=accuracy).summary((4, 9))
     full = accuracy == "full"
     assert ours.std == pytest.approx(true.std, rel=0.01 if full else 0.07)
-    assert ours.contact_loss == pytest.approx(true.contact_loss, abs=0.1 if full else 2.5)
+    assert ours.contact_loss == pytest.approx(true.contact_loss, rel=0.02, abs=0.1 if full else 2.5)
     assert ours.mean == pytest.approx(true.mean, rel=0.005)
 
 

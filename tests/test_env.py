@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 import panto_env
 from panto_env import InputError
-from panto_env.envs import IDS
+from panto_env.envs import BARE, IDS
 from panto_env.envs.infos import told
 
 
@@ -43,7 +43,7 @@ def test_gymnasium_and_stable_baselines_find_no_fault(name, settings):
 
 @pytest.mark.parametrize("name", IDS)
 def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
-    env = gymnasium.make(name, speed_kmh=320)
+    env = gymnasium.make(name, speed_kmh=320, run_in=0.0)
     _, infos, terminated = run_episode(env)
     assert not terminated
     run = env.unwrapped.trajectory
@@ -127,7 +127,7 @@ def test_seed_changes_noise_speed_and_line():
 def test_id_works_in_a_fresh_process_by_module_name():
     code = "import gymnasium; print(gymnasium.make('panto_env:Pantograph-v0').reset(seed=0)[0].shape)"
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert result.stdout.strip() == "(9,)"
+    assert result.stdout.strip() == "(10,)"
 
 
 def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
@@ -141,7 +141,7 @@ def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
 
 
 def test_observation_shows_what_it_says():
-    env = gymnasium.make("Pantograph-v0").unwrapped
+    env = gymnasium.make("Pantograph-v0", **BARE).unwrapped
     env.reset(seed=0)
     observation, _, _, _, info = env.step(np.array([0.5], dtype=np.float32))
     layout = env.context.layout
@@ -155,7 +155,9 @@ def test_observation_shows_what_it_says():
 
 
 def test_sensor_delay_and_noise():
-    quiet, late = (gymnasium.make("Pantograph-v0", sensors={"delay": delay}) for delay in (0.0, 0.0105))
+    quiet, late = (
+        gymnasium.make("Pantograph-v0", **BARE | {"sensors": {"delay": delay}}) for delay in (0.0, 0.0105)
+    )
     quiet.reset(seed=0)
     late.reset(seed=0)
     before = None
@@ -165,7 +167,7 @@ def test_sensor_delay_and_noise():
         if before is not None:
             np.testing.assert_array_equal(delayed[:5], before[:5])
         before = now
-    noisy = gymnasium.make("Pantograph-v0", sensors={"force_noise": 2.0})
+    noisy = gymnasium.make("Pantograph-v0", **BARE | {"sensors": {"force_noise": 2.0}})
     noisy.reset(seed=0)
     quiet.reset(seed=0)
     errors = [
@@ -188,7 +190,7 @@ def test_sensor_delay_and_noise():
     ],
 )
 def test_bad_action_is_refused_and_changes_nothing(action):
-    env, twin = (gymnasium.make("Pantograph-v0").unwrapped for _ in range(2))
+    env, twin = (gymnasium.make("Pantograph-v0", **BARE).unwrapped for _ in range(2))
     env.reset(seed=0)
     twin.reset(seed=0)
     good = np.array([0.3], dtype=np.float32)
@@ -241,7 +243,7 @@ def test_unknown_argument_is_a_type_error_as_in_python(kind):
 
 
 def test_options_hold_for_one_episode():
-    env = gymnasium.make("Pantograph-v0").unwrapped
+    env = gymnasium.make("Pantograph-v0", **BARE).unwrapped
     _, info = env.reset(seed=0, options={"speed_kmh": 250})
     assert info["speed_kmh"] == pytest.approx(250)
     _, info = env.reset()
@@ -257,7 +259,7 @@ def test_options_hold_for_one_episode():
     ],
 )
 def test_bad_options_leave_the_episode_as_it_was(options, message):
-    env = gymnasium.make("Pantograph-v0").unwrapped
+    env = gymnasium.make("Pantograph-v0", **BARE).unwrapped
     env.reset(seed=0)
     env.step(np.zeros(1, np.float32))
     with pytest.raises(InputError, match=message):

@@ -87,7 +87,7 @@ def test_tables_say_which_spans_are_evaluated():
     assert "spans 10-19" in table.splitlines()[0]
     rows = json.loads(shown("sweep", "speed_kmh=250,300", *light, "--json"))["rows"]
     assert [row["spans"] for row in rows] == ["10-19", "10-19"]
-    evaluated = shown("evaluate", "p", *light, "--speed", "250")
+    evaluated = shown("evaluate", "p", *light, "--speed", "250", "--line-condition", "new")
     assert "spans 10-19" in evaluated.splitlines()[0]
 
 
@@ -95,7 +95,9 @@ def test_an_episode_is_as_long_as_its_line(reference_run):
     """Only passes go on; an environment's episode stays at its line's end."""
     import gymnasium
 
-    env = gymnasium.make("panto_env:Pantograph-v0").unwrapped
+    from panto_env.envs import BARE
+
+    env = gymnasium.make("panto_env:Pantograph-v0", **BARE).unwrapped
     env.reset(seed=0)
     ended = False
     while not ended:

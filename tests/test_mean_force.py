@@ -166,14 +166,15 @@ def test_it_is_written_whole_or_not_at_all(empty_store, monkeypatch):
 
 @pytest.mark.parametrize("speeds", [300.0, (290.0, 301.0)])
 def test_an_environment_meets_it_at_any_speed_it_draws(speeds):
-    env = gymnasium.make("panto_env:Pantograph-v0", **LIGHT, speed_kmh=speeds, mean_force=60.0).unwrapped
+    settings = {**LIGHT, "speed_kmh": speeds, "mean_force": 60.0}
+    env = gymnasium.make("panto_env:PantographStiffness-v0", **settings).unwrapped
     _, info = env.reset(seed=5)
     applied, speed = env.context.nominal_force, info["speed_kmh"]
     exact = simulate(**LIGHT, speed_kmh=speed, mean_force=60.0).nominal_force
     assert applied == pytest.approx(exact, abs=0.3)
     assert applied > 65.0
     lanes = gymnasium.make_vec(
-        "panto_env:Pantograph-v0", num_envs=2, **LIGHT, speed_kmh=speeds, mean_force=60.0
+        "panto_env:PantographStiffness-v0", num_envs=2, **LIGHT, speed_kmh=speeds, mean_force=60.0
     )
     lanes.reset(seed=5)
     assert lanes.unwrapped.task.plant.nominal_force[0] == applied
@@ -181,7 +182,7 @@ def test_an_environment_meets_it_at_any_speed_it_draws(speeds):
 
 def test_an_environment_is_not_slowed_down_before_it_is_used(empty_store):
     _, runs = empty_store
-    env = gymnasium.make("panto_env:Pantograph-v0", **LIGHT, mean_force=60.0)
+    env = gymnasium.make("panto_env:PantographStiffness-v0", **LIGHT, mean_force=60.0)
     assert not runs
     env.reset(seed=0)
     assert runs

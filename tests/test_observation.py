@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.envs import BARE
 
 from .pantograph_alone import means, replay, rest
 
@@ -148,7 +149,7 @@ def test_info_tells_the_last_time_step(episode):
 def test_measured_observation_is_the_beginning_of_the_full_one():
     settings = {"actuator": {"place": "both"}, "distance": 50.0}
     full, measured = (
-        gymnasium.make("panto_env:Pantograph-v0", observation=kind, **settings).unwrapped
+        gymnasium.make("panto_env:Pantograph-v0", **BARE | {"observation": kind} | settings).unwrapped
         for kind in ("full", "measured")
     )
     seen, _ = measured.reset(seed=0)

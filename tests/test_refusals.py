@@ -19,6 +19,7 @@ from panto_env.cli import make_app
 from panto_env.control import Task
 from panto_env.control.memory import SHARE
 from panto_env.control.settings import run_settings
+from panto_env.envs import BARE
 from panto_env.plant.pantograph import build
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome
@@ -85,7 +86,7 @@ def test_a_run_that_diverges_gives_no_figures(diverging):
 
 
 def test_an_episode_that_diverges_ends_with_an_error(diverging):
-    env = gymnasium.make("panto_env:Pantograph-v0", **diverging)
+    env = gymnasium.make("panto_env:Pantograph-v0", **BARE | diverging)
     env.reset(seed=0)
     still, ended = np.zeros(1, dtype=np.float32), False
     with pytest.raises(InputError, match="diverged"):  # noqa: PT012 - at which step is not known
@@ -303,7 +304,7 @@ def test_the_command_says_its_version(tmp_path):
         (["train", "i.toml"], r"i.toml: \[environment\]: unknown id 3: known are Pantograph-v0"),
         (["train", "j.toml"], "key 'lanes' must be less than or equal to 65536"),
         (["train", "k.toml"], r"lanes x n_steps = 200,000,000 must be at most 50,000,000"),
-        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 180,000 passes; 100,000 at most"),
+        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 540,000 passes; 100,000 at most"),
         (["list", "p.toml"], "p.toml is not a valid entry: key 'masses' must hold at most 8 values"),
     ],
 )

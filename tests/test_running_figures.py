@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary
+from panto_env.envs import BARE
 from panto_env.envs.infos import told
 
 SPAN = load_catenary("ohl-three-span").span_length
@@ -14,7 +15,7 @@ WITH_SUPPORTS = {"catenary": "ohl-three-span", "pantograph": "dsa350", "distance
 
 def make(settings):
     actuator = {"place": "both", "force_limit": 300.0}
-    return gymnasium.make("panto_env:Pantograph-v0", actuator=actuator, **settings).unwrapped
+    return gymnasium.make("panto_env:Pantograph-v0", **BARE | {"actuator": actuator} | settings).unwrapped
 
 
 def play(env, act):

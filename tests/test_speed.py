@@ -44,7 +44,7 @@ def test_every_plant_and_environment_is_measured(result):
 
 def test_cost_is_measured_over_spans_modes_grid_and_cores(result):
     scaling = result["scaling"]
-    assert [row["spans"] for row in scaling["spans"]] == [3, 5, 7, 11, 12]
+    assert [row["spans"] for row in scaling["spans"]] == [3, 5, 8, 10, 12]
     assert [row["modes"] for row in scaling["modes"]] == [10, 20, 40, 80]
     assert {row["catenary"] for row in scaling["modes"]} == {"ohl-three-span"}
     assert len({(r["speed_kmh"], r["accuracy"], r["precision"]) for r in scaling["discretisation"]}) == 8

@@ -5,12 +5,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import ClipAction, NormalizeObservation, RecordEpisodeStatistics
 
 from panto_env import InputError
-from panto_env.envs import IDS
+from panto_env.envs import BARE, IDS
 
 LIVELY = {"sensors": "realistic", "actuator": "realistic", "line_condition": "fair", "speed_kmh": (250, 300)}
 
 
-def make(name="Pantograph-v0", lanes=3, **settings):
+def make(name=None, lanes=3, **settings):
+    """By default Pantograph-v0 in its bare form."""
+    if name is None:
+        name, settings = "Pantograph-v0", BARE | settings
     return gymnasium.make_vec(f"panto_env:{name}", num_envs=lanes, **settings)
 
 

@@ -101,7 +101,9 @@ class Task:
         self._steps_of_run_in = np.zeros(lanes, dtype=np.int64)  # control steps still to be made
         self._record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
-        rows = self._steps(self.speed_range[0]) + 1 if keep_samples else 1
+        slow = self.speed_range[0]
+        longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
+        rows = self._steps(slow, longest) + 1 if keep_samples else 1
         supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
         self.memory = record_size(lanes, rows - 1, supports, droppers)
         check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
@@ -165,10 +167,13 @@ class Task:
             self.plant.check_speed(speed)
         return low, high
 
-    def _steps(self, speed: float) -> int:
-        """Plant steps of an episode: whole control steps that cover the distance and stay on the line."""
+    def _steps(self, speed: float, run_in: int = 0) -> int:
+        """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
+
+        run_in: control steps before the episode begins.
+        """
         stride = speed * self.control_interval
-        wanted = math.ceil(self.distance / stride - 1e-9)
+        wanted = run_in + math.ceil(self.distance / stride - 1e-9)
         possible = self.plant.model.length / stride + 1e-9
         return max(1, math.floor(min(wanted, possible))) * self.control_steps
 
@@ -188,11 +193,13 @@ class Task:
         line = draw(self.settings.line_condition, random, len(plant.model.droppers))
         own = with_scatter(plant.pantograph, scatter, random) if scatter else None
         plant.start(lane, speed, line, own, self._static_force(speed))
+        run_in = 0
         if self.settings.run_in > 0:
             way = random.uniform(0, self.settings.run_in) * plant.catenary.span_length
-            self._steps_of_run_in[lane] = round(way / (speed * self.control_interval))
+            run_in = round(way / (speed * self.control_interval))
         self.speed[lane] = speed
-        end = self._steps(speed)
+        end = self._steps(speed, run_in)
+        self._steps_of_run_in[lane] = min(run_in, end // self.control_steps - 1)
         column = episode.table[:, lane]
         column[:] = 0.0
         column[TaskRow.END] = end
@@ -399,7 +406,7 @@ def _spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    wanted = math.ceil(settings.distance / line.span_length) + 1
+    wanted = math.ceil(settings.distance / line.span_length + settings.run_in) + 1
     if wanted > MOST_SPANS:
         longest = (MOST_SPANS - 1) * line.span_length
         raise InputError(

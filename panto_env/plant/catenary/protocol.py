@@ -93,8 +93,8 @@ def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> N
     """Raise InputError where a line without droppers and supports is to have defects."""
     if any(condition.defective for condition in conditions):
         raise InputError(
-            "Only a flexible catenary has droppers and supports that can be defective, and line "
-            f"'{data.name}' is none."
+            "Only a flexible catenary has droppers and supports that can be defective or scatter, and line "
+            f"'{data.name}' is none; take another line_condition, such as 'fair'."
         )
 
 
