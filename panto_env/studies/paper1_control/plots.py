@@ -23,7 +23,6 @@ from .cases import (
     SPANS,
     SPEEDS,
     STRONG,
-    STRONG_DAMPING,
     THETA,
     THETAS,
     Case,
@@ -114,7 +113,7 @@ def over_speed(results: Results, number: int, name: str, caption: str) -> Figure
         "feedback and frame damping (pd), realistic actuator": (
             [sampled(v, shipped, "realistic") for v in SPEEDS], "tab:olive", "d:"
         ),
-        f"feedback and damping of {STRONG_DAMPING:g} N s/m, realistic actuator": (
+        f"{STRONG}, realistic actuator": (
             [sampled(v, strong, "realistic") for v in SPEEDS], "tab:purple", "v:"
         ),
     }  # fmt: skip
