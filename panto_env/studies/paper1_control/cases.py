@@ -153,12 +153,10 @@ def _cases() -> Iterator[Case]:
     for fine, speed in product((False, True), SHOWN_SPEEDS):
         for line, policy in product((LINE, OTHER_LINE), PARTS.values()):
             yield Case(speed, policy, line, fine=fine)
-        for policy in ON_A_TRAIN.values():
-            yield sampled(speed, policy, "realistic", fine)
+        for line, policy in product((LINE, OTHER_LINE), ON_A_TRAIN.values()):
+            yield sampled(speed, policy, "realistic", fine, line)
     for fine, speed, gain, damping in product((False, True), FAST_SPEEDS, DAMPED_GAINS, DAMPINGS):
         yield sampled(speed, damped(gain, damping), "realistic", fine)
-    for speed, policy in product(SHOWN_SPEEDS, ON_A_TRAIN.values()):
-        yield sampled(speed, policy, "realistic", line=OTHER_LINE)
     for (actuator, interval), speed, gain in product(LOOPS, SHOWN_SPEEDS, GAINS):
         yield Case(speed, control(gain), actuator=actuator, control_interval=interval)
     for actuator, speed, policy in product(ACTUATORS, SHOWN_SPEEDS, ON_A_TRAIN.values()):

@@ -238,8 +238,8 @@ def _fine(results: Results) -> Table:
         for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, PARTS.items())
     ]
     named += [
-        (f"{LINE}, realistic: {name}", sampled(speed, policy, "realistic"))
-        for speed, (name, policy) in product(SHOWN_SPEEDS, ON_A_TRAIN.items())
+        (f"{line}, realistic: {name}", sampled(speed, policy, "realistic", line=line))
+        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, ON_A_TRAIN.items())
     ]
     rows = []
     for name, case in named:
