@@ -25,11 +25,14 @@ class CostOverAngle:
     cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
 
 
-def cost_over_angle(results: Mapping[Case, Result], speed: int, gain: float, reading: str) -> CostOverAngle:
+def cost_over_angle(
+    results: Mapping[Case, Result], speed: int, gain: float, reading: str, fine: bool = False
+) -> CostOverAngle:
     """At one speed (km/h)."""
 
     def cost(amplitude: float, theta: float) -> float:
-        return _result(results, speed, gain, amplitude, theta, reading).figures.cost_function
+        policy = control(gain, amplitude, theta, reading)
+        return results[Case(speed, policy, fine=fine)].figures.cost_function
 
     costs = tuple(cost(AMPLITUDE, theta) for theta in THETAS)
     least = min(costs)
@@ -37,35 +40,30 @@ def cost_over_angle(results: Mapping[Case, Result], speed: int, gain: float, rea
         cost=costs,
         best=THETAS[costs.index(least)],
         least=least,
-        without=without_feedforward(results, speed, gain).figures.cost_function,
+        without=without_feedforward(results, speed, gain, fine).figures.cost_function,
         at_paper=cost(AMPLITUDE, min(THETAS, key=lambda theta: abs(theta - THETA))),
-        cancelling=cancelling(results, speed, gain),
+        cancelling=cancelling(results, speed, gain, fine),
     )
 
 
-def without_feedforward(results: Mapping[Case, Result], speed: int, gain: float) -> Result:
+def without_feedforward(
+    results: Mapping[Case, Result], speed: int, gain: float, fine: bool = False
+) -> Result:
     """The feedback alone."""
-    return results[Case(speed, control(gain, amplitude=0.0))]
+    return results[Case(speed, control(gain, amplitude=0.0), fine=fine)]
 
 
-def cancelling(results: Mapping[Case, Result], speed: int, gain: float) -> float:
+def cancelling(results: Mapping[Case, Result], speed: int, gain: float, fine: bool = False) -> float:
     """The angle (rad) at which the feed-forward, once per span, opposes the force's part once per span.
 
     Both are measured: the part with feedback alone, and what the feed-forward at angle 0 adds to it.
     Shifting A sin(kx) by theta turns what it adds by -theta.
     """
-    part = without_feedforward(results, speed, gain).once_per_span
-    added = _result(results, speed, gain, AMPLITUDE, ZERO).once_per_span - part
+    part = without_feedforward(results, speed, gain, fine).once_per_span
+    added = results[Case(speed, control(gain, AMPLITUDE, ZERO), fine=fine)].once_per_span - part
     return wrap(cmath.phase(added) - cmath.phase(-part))
 
 
 def wrap(angle: float) -> float:
     """The same angle within -pi..pi."""
     return math.remainder(angle, 2 * math.pi)
-
-
-def _result(
-    results: Mapping[Case, Result], speed: int, gain: float, amplitude: float, theta: float, reading: str = ""
-) -> Result:
-    shape = {"reading": reading} if reading else {}
-    return results[Case(speed, control(gain, amplitude, theta, **shape))]

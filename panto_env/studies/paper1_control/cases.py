@@ -54,12 +54,28 @@ ACTUATORS: dict[str, Any] = {
     "realistic": "realistic",  # both, and 2500 N/s
 }
 SHIPPED = "pd as shipped"
+FAST_SPEEDS = tuple(range(300, 401, 25))
+"""km/h, those at which more damping of the frame is tried: the passive pantograph loses contact there."""
+DAMPINGS = (100.0, 150.0, 200.0, 250.0, 300.0, 350.0)
+"""Of the frame (N s/m), each tried with each of ``DAMPED_GAINS`` and the realistic actuator."""
+DAMPED_GAINS = (0.5, 0.75, 1.0, 1.25)
+STRONG_GAIN, STRONG_DAMPING = 0.75, 300.0
+"""The middle of three neighbouring ``DAMPINGS`` that leave no contact loss at ``FAST_SPEEDS``."""
+
+
+def damped(gain: float, damping: float) -> str:
+    """The policy pd as shipped but for these parameters, by name."""
+    return f"pd:gain={gain!r},damping={damping!r}"
+
+
+STRONG = f"pd, gain {STRONG_GAIN:g}, {STRONG_DAMPING:g} N s/m"
 DAMPING = {
     "frame damping alone": "pd:gain=0.0,derivative=0.0",
     "FB + frame damping": "pd:derivative=0.0",
     SHIPPED: "pd",
+    STRONG: damped(STRONG_GAIN, STRONG_DAMPING),
 }
-"""What the paper does not have: feedback of the frame's velocity."""
+"""What the paper does not have: feedback of the frame's velocity, 150 N s/m where no other is named."""
 
 
 USUAL: dict[str, float] = {"time_step": 2.5e-4, "spacing": 0.125}
@@ -87,9 +103,9 @@ def control(
     return f"fb+ff:gain={gain!r},amplitude={amplitude!r},theta={theta!r},{READINGS[reading]}"
 
 
-def sampled(speed_kmh: int, policy: str, actuator: str) -> Case:
+def sampled(speed_kmh: int, policy: str, actuator: str, fine: bool = False, line: str = LINE) -> Case:
     """A pass as a train could run it: controlled at its sampling interval, through this actuator."""
-    return Case(speed_kmh, policy, actuator=actuator, control_interval=SAMPLED)
+    return Case(speed_kmh, policy, line, actuator, SAMPLED, fine)
 
 
 PARTS = {
@@ -110,8 +126,11 @@ ON_A_TRAIN = {
     **DAMPING,
 }
 """Controls that are tried with each actuator, sampled."""
-ANGLE_CONTROLS = ((GAIN, SPAN), (DEFAULT_GAIN, SPAN), (GAIN, KMH))
-"""Gains and readings under which the phase angle is varied."""
+OVER_SPEED = {name: PARTS[name] for name in ("passive", f"FB+FF, gain {GAIN}", "FB+FF, gain 1")}
+OVER_SPEED_ON_A_TRAIN = {name: ON_A_TRAIN[name] for name in (f"FB+FF, gain {REAL_GAIN}", SHIPPED, STRONG)}
+"""Controls of Figs 17 and 18, the latter with the realistic actuator."""
+ANGLE_CONTROLS = ((GAIN, SPAN, False), (GAIN, SPAN, True), (DEFAULT_GAIN, SPAN, False), (GAIN, KMH, False))
+"""Gains and readings under which the phase angle is varied, and whether on the grid of ``FINE``."""
 LOOPS = (("ideal", OFTEN), ("ideal", SAMPLED), ("realistic", SAMPLED))
 """Actuators and control intervals under which the gain is varied."""
 
@@ -122,18 +141,22 @@ def all_cases() -> list[Case]:
 
 
 def _cases() -> Iterator[Case]:
-    for speed, policy in product(SPEEDS, ("passive", control(), control(DEFAULT_GAIN))):  # Figs 17, 18
-        yield Case(speed, policy)
-    for speed, policy in product(SPEEDS, (control(REAL_GAIN), DAMPING[SHIPPED])):
-        yield sampled(speed, policy, "realistic")
-    for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):  # Fig. 13
-        yield Case(speed, control(gain, amplitude=0.0))
+    for fine, speed in product((False, True), SPEEDS):  # Figs 17, 18
+        for policy in OVER_SPEED.values():
+            yield Case(speed, policy, fine=fine)
+        for policy in OVER_SPEED_ON_A_TRAIN.values():
+            yield sampled(speed, policy, "realistic", fine)
+    for (gain, reading, fine), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):  # Fig. 13
+        yield Case(speed, control(gain, amplitude=0.0), fine=fine)
         for theta in THETAS:
-            yield Case(speed, control(gain, theta=theta, reading=reading))
-    for speed, policy, line in product(SHOWN_SPEEDS, PARTS.values(), (LINE, OTHER_LINE)):
-        yield Case(speed, policy, line)
-    for speed, policy in product(SHOWN_SPEEDS, ("passive", control())):
-        yield Case(speed, policy, fine=True)
+            yield Case(speed, control(gain, theta=theta, reading=reading), fine=fine)
+    for fine, speed in product((False, True), SHOWN_SPEEDS):
+        for line, policy in product((LINE, OTHER_LINE), PARTS.values()):
+            yield Case(speed, policy, line, fine=fine)
+        for line, policy in product((LINE, OTHER_LINE), ON_A_TRAIN.values()):
+            yield sampled(speed, policy, "realistic", fine, line)
+    for fine, speed, gain, damping in product((False, True), FAST_SPEEDS, DAMPED_GAINS, DAMPINGS):
+        yield sampled(speed, damped(gain, damping), "realistic", fine)
     for (actuator, interval), speed, gain in product(LOOPS, SHOWN_SPEEDS, GAINS):
         yield Case(speed, control(gain), actuator=actuator, control_interval=interval)
     for actuator, speed, policy in product(ACTUATORS, SHOWN_SPEEDS, ON_A_TRAIN.values()):

@@ -22,6 +22,7 @@ from .cases import (
     SPAN,
     SPANS,
     SPEEDS,
+    STRONG,
     THETA,
     THETAS,
     Case,
@@ -101,7 +102,7 @@ def over_speed(results: Results, number: int, name: str, caption: str) -> Figure
     """Figs 17 and 18: a figure of merit over speed, by the name that the paper gives it."""
     from matplotlib.figure import Figure
 
-    gentle, damped = control(REAL_GAIN), DAMPING[SHIPPED]
+    gentle, shipped, strong = control(REAL_GAIN), DAMPING[SHIPPED], DAMPING[STRONG]
     curves = {
         "without control": ([Case(v) for v in SPEEDS], WITHOUT, "o-"),
         f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
@@ -110,7 +111,10 @@ def over_speed(results: Results, number: int, name: str, caption: str) -> Figure
             [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x:"
         ),
         "feedback and frame damping (pd), realistic actuator": (
-            [sampled(v, damped, "realistic") for v in SPEEDS], "tab:olive", "d:"
+            [sampled(v, shipped, "realistic") for v in SPEEDS], "tab:olive", "d:"
+        ),
+        f"{STRONG}, realistic actuator": (
+            [sampled(v, strong, "realistic") for v in SPEEDS], "tab:purple", "v:"
         ),
     }  # fmt: skip
     figure = Figure(figsize=(8, 4.8), layout="constrained")

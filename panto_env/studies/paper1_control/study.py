@@ -15,7 +15,7 @@ from .tables import all_tables
 
 def run(report: Report) -> Outcome:
     """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
-    results = run_all(all_cases(), lambda done, total: report("passes along the line", 0.9 * done / total))
+    results = run_all(all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total)))
     report("passive passes at the same mean force", 0.9)
     at_same_mean = {
         speed: passive_at_mean(speed, results[Case(speed, control())].figures.mean) for speed in SHOWN_SPEEDS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from itertools import product
 
 from ...base.table import Table
@@ -13,12 +14,18 @@ from .cases import (
     ACTUATORS,
     ANGLE_CONTROLS,
     ANGLE_SPEEDS,
+    DAMPED_GAINS,
+    DAMPINGS,
+    FAST_SPEEDS,
     FINE,
     GAIN,
     GAINS,
+    LINE,
     LOOPS,
     ON_A_TRAIN,
     OTHER_LINE,
+    OVER_SPEED,
+    OVER_SPEED_ON_A_TRAIN,
     PARTS,
     SHOWN_SPEEDS,
     SPANS,
@@ -26,6 +33,7 @@ from .cases import (
     USUAL,
     Case,
     control,
+    damped,
     sampled,
 )
 from .linear import amplification
@@ -65,12 +73,15 @@ def all_tables(results: Results, at_same_mean: Mapping[int, Result]) -> tuple[Ta
         _parts(results, at_same_mean),
         _gains(results),
         _actuators(results),
+        _worst(results),
+        _dampings(results),
         _angles(results),
         _bands(results),
         _amplification(),
         _speeds(results),
         _other_line(results),
         _fine(results),
+        _fine_speeds(results),
     )
 
 
@@ -115,14 +126,53 @@ def _actuators(results: Results) -> Table:
     return Table("Actuators, control every 10 ms", ("actuator: control", "km/h", *HEADINGS), _rows(rows))
 
 
+def _worst(results: Results) -> Table:
+    """The largest contact loss of ``SHOWN_SPEEDS``; the passive pantograph has no actuator."""
+    passive = f"{max(results[Case(speed)].figures.contact_loss for speed in SHOWN_SPEEDS):.2f}"
+    rows = [("passive", *(passive for _ in ACTUATORS))]
+    for name, policy in ON_A_TRAIN.items():
+        losses = [
+            max(results[sampled(speed, policy, actuator)].figures.contact_loss for speed in SHOWN_SPEEDS)
+            for actuator in ACTUATORS
+        ]
+        rows.append((name, *(f"{loss:.2f}" for loss in losses)))
+    return Table(
+        "Largest CL (%) of 300, 350 and 400 km/h, control every 10 ms", ("control", *ACTUATORS), tuple(rows)
+    )
+
+
+def _dampings(results: Results) -> Table:
+    """The largest contact loss of ``FAST_SPEEDS``."""
+    rows = []
+    for damping, fine in product(DAMPINGS, (False, True)):
+        losses = [
+            max(
+                results[sampled(speed, damped(gain, damping), "realistic", fine)].figures.contact_loss
+                for speed in FAST_SPEEDS
+            )
+            for gain in DAMPED_GAINS
+        ]
+        rows.append((f"{damping:g}", _numerics(fine), *(f"{loss:.2f}" for loss in losses)))
+    return Table(
+        "Largest CL (%) of 300, 325, ... 400 km/h: pd over gain and damping, realistic actuator",
+        ("damping (N s/m)", "time step, grid", *(f"gain {gain:g}" for gain in DAMPED_GAINS)),
+        tuple(rows),
+    )
+
+
+def _numerics(fine: bool) -> str:
+    grid = FINE if fine else USUAL
+    return f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m"
+
+
 def _angles(results: Results) -> Table:
     rows = []
-    for (gain, reading), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
-        curve = cost_over_angle(results, speed, gain, reading)
+    for (gain, reading, fine), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
+        curve = cost_over_angle(results, speed, gain, reading, fine)
         span = reading == ANGLE_CONTROLS[0][1]
         rows.append(
             (
-                f"{reading}, gain {gain:g}",
+                f"{reading}, gain {gain:g}, {_numerics(fine)}",
                 str(speed),
                 f"{math.degrees(curve.best):.0f}",
                 *(f"{value:.0f}" for value in (curve.least, curve.at_paper, max(curve.cost), curve.without)),
@@ -167,24 +217,64 @@ def _amplification() -> Table:
 def _speeds(results: Results) -> Table:
     rows = []
     for speed in SPEEDS:
-        passive, active = results[Case(speed)], results[Case(speed, control())]
-        rows += [("passive", speed, passive), (f"FB+FF, gain {GAIN}", speed, active)]
+        rows += [(name, speed, results[Case(speed, policy)]) for name, policy in OVER_SPEED.items()]
+        rows += [
+            (f"{name}, realistic actuator", speed, results[sampled(speed, policy, "realistic")])
+            for name, policy in OVER_SPEED_ON_A_TRAIN.items()
+        ]
     return Table("Over speed (Figs 17 and 18)", ("control", "km/h", *HEADINGS), _rows(rows))
 
 
+GRID_COLUMNS = tuple(
+    _figure(name, decimals)
+    for name, decimals in (("contact_loss", 2), ("mean", 1), ("std", 1), ("cost_function", 0))
+)
+
+
 def _fine(results: Results) -> Table:
-    grids = ((False, USUAL), (True, FINE))
-    numerics = {fine: f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m" for fine, grid in grids}
-    rows = [
-        (f"{name}, {numerics[fine]}", speed, results[Case(speed, PARTS[name], fine=fine)])
-        for speed, name, fine in product(SHOWN_SPEEDS, ("passive", f"FB+FF, gain {GAIN}"), numerics)
+    """The control, its parts and those on a train on both grids, one beside the other."""
+    named = [
+        (f"{line}, ideal: {name}", Case(speed, policy, line))
+        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, PARTS.items())
     ]
-    return Table("Time step and grid", ("control, time step, grid", "km/h", *HEADINGS), _rows(rows))
+    named += [
+        (f"{line}, realistic: {name}", sampled(speed, policy, "realistic", line=line))
+        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, ON_A_TRAIN.items())
+    ]
+    rows = []
+    for name, case in named:
+        both = results[case], results[replace(case, fine=True)]
+        rows.append((name, str(case.speed_kmh), *(cell(each) for _, cell in GRID_COLUMNS for each in both)))
+    headings = (f"{heading}, {_numerics(fine)}" for heading, _ in GRID_COLUMNS for fine in (False, True))
+    return Table("Time step and grid", ("line, actuator: control", "km/h", *headings), tuple(rows))
+
+
+def _fine_speeds(results: Results) -> Table:
+    """Contact loss over speed on both grids."""
+    columns = [(name, policy, False) for name, policy in OVER_SPEED.items()]
+    columns += [
+        (f"{name}, realistic actuator", policy, True) for name, policy in OVER_SPEED_ON_A_TRAIN.items()
+    ]
+
+    def loss(speed: int, policy: str, real: bool, fine: bool) -> str:
+        case = sampled(speed, policy, "realistic", fine) if real else Case(speed, policy, fine=fine)
+        return f"{results[case].figures.contact_loss:.2f}"
+
+    rows = [
+        (str(speed), _numerics(fine), *(loss(speed, policy, real, fine) for _, policy, real in columns))
+        for speed, fine in product(SPEEDS, (False, True))
+    ]
+    names = (name for name, _, _ in columns)
+    return Table("CL (%) over speed on both grids", ("km/h", "time step, grid", *names), tuple(rows))
 
 
 def _other_line(results: Results) -> Table:
     rows = [
         (name, speed, results[Case(speed, policy, OTHER_LINE)])
         for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
+    ]
+    rows += [
+        (f"{name}, realistic actuator", speed, results[sampled(speed, policy, "realistic", line=OTHER_LINE)])
+        for speed, (name, policy) in product(SHOWN_SPEEDS, ON_A_TRAIN.items())
     ]
     return Table(f"The same on the line {OTHER_LINE}", ("control", "km/h", *HEADINGS), _rows(rows))
