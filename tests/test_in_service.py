@@ -179,3 +179,27 @@ def test_what_the_id_sets_are_settings():
     assert set(BARE) == set(IDS["Pantograph-v0"])
     assert BARE["observation"] == "measured"
     assert BARE["line_condition"] == "new"
+
+
+@pytest.mark.slow
+def test_with_the_term_of_the_mean_force_a_trained_agent_keeps_the_rule(tmp_path):
+    """Without it the same training presses until the benchmark disqualifies the agent."""
+    pytest.importorskip("stable_baselines3")
+    from panto_agents.evaluation import Comparison, verdict
+    from panto_agents.settings import load_training, parse_training
+    from panto_agents.train import train
+
+    usual = load_training("ppo-quick").model_dump(mode="json")
+    means, verdicts = [], []
+    for name, reward in (("with", IDS["Pantograph-v0"]["reward"]), ("without", {"rate": 0.1})):
+        environment = usual["environment"] | {"reward": reward}
+        training = parse_training(usual | {"environment": environment}, name)
+        folder = train(training, tmp_path / name, progress=False)
+        pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), 2).run(str(folder.path / "model.zip"))
+        means.append(np.mean([pair.policy.mean for pair in pairs]))
+        verdicts.append(verdict(pairs))
+    (ratio, qualified), (_, without_qualified) = verdicts
+    print(means, verdicts)
+    assert ratio < 0.87
+    assert qualified
+    assert not without_qualified

@@ -1,34 +1,12 @@
 """Gymnasium environments."""
 
-from typing import Any
-
 import gymnasium
 
-from ..control.settings import default
+from .ids import BARE, IDS
 from .single import PantographEnv
 from .vector import PantographVectorEnv
 
 __all__ = ["BARE", "IDS", "PantographEnv", "PantographVectorEnv", "register"]
-
-IDS: dict[str, dict[str, Any]] = {
-    "Pantograph-v0": {
-        "speed_kmh": (200.0, 300.0),
-        "line_condition": "as-built",
-        "pantograph_scatter": 0.05,  # own choice: what makers and wear make of masses, springs and dampers
-        "run_in": 1.0,
-        "actuator": "realistic",
-        "sensors": "realistic",
-        "observation": "centred",
-        # As little as keeps the force from chattering, and the mean within the benchmark's rule.
-        "reward": {"rate": 0.1, "mean_force": 50.0},
-    },
-    "PantographStiffness-v0": {"catenary": "periodic-stiffness", "pantograph": "three-mass"},
-    "PantographThreeSpan-v0": {"catenary": "ohl-three-span", "pantograph": "dsa350"},
-}
-"""Registered ids and the arguments that set them apart."""
-BARE = {name: default(name) for name in IDS["Pantograph-v0"]}
-"""Arguments that make Pantograph-v0 the papers' bare form: one speed, a line and a pantograph as designed,
-ideal actuator and sensors, and a reward of CF and CL alone."""
 
 
 def register() -> None:

@@ -15,6 +15,7 @@ from ..base.errors import InputError
 from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.arguments import table, takes
+from ..control.entries import CENTRED
 from ..control.observation import BOUND, layout
 from ..control.settings import default, read_settings
 from ..control.state import TaskRow
@@ -22,6 +23,7 @@ from ..metrics.trajectory import Trajectory
 from ..plant.actuators import actuator_settings
 from ..plant.state import Row
 from .episodes import task_with_options, with_longest_episode
+from .ids import IDS
 from .infos import (
     CONTACT_FORCE,
     FIGURES_TO_COME,
@@ -53,6 +55,13 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     `PantographStiffness-v0` (periodic stiffness, paper 3), `PantographThreeSpan-v0` (three-span
     modal catenary, paper 2).
 
+    `Pantograph-v0` sets these arguments; what you give takes their place:
+
+    {in_service}
+
+    So no two episodes are alike, and what is learnt is not one line by heart. `**panto_env.envs.BARE` among
+    the arguments makes it the papers' bare form, which the class and the other ids are by default.
+
     ## Action Space
     `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={{"place": "both"}}`: share of the actuator's
     force limit (100 N unless told otherwise), up on the frame or up on the head and down on the mass
@@ -60,21 +69,28 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     wrongly shaped actions raise an error and leave the environment as it was.
 
     ## Observation Space
-    `Box(-10, 10, (n,), float32)`, each entry a physical value over its scale:
+    `Box(-10, 10, (n,), float32)`, each entry a physical value less its centre, over its scale. Those of
+    `Pantograph-v0`, `observation="centred"`, have a mean near 0 and a spread near 1 in a passive run:
+
+    {centred}
+
+    `observation="measured"`, the default of the class, has no nominal force:
 
     {observation}
 
     `observation="full"` appends the wire's height, the actuators' forces and the state of masses
-    between head and frame. Entries 0-4 carry the noise and delay of `sensors`.
+    between head and frame. Heights, velocities and contact force
+    carry the noise and delay of `sensors`.
 
     ## Rewards
     Minus the cost function CF over the control step (relative to the nominal force) and minus the
     share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
-    effort and rate of the action have weight 0. `info["reward_terms"]` holds the unweighted terms:
+    effort and rate of the action and for the mean force have weight 0 but in `Pantograph-v0`. A `reward` of
+    your own takes the place of all its weights. `info["reward_terms"]` holds the unweighted terms:
     over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
 
     ## Starting State
-    At the start of the line, at rest under the nominal force.
+    At the start of the line, at rest under the nominal force; with `run_in`, so many spans later at most.
 
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
@@ -225,12 +241,23 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     return force
 
 
-def _observation_table() -> str:
-    """The entries of the default observation as a Markdown table."""
+def _observation_table(kind: str) -> str:
+    """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(default("observation"), actuator, pantograph).entries
-    rows = [f"| {k} | {each.name} | {each.scale:g} {each.unit} |" for k, each in enumerate(entries)]
-    return "\n".join(("| Num | Observation | Scale |", "|-----|-------------|-------|", *rows))
+    entries = layout(kind, actuator, pantograph).entries
+    rows = [
+        f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
+        for k, each in enumerate(entries)
+    ]
+    return "\n".join(
+        ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
+    )
+
+
+def _id_table(name: str) -> str:
+    """What an id sets, as a Markdown table."""
+    rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
+    return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
 
 
 def _indented(text: str) -> str:
@@ -238,5 +265,8 @@ def _indented(text: str) -> str:
 
 
 PantographEnv.__doc__ = (PantographEnv.__doc__ or "").format(
-    observation=_indented(_observation_table()), arguments=_indented(table(EnvironmentSettings))
+    in_service=_indented(_id_table("Pantograph-v0")),
+    centred=_indented(_observation_table(CENTRED)),
+    observation=_indented(_observation_table(default("observation"))),
+    arguments=_indented(table(EnvironmentSettings)),
 )
