@@ -82,6 +82,7 @@ def test_the_force_is_read_relative_to_the_nominal_one():
     assert first[layout.index("nominal force")] == pytest.approx(2.0)
     expected = (info["contact_force"] / 180.0 - 1) / 0.3
     assert first[layout.index("force deviation")] == pytest.approx(expected, abs=1e-5)
+    assert layout.read(first, "contact force") == pytest.approx(info["contact_force"], rel=1e-5)
 
 
 def test_a_reference_policy_does_the_same_by_either_observation():
