@@ -47,7 +47,10 @@ def test_every_entry_is_shown_with_its_whole_description(panto):
         ("pd", ["policy pd", "Proportional and derivative feedback", "derivative", "0.005", "(N s/m)"]),
         ("fb+ff", ["policy fb+ff", "dead_zone", "'span'"]),
         ("passive", ["policy passive", "Actuators that stay at zero"]),
-        ("worn", ["line_condition worn", "presets are new, fair, worn", "wear_depth", "0.0003", "0.8"]),
+        (
+            "worn",
+            ["line_condition worn", "presets are new, fair, as-built, worn", "wear_depth", "0.0003", "0.8"],
+        ),
         (
             "realistic",
             ["actuator realistic", "2500.0", "(N/s)", "sensors realistic", "velocity_noise", "0.005"],
@@ -97,7 +100,7 @@ def test_a_preset_takes_values_and_defects():
         ("worn:wear_depth", "'wear_depth' must read name=value"),
         (
             "worm:wear_depth=1e-3",
-            r"must be 'new' or 'fair' or 'worn' \(with values, as 'new:irregularity=...'\)",
+            r"must be 'new' or 'fair' or 'as-built' or 'worn' \(with values, as 'new:irregularity=...'\)",
         ),
     ],
 )

@@ -7,6 +7,8 @@ benchmark has not asked for feedback.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,9 +22,14 @@ OTHER_SEED = 1_000_003
 """Added to a pass's seed: the tape's line is another one."""
 
 
-def policy_of(name: str) -> str:
-    """Name of the policy that a control is of; any other name as it is."""
-    return name.removeprefix(TAPE).removeprefix(BLIND)
+def control_of(name: Any) -> str:
+    """Which control a policy's name asks for, BLIND or TAPE; "" for a policy itself."""
+    return next((kind for kind in (BLIND, TAPE) if isinstance(name, str) and name.startswith(kind)), "")
+
+
+def policy_of(name: Any) -> Any:
+    """Name of the policy that a control is of; any other policy as it is."""
+    return name[len(control_of(name)) :] if control_of(name) else name
 
 
 class Blind:

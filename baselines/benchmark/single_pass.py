@@ -17,7 +17,7 @@ from panto_env.metrics.figures import Figures
 from panto_env.metrics.spans import within
 from panto_env.policies import Policy, find_policy, wishes
 
-from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, policy_of
+from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
 from .settings import BenchmarkSettings, Line
 
 Array = NDArray[np.float64]
@@ -109,11 +109,12 @@ def _record(
 
 def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:
     """The policy of a pass, which may be a control of another one."""
-    if policy.startswith(TAPE):
+    control = control_of(policy)
+    if control == TAPE:
         _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
         return Tape(recorder.actions())
     found = find_policy(policy_of(policy))
-    return Blind(found) if policy.startswith(BLIND) else found
+    return Blind(found) if control == BLIND else found
 
 
 class _CommandRecorder:

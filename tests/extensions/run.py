@@ -13,7 +13,9 @@ from panto_env.cli import main
 from panto_env.envs import PantographEnv
 
 line = "rail.toml"
-env = gymnasium.make("Pantograph-v0", catenary=line, actuator={"kind": "integrating"}, comment="mine")
+env = gymnasium.make(
+    "Pantograph-v0", line_condition="new", catenary=line, actuator={"kind": "integrating"}, comment="mine"
+)
 env.reset(seed=0)
 observation, _, _, _, info = env.step(np.ones(1, dtype=np.float32))
 layout = env.unwrapped.context.layout
