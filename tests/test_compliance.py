@@ -243,7 +243,7 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
     for output in (
         panto("simulate", *light),
-        panto("evaluate", "p", *light, "--line-condition", "new"),
+        panto("evaluate", "passive", *light, "--line-condition", "new"),
         panto("validate"),
     ):
         for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
@@ -251,6 +251,6 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     validation = json.loads(panto("validate", "--json"))["compliance"]
     assert [entry["speed_kmh"] for entry in validation] == [250.0, 300.0]
     assert {criterion["key"] for criterion in validation[0]["criteria"]} > {"mean", "std", "doppler", "slack"}
-    (entry,) = json.loads(panto("evaluate", "p", *light, "--line-condition", "new", "--json"))["passes"]
+    (entry,) = json.loads(panto("evaluate", "passive", *light, "--line-condition", "new", "--json"))["passes"]
     assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
