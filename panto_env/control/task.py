@@ -10,34 +10,27 @@ import numpy as np
 from ..backend import bind, copy_whole, lane_table, lane_threads, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..metrics.compliance import LineFacts
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
-from ..plant.catenary.schema import MOST_SPANS
 from ..plant.line_condition import draw
-from ..plant.numerics import Runs
 from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
 from ..plant.state import Row
-from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending, reason
+from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending
 from .context import Context
 from .episode import Episode, Flags
-from .identity import identity
+from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
 from .observation import layout
+from .record import ending, refuse_divergence, trajectory
 from .reward import MEAN_TIME
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
 from .step import control_step, observe_start
-
-LARGEST_DEVIATION = 2e3
-"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
-LARGEST_HEIGHT = 3.0
-"""Height of the wire (m), either way, beyond which it has, too."""
 
 BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_step", "_observe_start")
 """Attributes that ``Task._bind`` makes of the others."""
@@ -68,10 +61,10 @@ class Task:
             settings.catenary,
             settings.pantograph,
             lanes=lanes,
-            spans=_spans(settings),
+            spans=spans(settings),
             numerics=settings.numerics,
             actuator=settings.actuator,
-            runs=_runs(settings),
+            runs=runs(settings),
             bilateral=settings.bilateral,
             varied=settings.pantograph_scatter > 0,
         )
@@ -82,7 +75,7 @@ class Task:
                 f"not {self.distance:g} m; ask for more spans."
             )
         self.control_interval = settings.control_interval
-        self.control_steps = _whole_steps(settings.control_interval, plant.time_step)
+        self.control_steps = whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)
         stride = self.speed_range[1] * self.control_interval
         if self.distance < stride - 1e-9:
@@ -99,7 +92,7 @@ class Task:
         self._noise = None if rms is None else Noise(rms, lanes)
         self._all_lanes = np.arange(lanes)
         self._steps_of_run_in = np.zeros(lanes, dtype=np.int64)  # control steps still to be made
-        self._record_droppers, self.keep_samples = record_droppers, keep_samples
+        self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         slow = self.speed_range[0]
         longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
@@ -302,21 +295,8 @@ class Task:
         steps, supports = float(plant.steps_done[lane]), plant.model.supports
         figures = self.running.figures(lane, nominal_force, stride, plant.time_step, supports, steps)
         deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
-        self._refuse_divergence(lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
+        refuse_divergence(self, lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
         return figures
-
-    def _refuse_divergence(self, lane: int, deviation: float, height: Array) -> None:
-        """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
-        is that of no line.
-        """
-        possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
-        if not possible or self.episode.ending[lane] == Ending.DIVERGED:
-            plant = self.plant
-            raise InputError(
-                f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
-                f"{3.6 * self.speed[lane]:g} km/h diverged, so it has no result; take a time_step below "
-                f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
-            )
 
     def target_mean(self, lane: int) -> float:
         """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
@@ -325,53 +305,11 @@ class Task:
 
     def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
         """Record of a lane's run so far. Raises InputError where its computation diverged."""
-        plant, steps = self.plant, int(self.plant.steps_done[lane])
-        rows = self.samples.rows[lane, 1 : steps + 1, 0]
-        deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
-        self._refuse_divergence(lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
-        middle = (np.arange(steps) + 0.5) * plant.time_step
-        return Trajectory(
-            time=middle,
-            position=middle * self.speed[lane],
-            contact_force=rows[:, Row.CONTACT_FORCE].copy(),
-            head=rows[:, Row.HEAD_HEIGHT].copy(),
-            frame=rows[:, Row.FRAME_HEIGHT].copy(),
-            wire=rows[:, Row.WIRE_HEIGHT].copy(),
-            head_velocity=rows[:, Row.HEAD_VELOCITY].copy(),
-            frame_velocity=rows[:, Row.FRAME_VELOCITY].copy(),
-            frame_force=rows[:, Row.FRAME_FORCE].copy(),
-            head_force=rows[:, Row.HEAD_FORCE].copy(),
-            uplift=self.samples.uplift[lane, 1 : steps + 1].copy(),
-            support_position=plant.model.supports,
-            dropper_force=self.samples.tension[lane, 1 : steps + 1].copy(),
-            dropper_position=plant.model.droppers if self._record_droppers else np.zeros(0),
-            catenary=plant.catenary.name,
-            pantograph=plant.pantograph.name,
-            speed_kmh=3.6 * float(self.speed[lane]),
-            span_length=plant.catenary.span_length,
-            time_step=plant.time_step,
-            nominal_force=float(plant.nominal_force[lane]),
-            target_mean=self.target_mean(lane),
-            settings=identity(self.settings, plant, self.distance),
-            policy=policy,
-            seed=seed,
-            terminated=bool(self.episode.terminated[lane]),
-            ending=self.ending(lane),
-            line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(self.speed[lane])),
-        )
+        return trajectory(self, lane, policy, seed)
 
     def ending(self, lane: int) -> str:
         """Where and why a lane's run ended early, as a sentence; empty where it did not."""
-        ending = Ending(self.episode.ending[lane])
-        if ending is Ending.NONE:
-            return ""
-        plant = self.plant
-        time = float(plant.steps_done[lane] * plant.time_step)
-        position, line = time * float(self.speed[lane]), plant.catenary
-        return (
-            f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
-            f"{time:.2f} s): {reason(ending, line.free_uplift)}."
-        )
+        return ending(self, lane)
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
@@ -392,34 +330,3 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
         return run.summary(spans).mean
 
     return mean
-
-
-def _runs(settings: RunSettings) -> Runs:
-    """What the plant must be good for."""
-    slow, quick = settings.speed_kmh
-    pantograph, interval = settings.pantograph, settings.control_interval
-    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
-
-
-def _spans(settings: RunSettings) -> int | None:
-    """Spans of the line: a line too short for the distance asked for gets more, unless told how many."""
-    if settings.spans is not None or settings.distance is None:
-        return settings.spans
-    line = settings.catenary
-    wanted = math.ceil(settings.distance / line.span_length + settings.run_in) + 1
-    if wanted > MOST_SPANS:
-        longest = (MOST_SPANS - 1) * line.span_length
-        raise InputError(
-            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
-        )
-    return max(line.spans, wanted)
-
-
-def _whole_steps(control_interval: float, time_step: float) -> int:
-    steps = round(control_interval / time_step)
-    if steps < 1 or abs(steps * time_step - control_interval) > 1e-9:
-        raise InputError(
-            f"control_interval must be a whole number of time steps of {1e3 * time_step:g} ms, "
-            f"not {1e3 * control_interval:g} ms."
-        )
-    return steps

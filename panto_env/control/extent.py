@@ -1,0 +1,42 @@
+"""How far a run goes, on how long a line, and what its plant must be good for."""
+
+from __future__ import annotations
+
+import math
+
+from ..base.errors import InputError
+from ..plant.catenary.schema import MOST_SPANS
+from ..plant.numerics import Runs
+from .settings import RunSettings
+
+
+def runs(settings: RunSettings) -> Runs:
+    """What the plant must be good for."""
+    slow, quick = settings.speed_kmh
+    pantograph, interval = settings.pantograph, settings.control_interval
+    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
+
+
+def spans(settings: RunSettings) -> int | None:
+    """Spans of the line: a line too short for the distance asked for gets more, unless told how many."""
+    if settings.spans is not None or settings.distance is None:
+        return settings.spans
+    line = settings.catenary
+    wanted = math.ceil(settings.distance / line.span_length + settings.run_in) + 1
+    if wanted > MOST_SPANS:
+        longest = (MOST_SPANS - 1) * line.span_length
+        raise InputError(
+            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
+        )
+    return max(line.spans, wanted)
+
+
+def whole_steps(control_interval: float, time_step: float) -> int:
+    """Time steps in a control interval. Raises InputError where they are no whole number."""
+    steps = round(control_interval / time_step)
+    if steps < 1 or abs(steps * time_step - control_interval) > 1e-9:
+        raise InputError(
+            f"control_interval must be a whole number of time steps of {1e3 * time_step:g} ms, "
+            f"not {1e3 * control_interval:g} ms."
+        )
+    return steps

@@ -1,0 +1,89 @@
+"""The record of a lane's run, and why it has none: it ended early, or its computation diverged."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..metrics.compliance import LineFacts
+from ..metrics.trajectory import Trajectory
+from ..plant.state import Row
+from ..plant.valid_range import Ending, reason
+from .identity import identity
+
+if TYPE_CHECKING:
+    from .task import Task
+
+LARGEST_DEVIATION = 2e3
+"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
+LARGEST_HEIGHT = 3.0
+"""Height of the wire (m), either way, beyond which it has, too."""
+
+
+def refuse_divergence(task: Task, lane: int, deviation: float, height: Array) -> None:
+    """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
+    is that of no line.
+    """
+    possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
+    if not possible or task.episode.ending[lane] == Ending.DIVERGED:
+        plant = task.plant
+        raise InputError(
+            f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
+            f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; take a time_step below "
+            f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
+        )
+
+
+def trajectory(task: Task, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
+    """Record of a lane's run so far. Raises InputError where its computation diverged."""
+    plant, steps = task.plant, int(task.plant.steps_done[lane])
+    rows = task.samples.rows[lane, 1 : steps + 1, 0]
+    deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
+    refuse_divergence(task, lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
+    middle = (np.arange(steps) + 0.5) * plant.time_step
+    return Trajectory(
+        time=middle,
+        position=middle * task.speed[lane],
+        contact_force=rows[:, Row.CONTACT_FORCE].copy(),
+        head=rows[:, Row.HEAD_HEIGHT].copy(),
+        frame=rows[:, Row.FRAME_HEIGHT].copy(),
+        wire=rows[:, Row.WIRE_HEIGHT].copy(),
+        head_velocity=rows[:, Row.HEAD_VELOCITY].copy(),
+        frame_velocity=rows[:, Row.FRAME_VELOCITY].copy(),
+        frame_force=rows[:, Row.FRAME_FORCE].copy(),
+        head_force=rows[:, Row.HEAD_FORCE].copy(),
+        uplift=task.samples.uplift[lane, 1 : steps + 1].copy(),
+        support_position=plant.model.supports,
+        dropper_force=task.samples.tension[lane, 1 : steps + 1].copy(),
+        dropper_position=plant.model.droppers if task.record_droppers else np.zeros(0),
+        catenary=plant.catenary.name,
+        pantograph=plant.pantograph.name,
+        speed_kmh=3.6 * float(task.speed[lane]),
+        span_length=plant.catenary.span_length,
+        time_step=plant.time_step,
+        nominal_force=float(plant.nominal_force[lane]),
+        target_mean=task.target_mean(lane),
+        settings=identity(task.settings, plant, task.distance),
+        policy=policy,
+        seed=seed,
+        terminated=bool(task.episode.terminated[lane]),
+        ending=ending(task, lane),
+        line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
+    )
+
+
+def ending(task: Task, lane: int) -> str:
+    """Where and why a lane's run ended early, as a sentence; empty where it did not."""
+    which = Ending(task.episode.ending[lane])
+    if which is Ending.NONE:
+        return ""
+    plant = task.plant
+    time = float(plant.steps_done[lane] * plant.time_step)
+    position, line = time * float(task.speed[lane]), plant.catenary
+    return (
+        f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
+        f"{time:.2f} s): {reason(which, line.free_uplift)}."
+    )
