@@ -217,7 +217,7 @@ def test_bad_action_is_refused_and_changes_nothing(action):
         ({"reward": {"cost_function": -1}}, "reward is not valid: key 'cost_function'"),
         ({"observation": "everything"}, "observation must be one of measured, full"),
         ({"distance": -5}, "distance must be a positive number"),
-        ({"distance": 1e9}, "distance must be at most 59,940 m"),
+        ({"distance": 1e9}, "distance must be at most 59,580 m"),
         ({"control_interval": 0.0015, "time_step": 1e-3}, "whole number of time steps"),
         ({"time_step": 0}, "time_step must be greater than 0, not 0"),
         ({"window": 2}, "must be a number of spans from 3 up"),

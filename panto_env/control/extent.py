@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..base.errors import InputError
+from ..metrics.spans import CLEAR
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.numerics import Runs
 from .settings import RunSettings
@@ -22,9 +23,10 @@ def spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    wanted = math.ceil(settings.distance / line.span_length + settings.run_in) + 1
+    last = math.ceil(settings.distance / line.span_length + settings.run_in)
+    wanted = last + (CLEAR if last >= line.spans else 1)
     if wanted > MOST_SPANS:
-        longest = (MOST_SPANS - 1) * line.span_length
+        longest = (MOST_SPANS - CLEAR) * line.span_length
         raise InputError(
             f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
         )

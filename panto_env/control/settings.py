@@ -19,7 +19,7 @@ from ..base.names import suggest
 from ..base.ranges import Between
 from ..base.settings import parse, plain
 from ..catalog import load_catenary, load_pantograph
-from ..metrics.spans import LAST_USUAL
+from ..metrics.spans import CLEAR, LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.schema import check_span_count
@@ -171,12 +171,13 @@ class RunSettings(Numerics):
 def far_enough(settings: RunSettings) -> RunSettings:
     """Settings of a pass: one that was told neither distance nor spans goes on until its start has died out.
 
-    The line gets as many spans as that takes.
+    The line gets as many spans as that takes, and so many more that its end is not felt.
     """
     line = settings.catenary
-    if settings.distance is not None or settings.spans is not None or line.spans > LAST_USUAL:
+    if settings.distance is not None or settings.spans is not None:
         return settings
-    return settings.model_copy(update={"distance": LAST_USUAL * line.span_length})
+    last = max(LAST_USUAL, line.spans - 1)
+    return settings.model_copy(update={"distance": last * line.span_length, "spans": last + CLEAR})
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:

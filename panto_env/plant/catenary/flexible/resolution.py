@@ -20,7 +20,7 @@ from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 
-GRIDS = ((0.69, 0.25, 1e-3), (0.735, 0.25, 0.625e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
+GRIDS = ((0.69, 0.25, 1e-3), (0.72, 0.25, 0.625e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
 """Up to which share of the wave speed a grid (m) is fine and a time step (s) is short enough."""
 NODES_HZ = 60.0
 """How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
@@ -36,6 +36,8 @@ HARD_CONTACT_ERROR = 20
 """Of the standard deviation (%) where a hard contact is lost and the grid is ``HARD_CONTACT_GRID``."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
+HEAVY_CLAMP = 1.0
+"""Mass of a clamp on the contact wire (kg) that wants the finest grid where waves are deep."""
 FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
 """Grid (m) for ``accuracy="fast"``, where it is stable, and the coarsest for which the longer of the two time
 steps is taken."""
@@ -93,6 +95,8 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     if deep:  # two nodes in a wave that runs ahead of the train at the rate at which it passes the waves
         ahead = min(deep) * (wave_speed - quick) / quick
         spacing = min(spacing, max(ahead / 2, GRIDS[-1][1]))
+        if data.droppers.contact_clamp_mass > HEAVY_CLAMP:
+            spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
