@@ -140,7 +140,8 @@ EXPECTED = {  # ours, and how far it may move before somebody must look
     "CL with FB+FF, gain 1, 350 km/h": (0.55, 0.1),
     "CL with FB+FF, gain 1, 400 km/h": (0.0, 0.0),
     "largest CL with FB+FF, gain 1.75, 100-400 km/h": (0.0, 0.0),
-    "largest CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator": (38.4, 3.0),
+    # Not converged, and no grid settles it: 33 to 38 % by grid, step and window.
+    "largest CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator": (35.5, 4.0),
     "largest CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator": (5.14, 0.1),
     "raw σ with over without control, 300 km/h": (1.133, 0.01),
     "raw σ with over without control, 350 km/h": (0.813, 0.01),
