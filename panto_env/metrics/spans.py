@@ -26,8 +26,8 @@ missing falls by about a fifth per span at any speed; docs/validation.md shows w
 LAST_USUAL = 19
 """Last span of a run unless told otherwise, so that ten are evaluated."""
 CLEAR = 7
-"""Spans that a line has beyond the last one of a pass: no window about the train reaches its end, whose anchor
-reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
+"""Spans that a line has beyond the last one of a pass: no window about the train reaches its end, whose
+anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
 
 
 def check_spans(spans: Any) -> None:
