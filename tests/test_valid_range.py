@@ -15,7 +15,8 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics.spans import LAST_USUAL
 from panto_env.plant.catenary import CATENARIES
-from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER
+from panto_env.plant.catenary.flexible.segments import places
 from panto_env.plant.catenary.protocol import ending_by_wire
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
@@ -90,7 +91,7 @@ def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     model.settle(0, DrawnLine(LineCondition()), 0.0)
     line, wire, answer = model.line, model.wire, np.zeros(1, dtype=np.int64)
     wire.increment[:] = 0.01  # m in a step: 4 m/s
-    middle = PAD + round(2.5 * data.span_length / line.spacing) + np.arange(-3, 4)
+    middle = places(round(2.5 * data.span_length / line.spacing) + np.arange(-3, 4), line.rows)
     for wires, moved, expected in (
         ([MESSENGER], -0.73, Ending.NONE),
         ([MESSENGER], -0.75, Ending.WIRES),
@@ -100,11 +101,11 @@ def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     ):
         wire.displacement[:] = 0.0
         for each in wires:
-            wire.displacement[0, each, middle] = moved
+            wire.displacement[0, each][middle] = moved
         _ask(line, wire, answer)
         assert answer[0] == expected, (wires, moved)
-    wire.increment[0, MESSENGER, middle] = -0.7  # from step to step: no wire does so
-    wire.displacement[0, MESSENGER, middle] = -0.75
+    wire.increment[0, MESSENGER][middle] = -0.7  # from step to step: no wire does so
+    wire.displacement[0, MESSENGER][middle] = -0.75
     _ask(line, wire, answer)
     assert answer[0] == Ending.DIVERGED
 

@@ -16,16 +16,31 @@ from .mathematics import NOT_NEGATIVE, floor
 from .memory import CACHE_LINE, aligned_zeros, copy_whole, lane_table
 from .packed import bind, open_packed, pack
 from .threads import LaneThreads, lane_threads
+from .vectors import (
+    WIDTH,
+    any_of,
+    choose,
+    larger,
+    load_row,
+    root,
+    shift_down,
+    shift_up,
+    smaller,
+    store_row,
+)
 
 __all__ = [
     "CACHE_LINE",
     "JIT",
     "LANES_ABREAST",
     "NOT_NEGATIVE",
+    "WIDTH",
     "LaneThreads",
     "aligned_zeros",
+    "any_of",
     "bind",
     "cache_folder",
+    "choose",
     "constants",
     "copy_whole",
     "floor",
@@ -34,11 +49,18 @@ __all__ = [
     "kernel",
     "lane_table",
     "lane_threads",
+    "larger",
+    "load_row",
     "new_block",
     "new_blocks",
     "open_packed",
     "operation",
     "pack",
     "python_function",
+    "root",
+    "shift_down",
+    "shift_up",
+    "smaller",
+    "store_row",
     "subroutine",
 ]

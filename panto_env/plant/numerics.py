@@ -31,7 +31,8 @@ class Numerics(Settings):
     )
     spacing: Positive | None = Field(
         None,
-        description="grid of the flexible catenary (m), instead of the one that the accuracy asks for",
+        description="grid of the flexible catenary (m), instead of the one that the accuracy asks for; "
+        "the next finer one that has a multiple of 8 nodes per span is taken",
     )
     window: int | None = Field(
         None,

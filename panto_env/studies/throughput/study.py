@@ -6,6 +6,7 @@ import platform
 from dataclasses import asdict
 from typing import Any
 
+from ...backend import WIDTH
 from ...base.machine import cores
 from ...envs import IDS
 from . import roofline
@@ -23,8 +24,8 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
         if name == COUNTED:
             line = task.plant.model.line
             limits = roofline.measure(
-                2 * line.mobility.shape[1],
-                len(line.link_node),
+                2 * line.rows * WIDTH,
+                len(line.link_set),
                 task.plant.time_step,
                 speed.times_real_time,
                 in_single(task),

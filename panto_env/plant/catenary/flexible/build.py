@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....backend import CACHE_LINE, aligned_zeros
+from ....backend import CACHE_LINE, WIDTH, aligned_zeros
 from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ...interpolation import stencil
@@ -17,6 +17,7 @@ from .grid import nodes_per_span, spring_levels, stencil_weights
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .resolution import Resolution
 from .schema import FlexibleCatenaryData
+from .segments import lay_out, places
 from .static_shape import StaticShape
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
@@ -91,39 +92,83 @@ def constants(
 
     real = np.float32 if numerics.precision == "single" else np.float64
     keep = (1.0 - damping.alpha * step / 2) / settle
-    rows = [[*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires]
+    weights_by_wire = [
+        [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
+    ]
     courant = np.array([np.sqrt(wire.tension / wire.mass) for wire in wires]) * step / dx
     table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
+    rows = per_span * window // WIDTH
+    mast_row, mast_segment = places(per_span * np.arange(1, window), rows)
+    held = Sets(springs.wire[:, None], springs.node - PAD, rows)
+    joined = Sets(links.wires, first, rows)
+    yielding = mobility[springs.wire, springs.node, None]
+    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
     return FlexibleLine(
         spacing=dx,
         span=data.span_length,
         spans=spans,
         window=window,
+        rows=rows,
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),
         rise=np.zeros((1, 0, 4)),
         rise_breaks=np.zeros(0),
         rise_decay=0.0,
-        stencil=np.array(rows, dtype=real),
+        stencil=np.array(weights_by_wire, dtype=real),
         absorbing=(courant - 1) / (courant + 1),
-        inertia=(inertia if inertia.min() < 1 else inertia[:, :0]).astype(real),
-        mobility=mobility,
-        uplift_node=CONTACT * nodes + masts.astype(np.int64),
+        inertia=np.ascontiguousarray(
+            lay_out(inertia, rows, real)[:, PAD : -PAD if inertia.min() < 1 else PAD]
+        ),
+        mobility=lay_out(mobility, rows, float),
+        mast_row=mast_row,
+        mast_segment=mast_segment,
         free_uplift=data.free_uplift,
         largest_move=LARGEST_SPEED * step,
-        spring_node=springs.wire * nodes + springs.node,
-        spring_mobility=mobility[springs.wire, springs.node],
-        spring_levels=springs.levels,
-        half=np.array([0.5], dtype=real),
-        link_node=links.wires * nodes + (first + PAD)[:, None],
-        link_weight=weights.astype(real),
-        link_move=move.astype(real),
-        link_linear=linear.astype(real),
-        link_yield=relative.astype(real),
-        link_stiffness=links.stiffness.astype(real),
-        link_room=room.astype(real),
+        spring_wire=held.wires[:, 0],
+        spring_row=held.row,
+        spring_pull=held.of(pull, real),
+        link_wire=joined.wires,
+        link_row=joined.row,
+        link_weight=joined.of(weights, real),
+        link_move=joined.of(move.reshape(-1, 8), real),
+        link_linear=joined.of(linear, real),
+        link_yield=joined.of(relative, real, 1.0),
+        link_stiffness=joined.of(links.stiffness, real, 1.0),
+        link_room=joined.of(room, real, 1.0),
+        link_set=joined.number,
+        link_segment=joined.segment,
         link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
         link_gap=np.zeros((1, len(first)), dtype=real),
     )
+
+
+class Sets:
+    """What hangs on the wires, in sets: one per segment, all on the same wires and in the same rows."""
+
+    def __init__(self, wires: Index, node: Index, rows: int) -> None:
+        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
+        row, self.segment = places(node, rows)
+        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are there already
+        self.number = np.zeros(len(node), dtype=np.int64)
+        taken: set[tuple[int, int]] = set()
+        for k, (its_row, its_wires, segment) in enumerate(
+            zip(row, wires.tolist(), self.segment, strict=True)
+        ):
+            again = 0
+            while True:
+                number = found.setdefault((int(its_row), *its_wires, again), len(found))
+                if (number, segment) not in taken:
+                    break
+                again += 1
+            taken.add((number, segment))
+            self.number[k] = number
+        keys = np.array(list(found), dtype=np.int64).reshape(len(found), -1)
+        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
+
+    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
+        """Values (things, ...) as (sets, ..., WIDTH); where a set has nothing stands ``empty``."""
+        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
+        array[self.number, self.segment] = values
+        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
 
 
 def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
@@ -159,22 +204,35 @@ def _droppers(data: FlexibleCatenaryData, shape: StaticShape, spans: int) -> Lin
 
 def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
     """Wires of all lanes in their static shape."""
-    (wires, nodes), links, real = line.mobility.shape, len(line.link_node), line.stencil.dtype
-    # The leapfrog reads and writes these side by side. Were they at the same place of a page, a processor
-    # would take a read of one for a read of what it has just written to another, and wait.
-    displacement = aligned_zeros((lanes, wires, nodes), real)
-    increment = aligned_zeros((lanes, wires, nodes), real, place=21 * CACHE_LINE)
-    return FlexibleWire(
-        displacement=displacement,
-        increment=increment,
-        all_displacement=displacement.reshape(lanes, wires * nodes),
-        all_increment=increment.reshape(lanes, wires * nodes),
-        blend=aligned_zeros((lanes, nodes), real, place=42 * CACHE_LINE),
+    wires, real, sets = line.mobility.shape, line.stencil.dtype, line.link_yield.shape
+    wire = FlexibleWire(
+        # The leapfrog reads and writes both side by side. Were they at the same place of a page, a processor
+        # would take a read of one for a read of what it has just written to the other, and wait.
+        displacement=aligned_zeros((lanes, *wires), real),
+        increment=aligned_zeros((lanes, *wires), real, place=21 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
-        contact_node=np.zeros((lanes, CONTACTS), dtype=np.int64),
+        contact_row=np.zeros((lanes, CONTACTS), dtype=np.int64),
+        contact_segment=np.zeros((lanes, CONTACTS), dtype=np.int64),
         contact_weight=np.zeros((lanes, CONTACTS, 4)),
         unmoved_height=np.zeros((lanes, CONTACTS)),
-        spring_past=np.zeros((lanes, len(line.spring_node))),
-        extension=np.zeros((lanes, 2, links), dtype=real),
-        change=np.zeros((lanes, links), dtype=real),
+        spring_past=np.zeros((lanes, len(line.spring_row), WIDTH), dtype=real),
+        past_extension=np.zeros((lanes, *sets), dtype=real),
+        extension=np.zeros((lanes, *sets), dtype=real),
+        change=np.zeros((lanes, *sets), dtype=real),
+        static=np.ones((lanes, *sets), dtype=real),  # where there is no link, none is ever slack
+        gap=np.zeros((lanes, *sets), dtype=real),
     )
+    for lane in range(lanes):
+        settle(line, wire, lane)
+    return wire
+
+
+def settle(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
+    """Put one lane's wires at rest at the line's start."""
+    for array in (wire.displacement, wire.increment, wire.change):
+        array[lane] = 0.0
+    row, places = min(lane, len(line.link_static) - 1), (line.link_set, line.link_segment)
+    wire.static[lane][places] = line.link_static[row, : len(line.link_set)]
+    wire.gap[lane][places] = line.link_gap[row, : len(line.link_set)]
+    wire.extension[lane] = 0.0 - wire.gap[lane]
+    wire.first_span[lane] = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....backend import WIDTH
 from ....base.arrays import Array
 from ...interpolation import stencil
 from ..schema import Wire
@@ -11,8 +12,8 @@ from .schema import FlexibleCatenaryData
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
-    """Nodes in a span of a grid at most this coarse (m)."""
-    return int(np.ceil(data.span_length / spacing - 1e-9))
+    """Nodes in a span of a grid at most this coarse (m): as many in each segment of any window."""
+    return WIDTH * int(np.ceil(data.span_length / spacing / WIDTH - 1e-9))
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:

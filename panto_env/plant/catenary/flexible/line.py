@@ -1,4 +1,9 @@
-"""Arrays of the flexible catenary: the constants of a line on its grid, and what moves."""
+"""Arrays of the flexible catenary: the constants of a line on its grid, and what moves.
+
+Wires lie in segments abreast: the window is cut into ``WIDTH`` equal segments, and row r of a wire holds node
+r of each. So one vector computes a node of all segments at once, along the wires as at the droppers. Rows
+beyond a segment's ends hold nodes of its neighbours.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,7 @@ from typing import NamedTuple
 
 from ....base.arrays import Array, Index
 
-PAD = 2  # nodes beyond each end, for the five-point stencil
+PAD = 2  # rows beyond each end of the segments, for the five-point stencil
 CONTACT, MESSENGER = 0, 1
 """The wires of today's lines; the pantograph touches the first."""
 LOWER, UPPER = 0, 1
@@ -16,37 +21,46 @@ LOWER, UPPER = 0, 1
 class FlexibleLine(NamedTuple):
     """Constants of a line on its grid: wires, springs that hold them, and links between them.
 
-    The grid covers a window of the line that travels with the train, or all of it. A node i of wire w has
-    the number w * nodes + i among all nodes. Droppers are links; what defects change about them has one
-    row for all lanes or one per lane, for the whole line; intact spans are alike, and there one window does.
+    The grid covers a window of the line that travels with the train, or all of it. Droppers are links.
+    Springs and links whose nodes are in the same rows go abreast, one per segment at most: they are a set,
+    which has constants that do nothing where a segment has none.
+
+    What defects change about links has one row for all lanes or one per lane, for the whole line; intact
+    spans are alike, and there one window does.
     """
 
     spacing: float  # of the grid (m)
     span: float  # m
     spans: int  # of the whole line
     window: int  # spans that the grid covers
+    rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # static height of the contact wire over one span, every span/(n - 1) m (m)
     rise: Array  # (rows, pieces, 4): what defects add to it: a, b, c, d of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
     rise_decay: float  # kappa: of exponentials along a piece (1/m)
     stencil: Array  # (wires, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
     absorbing: Array  # (wires,): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
-    inertia: Array  # (wires, nodes): mass of the bare wire over that of the node; (wires, 0) where all are 1
-    mobility: Array  # (wires, nodes): displacement in one step by 1 N at the node (m/N)
-    uplift_node: Index  # (supports,): among all nodes, where uplift is recorded
+    inertia: (
+        Array  # (wires, rows, WIDTH): mass of the bare wire over that of the node; no rows where all are 1
+    )
+    mobility: Array  # (wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N at the node (m/N)
+    mast_row: Index  # (supports,): row of the node where uplift is recorded
+    mast_segment: Index  # (supports,): its segment
     free_uplift: float  # room for it up to the steady arm's stop (m)
     largest_move: float  # in a step, beyond which the computation has diverged (m)
-    spring_node: Index  # (springs,): among all nodes, where a spring to the ground holds a wire
-    spring_mobility: Array  # (springs,): mobility there (m/N)
-    spring_levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
-    half: Array  # (1,): 0.5, in the precision of the wires
-    link_node: Index  # (links, ends): first of four, among all nodes
-    link_weight: Array  # (links, 4): of the four nodes; a link hangs straight down, both ends have the same
-    link_move: Array  # (links, ends, 4): displacement of the nodes in a step by 1 N (m/N)
-    link_linear: Array  # (links, 2): change of tension by mean extension before and after (N/m)
-    link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
-    link_stiffness: Array  # (links,): in tension (N/m)
-    link_room: Array  # (links,): by which its ends may approach, as designed, until the wires touch (m)
+    spring_wire: Index  # (sets,): which wire springs to the ground hold
+    spring_row: Index  # (sets,): in which row
+    spring_pull: Array  # (sets, 3, WIDTH): their step by displacement at three times, newest first (-)
+    link_wire: Index  # (sets, ends): which wire links hang on
+    link_row: Index  # (sets,): first of four rows; links hang straight down, both ends are in the same ones
+    link_weight: Array  # (sets, 4, WIDTH): of the four nodes
+    link_move: Array  # (sets, ends times 4, WIDTH): displacement of the nodes in a step by 1 N (m/N)
+    link_linear: Array  # (sets, 2, WIDTH): change of tension by mean extension before and after (N/m)
+    link_yield: Array  # (sets, WIDTH): mean relative displacement of the ends over a step by 1 N (m/N)
+    link_stiffness: Array  # (sets, WIDTH): in tension (N/m)
+    link_room: Array  # (sets, WIDTH): by which its ends may approach, as designed, until the wires touch (m)
+    link_set: Index  # (links,): set of each of the window's links, in their order along the line
+    link_segment: Index  # (links,): its place there
     link_static: Array  # (rows, links of the window or the line): static tension (N)
     link_gap: Array  # likewise: how far the ends of a slack one must part before it pulls (m)
 
@@ -54,16 +68,17 @@ class FlexibleLine(NamedTuple):
 class FlexibleWire(NamedTuple):
     """What moves, in all lanes."""
 
-    displacement: Array  # (lanes, wires, nodes): u, about the static shape (m)
-    increment: Array  # (lanes, wires, nodes): d, over the last step (m)
-    all_displacement: Array  # (lanes, all nodes): the same memory as ``displacement``
-    all_increment: Array  # (lanes, all nodes): the same memory as ``increment``
-    blend: Array  # (lanes, nodes): what the stencil acts on, scratch (m)
+    displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, about the static shape (m)
+    increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
     first_span: Index  # (lanes,): spans that the window has travelled
-    contact_node: Index  # (lanes, contacts): first of the four nodes about a contact point
-    contact_weight: Array  # (lanes, contacts, 4): of these nodes
+    contact_row: Index  # (lanes, contacts): row of the first of the four nodes about a contact point
+    contact_segment: Index  # (lanes, contacts): its segment
+    contact_weight: Array  # (lanes, contacts, 4): of the four
     unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
-    spring_past: Array  # (lanes, springs): increment before the step, scratch (m)
+    spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
     # Extensions are about static, less the gap of a link that is slack there.
-    extension: Array  # (lanes, 2 times, links): before the step and at its start (m)
-    change: Array  # (lanes, links): of the tension about the static one, over the last step (N)
+    past_extension: Array  # (lanes, sets, WIDTH): before the step (m)
+    extension: Array  # (lanes, sets, WIDTH): at its start (m)
+    change: Array  # (lanes, sets, WIDTH): of the tension about the static one, over the last step (N)
+    static: Array  # (lanes, sets, WIDTH): ``link_static`` of the window's links (N)
+    gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of them (m)

@@ -1,14 +1,10 @@
-"""Links between wires in a kernel: droppers, which pull and go slack.
-
-Displacements and increments are those of all nodes, one wire after the other.
-"""
+"""Links between wires in a kernel: droppers, which pull and go slack, those of a set side by side."""
 
 from __future__ import annotations
 
-import math
-
-from ....backend import NOT_NEGATIVE, inlined
+from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
 from .line import LOWER, UPPER
+from .segments import move, read
 
 
 @inlined
@@ -20,88 +16,80 @@ def defect_row(table, lane):
 @inlined
 def first_link(line, first_span):
     """Where the window's links begin in the tables of static tension and gap."""
-    count = line.link_weight.shape[0]
+    count = line.link_set.size
     return min(first_span * (count // line.window), line.link_static.shape[1] - count) & NOT_NEGATIVE
 
 
 @inlined
-def difference(u, lower, upper, weight):
-    """How far four nodes from ``upper`` on stand over four from ``lower`` on, weighted (m)."""
-    return (
-        weight[0] * (u[upper] - u[lower])
-        + weight[1] * (u[upper + 1] - u[lower + 1])
-        + weight[2] * (u[upper + 2] - u[lower + 2])
-        + weight[3] * (u[upper + 3] - u[lower + 3])
-    )
+def difference(lower, upper, row, weight, rows):
+    """How far the upper wire stands over the lower one at the links of a set (m)."""
+    total = load_row(weight, 0) * (read(upper, row, rows) - read(lower, row, rows))
+    for k in range(1, 4):
+        total += load_row(weight, k) * (read(upper, row + k, rows) - read(lower, row + k, rows))
+    return total
 
 
 @inlined
-def move_nodes(u, d, i, move, force):
-    """Move four nodes from i on by ``move`` times the force (N)."""
-    # All is read before any is written, so that the four become one vector.
-    m0, m1, m2, m3 = move[0] * force, move[1] * force, move[2] * force, move[3] * force
-    d0, d1, d2, d3 = d[i] + m0, d[i + 1] + m1, d[i + 2] + m2, d[i + 3] + m3
-    u0, u1, u2, u3 = u[i] + m0, u[i + 1] + m1, u[i + 2] + m2, u[i + 3] + m3
-    d[i], d[i + 1], d[i + 2], d[i + 3] = d0, d1, d2, d3
-    u[i], u[i + 1], u[i + 2], u[i + 3] = u0, u1, u2, u3
-
-
-@inlined
-def measure_extensions(node, weight, u, past, now, gap):
+def measure_extensions(line, u, past, now, gap):
     """Extensions (m) before the step and at its start, from displacements at its start."""
-    for k in range(weight.shape[0]):
-        past[k] = now[k]
-        lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
-        now[k] = difference(u, lower, upper, weight[k]) - gap[k]
+    for s in range(line.link_row.size):
+        lower, upper = u[line.link_wire[s, LOWER] & NOT_NEGATIVE], u[line.link_wire[s, UPPER] & NOT_NEGATIVE]
+        apart = difference(lower, upper, line.link_row[s], line.link_weight[s], line.rows)
+        store_row(past, s, load_row(now, s))
+        store_row(now, s, apart - load_row(gap, s))
 
 
 @inlined
 def slackening(stiffness, static, past, free, yielding):
-    """Change of tension (N) of a link that is slack before or after the step.
+    """Change of tension (N) of links that are slack before or after the step.
 
-    Its extension, averaged over a step, goes from ``past`` to ``free - yielding * change`` (m). The
+    Their extension, averaged over a step, goes from ``past`` to ``free - yielding * change`` (m). The
     force is the change of the spring's energy over the change of extension (a discrete gradient), so
     that going slack and taut again conserves energy.
     """
     slack = static / stiffness  # extensions below -slack carry no tension
     a, b = past + slack, free + slack + yielding * static  # b: were the tension 0
-    if a >= 0.0:
-        # from taut to slack: T = k a^2 / (2 (a - b + yielding T))
-        fall = a - b
-        tension = (math.sqrt(fall * fall + 2 * yielding * stiffness * a * a) - fall) / (2 * yielding)
-        return tension - static
-    if b <= 0.0:
-        return -static
+    # from taut to slack: T = k a^2 / (2 (a - b + yielding T))
+    fall = a - b
+    falling = (root(fall * fall + 2.0 * yielding * stiffness * a * a) - fall) / (2.0 * yielding)
     # from slack to taut, at the extension e > 0: k e^2 = 2 T (e - a), e = b - yielding T
     stiff = 1.0 + 0.5 * stiffness * yielding
-    e = (a + b + math.sqrt((a + b) ** 2 - 4 * stiff * a * b)) / (2 * stiff)
-    return (b - e) / yielding - static
+    e = (a + b + root((a + b) * (a + b) - 4.0 * stiff * a * b)) / (2.0 * stiff)
+    rising = choose(b > 0.0, (b - e) / yielding, 0.0 * b)
+    return choose(a < 0.0, rising, falling) - static
 
 
 @inlined
 def pull_links(line, u, d, past, now, static, change):
     """Links: each one scalar equation for its tension, which is never negative."""
-    node, weight, move = line.link_node, line.link_weight, line.link_move
-    linear, yielding = line.link_linear, line.link_yield
-    stiffness, half = line.link_stiffness, line.half[0]
-    for k in range(weight.shape[0]):
-        lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
-        step = difference(d, lower, upper, weight[k])
-        before, free = half * (past[k] + now[k]), now[k] + half * step
-        taut = linear[k, 0] * before + linear[k, 1] * free  # the mean spring force
-        change[k] = max(taut, -static[k])
-        if stiffness[k] * min(before, free - yielding[k] * taut) < -static[k]:
-            change[k] = slackening(stiffness[k], static[k], before, free, yielding[k])
-        pull = change[k]  # read back, in the precision of the wires
-        move_nodes(u, d, lower, move[k, LOWER], pull)
-        move_nodes(u, d, upper, move[k, UPPER], -pull)
+    rows = line.rows
+    for s in range(line.link_row.size):
+        lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
+        row, move_by, linear = line.link_row[s], line.link_move[s], line.link_linear[s]
+        step = difference(d[lower], d[upper], row, line.link_weight[s], rows)
+        stiffness, yielding = load_row(line.link_stiffness, s), load_row(line.link_yield, s)
+        before = 0.5 * (load_row(past, s) + load_row(now, s))
+        free, least = load_row(now, s) + 0.5 * step, -load_row(static, s)
+        taut = load_row(linear, 0) * before + load_row(linear, 1) * free  # the mean spring force
+        pull = larger(taut, least)
+        slack = stiffness * smaller(before, free - yielding * taut) < least
+        if any_of(slack):
+            pull = choose(slack, slackening(stiffness, load_row(static, s), before, free, yielding), pull)
+        store_row(change, s, pull)
+        for k in range(4):
+            move(u[lower], d[lower], row + k, rows, load_row(move_by, k) * pull)
+            move(u[upper], d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))
 
 
 @inlined
-def shift_extensions(now, gap, spans, first):
-    """Let the window, of so many spans, travel by one: links of fresh wire are at rest."""
-    per_span = now.size // spans
-    for k in range(now.size - per_span):
-        now[k] = now[k + per_span]
-    for k in range(now.size - per_span, now.size):
-        now[k] = 0.0 - gap[first + k]
+def follow_links(line, row, first_span, now, static, gap):
+    """Let the window have travelled by a span, to ``first_span``: links of fresh wire are at rest."""
+    links, number, segment = line.link_set.size, line.link_set, line.link_segment
+    per_span, first = links // line.window, first_link(line, first_span)
+    for k in range(links):
+        static[number[k], segment[k]] = line.link_static[row, first + k]
+        gap[number[k], segment[k]] = line.link_gap[row, first + k]
+    for k in range(links - per_span):
+        now[number[k], segment[k]] = now[number[k + per_span], segment[k + per_span]]
+    for k in range(links - per_span, links):
+        now[number[k], segment[k]] = 0.0 - gap[number[k], segment[k]]

@@ -10,7 +10,7 @@ from ....base.arrays import Array
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
-from .build import at_rest, constants, dropper_positions
+from .build import at_rest, constants, dropper_positions, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
 from .resolution import resolution
@@ -76,14 +76,9 @@ class FlexibleCatenary:
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
         """Put one lane's wires at rest, as ``drawn`` has them; a force (N) at the anchor moves no wire."""
-        line, wire = self.line, self.wire
         if self._lines_differ:
             self._write_defects(lane, drawn)
-        for array in (wire.displacement, wire.increment, wire.change):
-            array[lane] = 0.0
-        gap = line.link_gap[min(lane, len(line.link_gap) - 1)]
-        wire.extension[lane] = 0.0 - gap[: len(line.link_node)]
-        wire.first_span[lane] = 0
+        settle(self.line, self.wire, lane)
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
@@ -125,7 +126,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: 
             f"A time step of {1e3 * step:g} ms is unstable on a grid of {span / finest:g} m "
             f"for line '{data.name}'; take a shorter step or a coarser grid."
         )
-    for count in range(finest, 7, -1):
+    for count in range(finest, 2 * WIDTH - 1, -WIDTH):
         if stable(data, span / count, step):
             return Resolution(span / count, step)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")

@@ -10,7 +10,7 @@ acts on it. So the wire's displacement at the ends of a step is the mean of u be
 
 from __future__ import annotations
 
-from ....backend import NOT_NEGATIVE, implements, inlined
+from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
 from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
@@ -23,19 +23,19 @@ from ..protocol import (
     rise_at_contact,
 )
 from .line import CONTACT, LOWER, UPPER, FlexibleLine
-from .links import defect_row, difference, first_link, measure_extensions, pull_links, shift_extensions
+from .links import defect_row, difference, follow_links, measure_extensions, pull_links
+from .segments import shift_nodes
 from .wires import (
-    absorb,
-    anchor,
-    apply_on_contact_wire,
     apply_springs,
     deflection,
+    end_wire,
     keep_spring_past,
     leapfrog,
     locate,
+    move_place,
     rise_by_defects,
-    shift_window,
     static_height,
+    yield_of_place,
 )
 
 
@@ -45,9 +45,14 @@ def follow(line, wire, lane, x):
     ahead = int(x / line.span) - wire.first_span[lane]
     if 2 * ahead > line.window - 1 and wire.first_span[lane] + line.window < line.spans:
         wire.first_span[lane] += 1
-        gap = line.link_gap[defect_row(line.link_static, lane)]
-        shift_window(wire.displacement[lane], wire.increment[lane], line.window)
-        shift_extensions(wire.extension[lane, 1], gap, line.window, first_link(line, wire.first_span[lane]))
+        per_span = line.rows * WIDTH // line.window
+        for w in range(wire.displacement.shape[1]):
+            shift_nodes(wire.displacement[lane, w], line.rows, per_span)
+            shift_nodes(wire.increment[lane, w], line.rows, per_span)
+        row = defect_row(line.link_static, lane)
+        follow_links(
+            line, row, wire.first_span[lane], wire.extension[lane], wire.static[lane], wire.gap[lane]
+        )
 
 
 @inlined
@@ -64,106 +69,98 @@ def unmoved_height(line, lane, x):
 def _place(line, wire, lane, contact, x):
     if contact == 0:
         follow(line, wire, lane, x)
-    u, d = wire.displacement[lane], wire.increment[lane]
-    start = wire.first_span[lane] * line.span
-    first, weights = locate(x - start, line.spacing, u.shape[1])
-    wire.contact_node[lane, contact] = first
+    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    row, segment, weight = locate(x - wire.first_span[lane] * line.span, line.spacing, line.rows)
+    wire.contact_row[lane, contact], wire.contact_segment[lane, contact] = row, segment
     for k in range(4):
-        wire.contact_weight[lane, contact, k] = weights[k]
+        wire.contact_weight[lane, contact, k] = weight[k]
     height = unmoved_height(line, lane, x)
     wire.unmoved_height[lane, contact] = height
-    return height + deflection(u, d, first, weights, 0.5), height + deflection(u, d, first, weights, 0.0)
+    before = height + deflection(u, d, row, segment, weight, 0.5)
+    return before, height + deflection(u, d, row, segment, weight, 0.0)
 
 
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
-    u, d, q = wire.displacement[lane], wire.increment[lane], wire.blend[lane]
-    all_u, all_d, spring_past = wire.all_displacement[lane], wire.all_increment[lane], wire.spring_past[lane]
-    past, now = wire.extension[lane, 0], wire.extension[lane, 1]
-    row = defect_row(line.link_static, lane)
-    first = first_link(line, wire.first_span[lane])
-    static, gap = line.link_static[row, first:], line.link_gap[row, first:]
-    keep_spring_past(line.spring_node, all_d, spring_past)
-    measure_extensions(line.link_node, line.link_weight, all_u, past, now, gap)
+    u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
+    past, now = wire.past_extension[lane], wire.extension[lane]
+    keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
+    measure_extensions(line, u, past, now, wire.gap[lane])
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], q, line.inertia[w], line.stencil[w])
-    apply_springs(line.spring_node, line.spring_mobility, line.spring_levels, all_u, all_d, spring_past)
-    pull_links(line, all_u, all_d, past, now, static, wire.change[lane])
+        leapfrog(u[w], d[w], line.inertia[w], line.stencil[w])
+    apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
+    pull_links(line, u, d, past, now, wire.static[lane], wire.change[lane])
 
 
 @implements(rise_at_contact, FlexibleLine)
 def _rise(line, wire, lane, contact, x0, x1):
-    u, d = wire.displacement[lane], wire.increment[lane]
-    start = wire.first_span[lane] * line.span
-    first_0, weights_0 = locate(x0 - start, line.spacing, u.shape[1])
-    first_1, weights_1 = locate(x1 - start, line.spacing, u.shape[1])
-    deflected = deflection(u, d, first_1, weights_1, 1.0) - deflection(u, d, first_0, weights_0, 1.0)
+    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    start, rows = wire.first_span[lane] * line.span, line.rows
+    row_0, segment_0, weight_0 = locate(x0 - start, line.spacing, rows)
+    row_1, segment_1, weight_1 = locate(x1 - start, line.spacing, rows)
+    before = deflection(u, d, row_0, segment_0, weight_0, 1.0)
+    deflected = deflection(u, d, row_1, segment_1, weight_1, 1.0) - before
     return unmoved_height(line, lane, x1) - unmoved_height(line, lane, x0) + deflected
 
 
 @implements(look_at_contact, FlexibleLine)
 def _look(line, wire, lane, contact, x):
-    u, d, mobility = wire.displacement[lane], wire.increment[lane], line.mobility
-    first, weights = wire.contact_node[lane, contact] & NOT_NEGATIVE, wire.contact_weight[lane, contact]
-    compliance = 0.0
-    for k in range(4):
-        compliance += 0.5 * weights[k] * weights[k] * mobility[CONTACT, first + k]
-    height = wire.unmoved_height[lane, contact] + deflection(u, d, first, weights, 0.5)
+    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
+    weight = wire.contact_weight[lane, contact]
+    compliance = 0.5 * yield_of_place(line.mobility[CONTACT], row, segment, weight)
+    height = wire.unmoved_height[lane, contact] + deflection(u, d, row, segment, weight, 0.5)
     return height, compliance, 0.0, 0.0
 
 
 @implements(apply_force, FlexibleLine)
 def _apply(line, wire, lane, contact, x, force):
-    first, weights = wire.contact_node[lane, contact] & NOT_NEGATIVE, wire.contact_weight[lane, contact]
-    u, d = wire.displacement[lane], wire.increment[lane]
-    apply_on_contact_wire(u, d, line.mobility, first, weights, force)
+    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
+    weight = wire.contact_weight[lane, contact]
+    move_place(u, d, line.mobility[CONTACT], row, segment, weight, force)
 
 
 @implements(end_step, FlexibleLine)
 def _end(line, wire, lane):
-    u, d = wire.displacement[lane], wire.increment[lane]
-    first_span, last = wire.first_span[lane], u.shape[1] - 1
-    for w in range(u.shape[0]):
-        if first_span == 0:
-            anchor(u[w], 0, 1)
-            anchor(d[w], 0, 1)
-        else:
-            absorb(u[w], d[w], line.absorbing[w], 0, 1)
-        if first_span + line.window >= line.spans:
-            anchor(u[w], last, -1)
-            anchor(d[w], last, -1)
-        else:
-            absorb(u[w], d[w], line.absorbing[w], last, -1)
+    first_span = wire.first_span[lane]
+    at_start, at_end = first_span == 0, first_span + line.window >= line.spans
+    for w in range(wire.displacement.shape[1]):
+        u, d = wire.displacement[lane, w], wire.increment[lane, w]
+        end_wire(u, d, line.absorbing[w], at_start, at_end)
 
 
 @implements(ending_by_wire, FlexibleLine)
 def _ending(line, wire, lane):
-    u, d = wire.all_displacement[lane], wire.all_increment[lane]
-    for s in range(line.uplift_node.size):
-        i = line.uplift_node[s] & NOT_NEGATIVE
-        if u[i] > line.free_uplift:
-            return ENDING.STOP if abs(d[i]) < line.largest_move else ENDING.DIVERGED
+    u, d = wire.displacement[lane], wire.increment[lane]
+    for s in range(line.mast_row.size):
+        i, j = line.mast_row[s] & NOT_NEGATIVE, line.mast_segment[s] & NOT_NEGATIVE
+        if u[CONTACT, i, j] > line.free_uplift:
+            return ENDING.STOP if abs(d[CONTACT, i, j]) < line.largest_move else ENDING.DIVERGED
     # The wires are nearest to each other at a dropper: between two, the contact wire hangs.
-    node, weight = line.link_node, line.link_weight
-    for k in range(line.link_room.size):
-        lower, upper = node[k, LOWER] & NOT_NEGATIVE, node[k, UPPER] & NOT_NEGATIVE
-        if difference(u, lower, upper, weight[k]) < -line.link_room[k]:
-            closing = abs(difference(d, lower, upper, weight[k]))
-            return ENDING.WIRES if closing < line.largest_move else ENDING.DIVERGED
+    for s in range(line.link_row.size):
+        lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
+        row, weight = line.link_row[s], line.link_weight[s]
+        apart = difference(u[lower], u[upper], row, weight, line.rows)
+        touching = apart < -load_row(line.link_room, s)
+        if any_of(touching):
+            closing = difference(d[lower], d[upper], row, weight, line.rows)
+            quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
+            return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     return ENDING.NONE
 
 
 @implements(record_wire, FlexibleLine)
 def _record(line, wire, lane, uplift, tension):
     first_span = wire.first_span[lane]
-    for s in range(line.uplift_node.size):
+    for s in range(line.mast_row.size):
         if first_span + s < uplift.size:
-            node = line.uplift_node[s]
-            uplift[first_span + s] = wire.all_displacement[lane, node] - 0.5 * wire.all_increment[lane, node]
+            i, j = line.mast_row[s], line.mast_segment[s]
+            u, d = wire.displacement[lane, CONTACT, i, j], wire.increment[lane, CONTACT, i, j]
+            uplift[first_span + s] = u - 0.5 * d
     if tension.size > 0:
-        links = line.link_weight.shape[0]
+        links = line.link_set.size
         first = first_span * (links // line.window)
-        static = line.link_static[defect_row(line.link_static, lane)]
-        begin = first_link(line, first_span)
         for k in range(links):
-            tension[first + k] = static[begin + k] + wire.change[lane, k]
+            i, j = line.link_set[k], line.link_segment[k]
+            tension[first + k] = wire.static[lane, i, j] + wire.change[lane, i, j]

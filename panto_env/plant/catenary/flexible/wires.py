@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ....backend import NOT_NEGATIVE, floor, inlined
+from ....backend import NOT_NEGATIVE, WIDTH, floor, inlined, load_row, store_row
 from ...interpolation import cubic_weights
-from .line import CONTACT, PAD
+from .line import PAD
+from .segments import node_after, row_of, segment_of, share_ends
 
 
 @inlined
@@ -33,106 +34,129 @@ def rise_by_defects(pieces, breaks, decay, x):
 
 
 @inlined
-def locate(x, spacing, nodes):
-    """First of the four nodes around x (m from the grid's start), and their weights."""
+def locate(x, spacing, rows):
+    """Row and segment of the first of the four nodes around x (m from the window's start); their weights."""
     ratio = x / spacing
-    left = min(max(int(floor(ratio)), 0), nodes - 2 * PAD - 2)
-    return (left - 1 + PAD) & NOT_NEGATIVE, cubic_weights(ratio - left)
+    left = min(max(int(floor(ratio)), 0), rows * WIDTH - 1)
+    segment = segment_of(left - 1, rows)
+    return row_of(left - 1, segment, rows), segment, cubic_weights(ratio - left)
 
 
 @inlined
-def deflection(u, d, first, weights, ago):
-    """Displacement (m) of the contact wire at a place among four nodes, by a share of a step ago."""
+def deflection(u, d, row, segment, weight, ago):
+    """Displacement (m) of a wire at a place among four nodes, by a share of a step ago."""
     total = 0.0
     for k in range(4):
-        total += weights[k] * (u[CONTACT, first + k] - ago * d[CONTACT, first + k])
+        i, j = node_after(row, segment, k, u.shape[0])
+        total += weight[k] * (u[i, j] - ago * d[i, j])
     return total
 
 
 @inlined
-def leapfrog(u, d, q, inertia, stencil):
-    """One step of one bare wire: d <- keep d + S (u + lag d), u <- u + d, with the stencil S."""
+def move_place(u, d, mobility, row, segment, weight, force):
+    """Move a wire by a force (N), spread over four nodes."""
+    for k in range(4):
+        i, j = node_after(row, segment, k, u.shape[0])
+        step = mobility[i, j] * weight[k] * force
+        d[i, j] += step
+        u[i, j] += step
+
+
+@inlined
+def yield_of_place(mobility, row, segment, weight):
+    """Displacement of a place among four nodes in a step by 1 N there (m/N)."""
+    total = 0.0
+    for k in range(4):
+        i, j = node_after(row, segment, k, mobility.shape[0])
+        total += weight[k] * weight[k] * mobility[i, j]
+    return total
+
+
+@inlined
+def leapfrog(u, d, inertia, stencil):
+    """One step of one bare wire: d <- keep d + S (u + lag d), u <- u + d, with the stencil S.
+
+    S is near (second difference) + far (difference over two nodes), written in second differences: weights
+    that only nearly add up to 0 would be a spring, in single precision.
+    """
     near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
     # The least of loads on every node keeps wires at rest away from subnormal numbers, which are slow.
-    quiet = stencil[4]
-    for i in range(u.size):
-        q[i] = u[i] + lag * d[i]
-    # Differences, not weights that only nearly add up to 0: those would be a spring, in single precision.
-    # Indices only ever add to i: a negative one would make Numba check for wrap-around, and the
-    # loop would not be vectorised.
-    if inertia.size == 0:
-        for i in range(u.size - 2 * PAD):
-            c = q[i + 2]
-            force = near * ((q[i + 1] - c) + (q[i + 3] - c)) + far * ((q[i] - c) + (q[i + 4] - c))
-            step = keep * d[i + 2] + force - quiet
-            d[i + 2] = step
-            u[i + 2] += step
-    else:
-        for i in range(u.size - 2 * PAD):
-            c = q[i + 2]
-            force = near * ((q[i + 1] - c) + (q[i + 3] - c)) + far * ((q[i] - c) + (q[i + 4] - c))
-            step = keep * d[i + 2] + inertia[i + 2] * force - quiet
-            d[i + 2] = step
-            u[i + 2] += step
+    quiet, middle = stencil[4], near + far + far
+    before = load_row(u, 1) + lag * load_row(d, 1)
+    here = load_row(u, 2) + lag * load_row(d, 2)
+    after = load_row(u, 3) + lag * load_row(d, 3)
+    slope = after - here
+    bend_before = (here - before) - (before - (load_row(u, 0) + lag * load_row(d, 0)))
+    bend = slope - (here - before)
+    for i in range(PAD, u.shape[0] - PAD):
+        ahead = load_row(u, i + 2) + lag * load_row(d, i + 2)
+        slope_ahead = ahead - after
+        bend_after = slope_ahead - slope
+        force = middle * bend + far * (bend_before + bend_after)
+        if inertia.shape[0] > 0:
+            force = load_row(inertia, i - PAD) * force
+        step = (keep * load_row(d, i) - quiet) + force
+        store_row(d, i, step)
+        store_row(u, i, load_row(u, i) + step)
+        after, slope, bend_before, bend = ahead, slope_ahead, bend, bend_after
 
 
 @inlined
-def apply_on_contact_wire(u, d, mobility, first, weights, force):
-    """Move the contact wire by a force (N), spread over four nodes."""
-    for k in range(4):
-        step = mobility[CONTACT, first + k] * weights[k] * force
-        d[CONTACT, first + k] += step
-        u[CONTACT, first + k] += step
-
-
-@inlined
-def keep_spring_past(node, d, past):
+def keep_spring_past(wire, row, d, past):
     """Keep what the leapfrog overwrites: increments where springs hold the wires."""
-    for s in range(node.size):
-        past[s] = d[node[s] & NOT_NEGATIVE]
+    for s in range(row.size):
+        store_row(past, s, load_row(d[wire[s] & NOT_NEGATIVE], row[s]))
 
 
 @inlined
-def apply_springs(node, mobility, levels, u, d, past):
+def apply_springs(wire, row, pull, u, d, past):
     """Springs and dampers to the ground (messenger supports, steady arms), each implicit at its node."""
-    for s in range(node.size):
-        i = node[s] & NOT_NEGATIVE
-        new, now = u[i], u[i] - d[i]
-        pull = levels[s, 0] * new + levels[s, 1] * now + levels[s, 2] * (now - past[s])
-        step = mobility[s] * pull / (1.0 + levels[s, 0] * mobility[s])
-        d[i] -= step
-        u[i] -= step
+    for s in range(row.size):
+        i, its_u, its_d = row[s], u[wire[s] & NOT_NEGATIVE], d[wire[s] & NOT_NEGATIVE]
+        new, increment = load_row(its_u, i), load_row(its_d, i)
+        now = new - increment
+        by_time = pull[s]
+        step = (
+            load_row(by_time, 0) * new
+            + load_row(by_time, 1) * now
+            + load_row(by_time, 2) * (now - load_row(past, s))
+        )
+        store_row(its_d, i, increment - step)
+        store_row(its_u, i, new - step)
 
 
 @inlined
-def anchor(u, end, inward):
-    """No displacement, no moment (odd continuation) at one end of a wire."""
-    middle = end + 2 * inward
-    u[middle] = 0.0
-    u[middle - inward] = -u[middle + inward]
-    u[middle - 2 * inward] = -u[middle + 2 * inward]
+def anchor(x, row, segment, inward, beyond):
+    """No displacement, no moment (odd continuation by so many nodes) at one end of a wire."""
+    x[row, segment] = 0.0
+    for k in range(1, beyond + 1):
+        x[row - k * inward, segment] = -x[row + k * inward, segment]
 
 
 @inlined
-def absorb(u, d, absorbing, end, inward):
-    """Let waves leave at one end of a wire: Mur's one-way wave equation, node by node outward."""
-    for k in range(1, -1, -1):
-        i = end + k * inward
-        inner, inner_step = u[i + inward], d[i + inward]  # already at the new time
-        step = (1.0 + absorbing) * (inner - inner_step - u[i]) + absorbing * inner_step
-        d[i] = step
-        u[i] += step
+def absorb(u, d, absorbing, row, segment, inward):
+    """Let waves leave at one end of a wire: Mur's one-way wave equation, from this row on outward."""
+    for k in range(PAD):
+        i = row - k * inward
+        inner, inner_step = u[i + inward, segment], d[i + inward, segment]  # already at the new time
+        step = (1.0 + absorbing) * (inner - inner_step - u[i, segment]) + absorbing * inner_step
+        d[i, segment] = step
+        u[i, segment] += step
 
 
 @inlined
-def shift_window(u, d, spans):
-    """Let the window, of so many spans, travel by one: fresh wire, at rest, comes in ahead."""
-    nodes = u.shape[1]
-    step = (nodes - 1 - 2 * PAD) // spans
-    for w in range(u.shape[0]):
-        for i in range(nodes - step):
-            u[w, i] = u[w, i + step]
-            d[w, i] = d[w, i + step]
-        for i in range(nodes - step, nodes):
-            u[w, i] = 0.0
-            d[w, i] = 0.0
+def end_wire(u, d, absorbing, at_start, at_end):
+    """Anchor a wire where the window is at the line's start or end; let waves leave elsewhere."""
+    start, end, last = PAD, u.shape[0] - PAD, WIDTH - 1
+    if at_start:
+        anchor(u, start, 0, 1, 2)
+        anchor(d, start, 0, 1, 2)
+    else:
+        absorb(u, d, absorbing, start - 1, 0, 1)
+    if at_end:
+        anchor(u, end, last, -1, 1)
+        anchor(d, end, last, -1, 1)
+    else:
+        absorb(u, d, absorbing, end, last, -1)
+    share_ends(u, u.shape[0] - 2 * PAD)
+    share_ends(d, u.shape[0] - 2 * PAD)

@@ -1,0 +1,145 @@
+"""Segments abreast hold the same wires as one after the other would."""
+
+import numpy as np
+import pytest
+
+from panto_env import simulate
+from panto_env.backend import WIDTH, kernel, load_row
+from panto_env.plant.catenary.flexible.build import Sets
+from panto_env.plant.catenary.flexible.line import PAD
+from panto_env.plant.catenary.flexible.segments import (
+    along,
+    lay_out,
+    move,
+    node_after,
+    places,
+    read,
+    share_ends,
+    shift_nodes,
+    window_nodes,
+)
+
+pytestmark = pytest.mark.plain
+ROWS = 7
+NODES = window_nodes(ROWS)
+
+
+@kernel
+def _share(x, rows):
+    share_ends(x, rows)
+
+
+@kernel
+def _shift(x, rows, count):
+    shift_nodes(x, rows, count)
+
+
+@kernel
+def _read(x, row, rows, out):
+    values = read(x, row, rows)
+    for j in range(WIDTH):
+        out[0, j] = 0.0
+    move(out, out, 0, rows, values)
+
+
+@kernel
+def _move(u, d, row, rows, steps):
+    move(u, d, row, rows, load_row(steps, 0))
+
+
+@kernel
+def _after(row, segment, count, all_rows, out):
+    out[0], out[1] = node_after(row, segment, count, all_rows)
+
+
+def random_wire(kind=np.float64):
+    values = np.random.default_rng(0).normal(size=len(NODES))
+    return values, lay_out(values, ROWS, kind)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_nodes_are_laid_out_and_found_again(kind):
+    values, x = random_wire(kind)
+    assert x.shape == (ROWS + 2 * PAD, WIDTH)
+    np.testing.assert_array_equal(along(x), values.astype(kind))
+    row, segment = places(np.array([-2, 0, ROWS - 1, ROWS, WIDTH * ROWS, WIDTH * ROWS + 1]), ROWS)
+    np.testing.assert_array_equal(row, [0, PAD, PAD + ROWS - 1, PAD, PAD + ROWS, PAD + ROWS + 1])
+    np.testing.assert_array_equal(segment, [0, 0, 0, 1, WIDTH - 1, WIDTH - 1])
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_ends_hold_what_the_neighbours_hold(kind):
+    _, x = random_wire(kind)
+    wanted = x.copy()
+    x[:PAD, 1:] = x[-PAD:, :-1] = 9.0
+    _share(x, ROWS)
+    np.testing.assert_array_equal(x, wanted)
+
+
+@pytest.mark.parametrize("count", [3, ROWS, ROWS + 3, 3 * ROWS])
+def test_a_window_travels_by_any_number_of_nodes(count):
+    values, x = random_wire()
+    _shift(x, ROWS, count)
+    np.testing.assert_array_equal(along(x), np.append(values[count:], np.zeros(count)))
+    kept = x.copy()
+    _share(x, ROWS)
+    np.testing.assert_array_equal(x, kept)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_rows_beyond_a_segment_are_those_of_the_next(kind):
+    values, x = random_wire(kind)
+    for row in range(ROWS + 2 * PAD):
+        out = np.zeros((3, WIDTH), kind)
+        if row >= PAD:
+            x[:PAD, 1:] = x[-PAD:, :-1] = 9.0  # not up to date
+        _read(x, row, ROWS, out)
+        wanted = values[row + ROWS * np.arange(WIDTH)].astype(kind)
+        np.testing.assert_array_equal(out[0], 2 * wanted)  # as displacement and as increment
+
+
+def test_a_step_moves_the_nodes_that_are_read():
+    """And none beyond the window's end."""
+    for row in range(PAD, ROWS + 2 * PAD):
+        u, d = np.zeros((2, ROWS + 2 * PAD, WIDTH))
+        steps = 1.0 + np.arange(WIDTH)[None]
+        _move(u, d, row, ROWS, steps)
+        wanted = np.zeros(len(NODES))
+        wanted[row + ROWS * np.arange(WIDTH)] = steps[0]
+        wanted[NODES >= ROWS * WIDTH] = 0.0
+        for x in (u, d):
+            inner = x[PAD:-PAD].T.ravel()
+            np.testing.assert_array_equal(inner, wanted[PAD:-PAD])
+
+
+def test_the_nodes_after_one():
+    out = np.zeros(2, dtype=np.int64)
+    for node in range(-1, WIDTH * ROWS - 1):
+        row, segment = places(np.array(node), ROWS)
+        for count in range(4):
+            _after(int(row), int(segment), count, ROWS + 2 * PAD, out)
+            if node + count < WIDTH * ROWS + PAD:
+                assert tuple(out) == tuple(map(int, places(np.array(node + count), ROWS)))
+
+
+def test_what_hangs_in_the_same_rows_goes_abreast():
+    """Two things in the same rows of a segment, or on other wires, do not."""
+    wires = np.array([[0, 1]] * 5 + [[1, 2]])
+    sets = Sets(wires, np.array([3, 3, 3 + ROWS, 4, 4 + 2 * ROWS, 4 + 3 * ROWS]), ROWS)
+    np.testing.assert_array_equal(sets.number, [0, 1, 0, 2, 2, 3])
+    np.testing.assert_array_equal(sets.segment, [0, 0, 1, 0, 2, 3])
+    np.testing.assert_array_equal(sets.row, PAD + np.array([3, 3, 4, 4]))
+    np.testing.assert_array_equal(sets.wires[[0, 3]], [[0, 1], [1, 2]])
+    table = sets.of(np.arange(12.0).reshape(6, 2), float, empty=-1.0)
+    assert table.shape == (4, 2, WIDTH)
+    np.testing.assert_array_equal(table[2, 1], [7, -1, 9, -1, -1, -1, -1, -1])
+
+
+@pytest.mark.skipif(not __import__("panto_env").backend.JIT, reason="slow in plain Python")
+@pytest.mark.parametrize("window", [3, 4, 5, 7, 9, 12, 16, 0])
+def test_any_window_that_has_not_travelled_gives_the_same_run(window):
+    """However its segments lie to spans and droppers."""
+    given = {"spans": 20, "distance": 55.0, "precision": "double"}
+    reference = simulate(window=8, **given)
+    run = simulate(window=window, **given)
+    assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3
