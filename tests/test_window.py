@@ -10,7 +10,7 @@ from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
 from panto_env.plant.catenary.flexible.static_shape import solve
 from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
-from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.numerics import WINDOW, Numerics, Runs
 from panto_env.studies.en50318 import window as windows
 
 
@@ -79,7 +79,7 @@ def test_window_is_the_whole_line_until_it_travels():
 @pytest.mark.parametrize(("catenary", "pantograph"), windows.LINES)
 @pytest.mark.parametrize("speed", windows.SPEEDS_KMH)
 def test_default_window_agrees_with_the_whole_line(catenary, pantograph, speed):
-    (check,) = windows.check_windows(catenary, pantograph, speed, [Numerics().window_in_use])
+    (check,) = windows.check_windows(catenary, pantograph, speed, [WINDOW])
     assert abs(check.std) < 1
     assert abs(check.max) < 1
     assert abs(check.min) < 1  # % of the mean force

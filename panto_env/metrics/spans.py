@@ -25,7 +25,7 @@ FIRST_SETTLED = 10
 missing falls by about a fifth per span at any speed; docs/validation.md shows what is left."""
 LAST_USUAL = 19
 """Last span of a run unless told otherwise, so that ten are evaluated."""
-CLEAR = 7
+CLEAR = 8
 """Spans that a line has beyond the last one of a pass: no window about the train reaches its end, whose
 anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
 

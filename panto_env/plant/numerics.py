@@ -14,8 +14,10 @@ from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
-WINDOW = {"full": 10, "fast": 8}
-"""Spans computed about the train, by accuracy."""
+WINDOW, SLOW_WINDOW = 8, 16
+"""Spans computed about the train; about a slow one, to which waves come back from far along the line."""
+SLOW_TRAIN = 200 / 3.6
+"""Speed (m/s) below which a train is slow in this sense."""
 
 
 class Numerics(Settings):
@@ -37,8 +39,8 @@ class Numerics(Settings):
     window: int | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, of an even number one more "
-        f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
-        "0: the whole line",
+        f"ahead than behind; by default {WINDOW}, for trains below {3.6 * SLOW_TRAIN:g} km/h {SLOW_WINDOW} "
+        f'unless accuracy="fast"; 0: the whole line',
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
@@ -50,11 +52,6 @@ class Numerics(Settings):
         if value is not None and value != 0 and value < 3:
             raise ValueError("must be a number of spans from 3 up, or 0 for the whole line")
         return value
-
-    @property
-    def window_in_use(self) -> int:
-        """The window asked for, or that of the accuracy; 0: the whole line."""
-        return WINDOW[self.accuracy] if self.window is None else self.window
 
 
 class Runs(NamedTuple):

@@ -43,7 +43,7 @@ def in_use(
     speed = speed_kmh / 3.6
     with warnings.catch_warnings(action="ignore"):  # of coarse grids: what they cost is the question here
         chosen = resolution(line, numerics, Runs((speed, speed), conditions=(condition,)))
-    return numerics.model_copy(update=chosen._asdict() | {"window": numerics.window_in_use})
+    return numerics.model_copy(update=chosen._asdict())
 
 
 def converge(numerics: Numerics) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
 from ...valid_range import LARGEST_SPEED
-from .grid import nodes_per_span, spring_levels, stencil_weights
+from .grid import missing_yield, nodes_per_span, spring_levels, stencil_weights
 from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .resolution import Resolution
 from .schema import FlexibleCatenaryData
@@ -21,6 +21,8 @@ from .segments import lay_out, places
 from .static_shape import StaticShape
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
+STIFFEST = 1e8
+"""Of a link on the grid (N/m), in tension."""
 MOST_NODES = 1_000_000
 """Of a wire on its grid: more would take the memory of a machine, and a run of them days."""
 QUIET = 1e-25
@@ -53,7 +55,7 @@ def constants(
 
     Raises InputError where the nodes are too many.
     """
-    window = min(numerics.window_in_use or spans, spans)
+    window = min(resolution.window or spans, spans)
     step, damping = resolution.time_step, data.damping
     per_span = nodes_per_span(data, resolution.spacing)
     dx = data.span_length / per_span
@@ -85,10 +87,16 @@ def constants(
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
     inertia = own / mass
 
+    # What the wires yield too little on the grid, a link yields instead.
+    ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
+    missing = sum(
+        count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
+    )
+    stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
     move = np.stack([mobility[links.wires[:, end, None], four] * weights for end in (LOWER, UPPER)], axis=1)
     relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
     early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
-    linear = np.outer(links.stiffness, (early, late)) / (1 + late * links.stiffness * relative)[:, None]
+    linear = np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None]
 
     real = np.float32 if numerics.precision == "single" else np.float64
     keep = (1.0 - damping.alpha * step / 2) / settle
@@ -132,7 +140,7 @@ def constants(
         link_move=joined.of(move.reshape(-1, 8), real),
         link_linear=joined.of(linear, real),
         link_yield=joined.of(relative, real, 1.0),
-        link_stiffness=joined.of(links.stiffness, real, 1.0),
+        link_stiffness=joined.of(stiffness, real, 1.0),
         link_room=joined.of(room, real, 1.0),
         link_set=joined.number,
         link_segment=joined.segment,

@@ -57,7 +57,7 @@ class FlexibleLine(NamedTuple):
     link_move: Array  # (sets, ends times 4, WIDTH): displacement of the nodes in a step by 1 N (m/N)
     link_linear: Array  # (sets, 2, WIDTH): change of tension by mean extension before and after (N/m)
     link_yield: Array  # (sets, WIDTH): mean relative displacement of the ends over a step by 1 N (m/N)
-    link_stiffness: Array  # (sets, WIDTH): in tension (N/m)
+    link_stiffness: Array  # (sets, WIDTH): in tension, with what the grid's wires yield too little (N/m)
     link_room: Array  # (sets, WIDTH): by which its ends may approach, as designed, until the wires touch (m)
     link_set: Index  # (links,): set of each of the window's links, in their order along the line
     link_segment: Index  # (links,): its place there

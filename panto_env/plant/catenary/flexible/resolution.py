@@ -1,4 +1,4 @@
-"""Grid and time step of a flexible catenary: what is fine enough for the runs that it is built for.
+"""Grid, time step and window of a flexible catenary: what is enough for the runs that it is built for.
 
 A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what happens at
 f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple
@@ -16,12 +16,12 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
-from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
+from ...numerics import SAMPLES_PER_WAVE, SLOW_TRAIN, SLOW_WINDOW, WINDOW, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 
-GRIDS = ((0.69, 0.25, 1e-3), (0.72, 0.25, 0.625e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
+GRIDS = ((0.6, 1 / 3, 1e-2 / 6), (0.72, 0.3, 1.25e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
 """Up to which share of the wave speed a grid (m) is fine and a time step (s) is short enough."""
 NODES_HZ = 60.0
 """How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
@@ -29,7 +29,13 @@ SLOWEST_HZ = 22.0
 """Below which (Hz) a ripple is in the filtered force."""
 FINEST_GRID = 0.1
 """Grid (m) that the slowest trains get."""
-SLOW = ((50 / 3.6, 0.2, 0.125e-3), (150 / 3.6, 0.2, 0.25e-3), (np.inf, 0.25, 1e-3))
+SLOW = (
+    (50 / 3.6, 0.12, 0.125e-3),
+    (100 / 3.6, 0.2, 0.25e-3),
+    (150 / 3.6, 0.2, 0.5e-3),
+    (200 / 3.6, 0.3, 1e-3),
+    (np.inf, np.inf, np.inf),
+)
 """Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
 HARD_CONTACT_GRID = 0.15
 """Grid (m) that a hard contact wants."""
@@ -39,10 +45,13 @@ DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
 HEAVY_CLAMP = 1.0
 """Mass of a clamp on the contact wire (kg) that wants the finest grid where waves are deep."""
-FAST_GRID, FAST_FINE_ENOUGH = 1 / 3, 0.375
-"""Grid (m) for ``accuracy="fast"``, where it is stable, and the coarsest for which the longer of the two time
-steps is taken."""
+FAST_GRIDS = ((0.6, 0.5), (0.72, 0.4), (1.0, 1 / 3))
+"""Up to which share of the wave speed a grid (m) is taken for ``accuracy="fast"``."""
+FAST_NODES_HZ = 40.0
+"""How often a train must pass a node then (Hz)."""
 FAST_STEPS = (2.5e-3, 2e-3)
+"""Time steps (s) for it: the longer one where that is stable on the grid, else the shorter, on a coarser grid
+if need be."""
 FAST_SAMPLES_PER_WAVE = 3
 
 
@@ -51,10 +60,11 @@ class Resolution(NamedTuple):
 
     spacing: float  # of the grid (m)
     time_step: float  # s
+    window: int  # spans computed about the train; 0: the whole line
 
 
 def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Resolution:
-    """Grid and time step: those asked for, or those that the accuracy asks for, and stable together.
+    """Grid, time step and window: those asked for, or those that the accuracy asks for, stable together.
 
     Warns where what is asked for is coarser than figures within 1 % want. Raises InputError where grid and
     step are not stable together, or waves of the wire are too short for the step.
@@ -101,25 +111,31 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
-    return Resolution(min(spacing, grid), min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)))
+    window = SLOW_WINDOW if slow < SLOW_TRAIN else WINDOW
+    return Resolution(min(spacing, grid), min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)), window)
 
 
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     longer, shorter = FAST_STEPS
-    grid = data.span_length / nodes_per_span(data, FAST_FINE_ENOUGH)
+    slow, quick = runs.speeds
+    wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+    spacing = next((grid for share, grid in FAST_GRIDS if quick <= share * wave_speed), FAST_GRIDS[-1][1])
+    spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
+    grid = data.span_length / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer) else shorter
-    return Resolution(FAST_GRID, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
+    return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW)
 
 
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: Resolution) -> Resolution:
     """Nodes evenly over a span, and a step of which the control interval is a whole number."""
     span, given = data.span_length, numerics.spacing
+    window = wanted.window if numerics.window is None else numerics.window
     finest = nodes_per_span(data, given or wanted.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(wanted.time_step)
         while not stable(data, span / finest, step):
             step = runs.whole_part(0.95 * step)
-        return Resolution(span / finest, step)
+        return Resolution(span / finest, step, window)
     step = numerics.time_step or runs.whole_part(wanted.time_step)
     if given is not None and not stable(data, span / finest, step):
         raise InputError(
@@ -128,7 +144,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: 
         )
     for count in range(finest, 2 * WIDTH - 1, -WIDTH):
         if stable(data, span / count, step):
-            return Resolution(span / count, step)
+            return Resolution(span / count, step, window)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
