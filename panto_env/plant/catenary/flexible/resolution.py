@@ -21,7 +21,14 @@ from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 
-GRIDS = ((0.6, 1 / 3, 1e-2 / 6), (0.72, 0.3, 1.25e-3), (0.87, 0.15, 1e-3), (1.0, 0.125, 1e-3))
+GRIDS = (
+    (0.6, 1 / 3, 1e-2 / 6),
+    (0.69, 0.3, 1.25e-3),
+    (0.74, 0.25, 1e-3),
+    (0.78, 0.2, 1e-3),
+    (0.87, 0.15, 1e-3),
+    (1.0, 0.125, 1e-3),
+)
 """Up to which share of the wave speed a grid (m) is fine and a time step (s) is short enough."""
 NODES_HZ = 60.0
 """How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
