@@ -88,7 +88,8 @@ def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Bench
     assert outcome.spans == ((3, 5),)
     run = simulate(policy="p", seed=1, distance=310.0, line_condition="fair", record_droppers=False)
     assert outcome.rows[3].figures == run.summary((3, 5))
-    steps = np.diff(run.frame_force[run.position > 120][4::10])  # once a control interval
+    interval = round(0.01 / run.time_step)
+    steps = np.diff(run.frame_force[run.position > 120][4::interval])
     assert outcome.rows[3].action_rate == pytest.approx(np.sqrt(np.mean((steps / 0.01) ** 2)), 0.03)
     assert outcome.rows[0].action_rate == outcome.rows[0].figures.effort == 0
 

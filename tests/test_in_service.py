@@ -109,7 +109,7 @@ def test_run_in_is_no_part_of_the_episode_s_figures():
     assert figures["contact_loss"] == pytest.approx(100 * (run.contact_force[inside] <= 0).mean())
     assert not run.frame_force[~inside].any()
     assert run.frame_force[inside].any()
-    assert len(seen) == len(infos) == len(run.time[inside]) // 10 + 1
+    assert len(seen) == len(infos) == len(run.time[inside]) // round(0.01 / run.time_step) + 1
     # And what runs in runs as any passive train does.
     passive = simulate(spans=10, distance=240.0)
     np.testing.assert_array_equal(run.contact_force[~inside], passive.contact_force[: (~inside).sum()])

@@ -2,12 +2,25 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from panto_env import InputError
 from panto_env.metrics.figures import Figures, contact_loss, cost_function
 from panto_env.metrics.labels import LABELS
-from panto_env.metrics.low_pass import low_pass
+from panto_env.metrics.low_pass import low_pass, low_pass_sections
 from panto_env.metrics.spans import last_whole_span, limits, within
+
+
+@pytest.mark.parametrize("step", [1e-4, 1.25e-3, 5e-3, 0.02])
+def test_the_filter_is_scipy_s_butterworth_filter(step):
+    sections, settled = low_pass_sections(step)
+    theirs = signal.butter(6, 20.0, fs=1 / step, output="sos")
+    frequency = np.linspace(0, 0.5 / step, 200)
+    for each in (sections, theirs):
+        assert each.shape == (3, 6)
+    ours, wanted = (signal.freqz_sos(each, worN=frequency, fs=1 / step)[1] for each in (sections, theirs))
+    np.testing.assert_allclose(ours, wanted, atol=1e-9)
+    np.testing.assert_allclose(settled, signal.sosfilt_zi(sections), rtol=1e-9, atol=1e-12)
 
 
 def test_low_pass_keeps_slow_and_stops_fast_waves():

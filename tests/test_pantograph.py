@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from panto_env.catalog import available, load_pantograph
 from panto_env.plant.pantograph import build as pantograph
@@ -22,6 +23,14 @@ def test_discretisation_is_exact_for_held_forces(name):
         solution = solve_ivp(lambda t, x, f=forces: a @ x + b @ f, (0, step), exact, rtol=1e-11, atol=1e-14)
         exact = solution.y[:, -1]
     np.testing.assert_allclose(state, exact, rtol=1e-7, atol=1e-11)
+
+
+@pytest.mark.parametrize("size", [1e-12, 0.2, 3.0, 400.0])
+def test_exponential_is_scipy_s(size):
+    matrix = size * np.random.default_rng(0).normal(size=(7, 7))
+    matrix -= 4 * size * np.eye(7)  # it decays, as a pantograph does
+    np.testing.assert_allclose(pantograph.exponential(matrix), expm(matrix), rtol=1e-10, atol=1e-13)
+    np.testing.assert_array_equal(pantograph.exponential(0 * matrix), np.eye(7))
 
 
 def test_matrices_of_two_masses_as_written_out():

@@ -280,7 +280,7 @@ def test_the_command_says_its_version(tmp_path):
             "at least the 0.8333 m that a train covers in one control interval",
         ),
         (["simulate", "--distance", "60", "--control-interval", "5"], "at least the 416.7 m"),
-        (["simulate", "--distance", "1e9"], "distance must be at most 59,580 m on line 'en50318-2002'"),
+        (["simulate", "--distance", "1e9"], "distance must be at most 59,520 m on line 'en50318-2002'"),
         (["simulate", "--line-spans", "2"], "A line's spans must be a whole number from 3 to 1000, not 2"),
         (["simulate", "--policy", "own.py:"], "must name a class in the file, as own.py:Name"),
         (["sweep", "speed_kmh=300:300:5"], "speed_kmh has the value 300 twice"),

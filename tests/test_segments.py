@@ -89,7 +89,8 @@ def test_a_window_travels_by_any_number_of_nodes(count):
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_rows_beyond_a_segment_are_those_of_the_next(kind):
     values, x = random_wire(kind)
-    for row in range(ROWS + 2 * PAD):
+    values = np.append(values, values[-1])
+    for row in range(ROWS + 2 * PAD + 1):
         out = np.zeros((3, WIDTH), kind)
         if row >= PAD:
             x[:PAD, 1:] = x[-PAD:, :-1] = 9.0  # not up to date
@@ -100,16 +101,16 @@ def test_rows_beyond_a_segment_are_those_of_the_next(kind):
 
 def test_a_step_moves_the_nodes_that_are_read():
     """And none beyond the window's end."""
-    for row in range(PAD, ROWS + 2 * PAD):
+    for row in range(PAD, ROWS + 2 * PAD + 1):
         u, d = np.zeros((2, ROWS + 2 * PAD, WIDTH))
         steps = 1.0 + np.arange(WIDTH)[None]
         _move(u, d, row, ROWS, steps)
-        wanted = np.zeros(len(NODES))
+        wanted = np.zeros(len(NODES) + 1)
         wanted[row + ROWS * np.arange(WIDTH)] = steps[0]
-        wanted[NODES >= ROWS * WIDTH] = 0.0
+        wanted[ROWS * WIDTH + PAD :] = 0.0
         for x in (u, d):
             inner = x[PAD:-PAD].T.ravel()
-            np.testing.assert_array_equal(inner, wanted[PAD:-PAD])
+            np.testing.assert_array_equal(inner, wanted[PAD : PAD + ROWS * WIDTH])
 
 
 def test_the_nodes_after_one():

@@ -101,10 +101,12 @@ def observe(episode, sensors, block, task, begin, count):
     """Observation of a block into ``episode.observation``; noise is added to the readings."""
     readings, entries = task[TASK_ROW.READING :], task[TASK_ROW.ENTRY :]
     if sensors.noise.shape[1] > 0:
-        for k in range(sensors.noise.shape[0]):
-            noise = sensors.noise[k, begin : begin + count]
-            for i in range(count):
-                readings[k, i] += noise[i]
+        for i in range(count):
+            lane = (begin + i) & NOT_NEGATIVE
+            noise = sensors.noise[lane, sensors.noise_used[lane] & NOT_NEGATIVE]
+            for k in range(noise.size):
+                readings[k, i] += noise[k]
+            sensors.noise_used[lane] += 1
     for i in range(count):
         task[TASK_ROW.SPANS, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i] * episode.spans_per_metre
     for k in range(episode.writers.shape[0]):

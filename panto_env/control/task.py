@@ -90,7 +90,6 @@ class Task:
         self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes)
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
-        self._all_lanes = np.arange(lanes)
         self._steps_of_run_in = np.zeros(lanes, dtype=np.int64)  # control steps still to be made
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
@@ -207,8 +206,7 @@ class Task:
             self.samples.rows[lane, 0, 0] = sample
         self.running.clear(lane)
         if self._noise is not None:
-            self._noise.start(lane, random)
-            self._noise.write(self.sensors.noise, np.array([lane]))
+            self._noise.start(self.sensors, lane, random)
         self._observe_start(lane, lane + 1)
 
     def run_in(self) -> None:
@@ -216,13 +214,11 @@ class Task:
 
         Raises InputError where a run leaves the plant's valid range before its episode has begun.
         """
-        running, left = self._steps_of_run_in > 0, self._steps_of_run_in
-        begun, idle = np.flatnonzero(running), np.zeros_like(self._action)
-        while running.any():
-            self.step(idle, skip=~running)
-            left[running] -= 1
-            running = left > 0
-        for lane in begun.tolist():
+        steps, idle = self._steps_of_run_in.copy(), np.zeros_like(self._action)
+        self._steps_of_run_in[:] = 0
+        for done in range(int(steps.max())):
+            self.step(idle, skip=steps <= done)
+        for lane in np.flatnonzero(steps).tolist():
             if self.episode.terminated[lane]:
                 raise InputError(self.ending(lane))
             column, end = self.episode.table[:, lane], self.end(lane)
@@ -265,12 +261,10 @@ class Task:
         Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
         """
         self._action[...] = action
-        stepped = self._all_lanes
         if skip is not None:
             self.episode.idle[:] = skip
-            stepped = np.flatnonzero(~skip)
         if self._noise is not None:
-            self._noise.write(self.sensors.noise, stepped)
+            self._noise.prepare(self.sensors, skip)
         if self._threads is None:
             self._control_step(0, self.lanes)
         else:

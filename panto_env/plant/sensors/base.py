@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import Any, Protocol
 
 from ...backend import constants, operation
-from ...base.arrays import Array
+from ...base.arrays import Array, Index
 from ...base.settings import Settings
 
 
@@ -29,7 +29,11 @@ class SensorArrays(Protocol):
 
     @property
     def noise(self) -> Array:
-        """Noise of the next reading, (readings, lanes), in its units; (readings, 0) where there is none."""
+        """Noise of the next readings, (lanes, times, readings), in their units; no times for none."""
+
+    @property
+    def noise_used(self) -> Index:
+        """How many of them each lane has used, (lanes,)."""
 
     def reset(self, lane: int, sample: Array) -> None:
         """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""

@@ -7,11 +7,12 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import implements, inlined, lane_table
-from ...base.arrays import Array
+from ...backend import implements, inlined
+from ...base.arrays import Array, Index
 from ...base.ranges import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
+from .noise import AHEAD
 
 SENSED = (Row.HEAD_HEIGHT, Row.FRAME_HEIGHT, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.CONTACT_FORCE)
 """Rows of a sample that are read, in the order of ``Reading``."""
@@ -55,7 +56,8 @@ class DelayedSensors(SensorSettings):
             older_at=read_at - 1 if read_at > 1 else control_steps,
             older_share=0.0 if late < 1e-6 else late,
             older=np.zeros((len(Reading), lanes)),
-            noise=lane_table(len(Reading), lanes) if self.noise_rms else np.zeros((len(Reading), 0)),
+            noise=np.zeros((lanes, AHEAD if self.noise_rms else 0, len(Reading))),
+            noise_used=np.zeros(lanes, dtype=np.int64),
         )
 
 
@@ -70,7 +72,8 @@ class DelayedArrays(NamedTuple):
     older_at: int  # plant step whose sample, the one before, is read too
     older_share: float  # weight of that
     older: Array  # (readings, lanes): that sample
-    noise: Array  # (readings, lanes): of the next reading, in its units; or (readings, 0) for none
+    noise: Array  # (lanes, times, readings): of the next readings, in their units; no times for none
+    noise_used: Index  # (lanes,): how many of them have been used
 
     def reset(self, lane: int, sample: Array) -> None:
         """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""

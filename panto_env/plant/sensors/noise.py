@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
-from ...base.arrays import Array
+import numpy as np
 
 AHEAD = 64
 """Readings drawn at a time: a call of a generator takes as long as some fifty numbers."""
 
 
 class Noise:
-    """Numbers drawn ahead for every lane."""
+    """Draws numbers ahead for every lane, into the ``noise`` of its sensors."""
 
     def __init__(self, rms: tuple[float, ...], lanes: int) -> None:
         """rms: of each reading, in its unit. Each lane must be started."""
         self._rms = np.array(rms)
-        self._drawn = np.zeros((lanes, AHEAD, len(rms)))
-        self._used = np.full(lanes, AHEAD)
         self._random = [np.random.default_rng(0)] * lanes
+        self._enough = 0  # readings that every lane has, at least
 
-    def start(self, lane: int, random: np.random.Generator) -> None:
-        """Draw a lane's numbers from this generator from now on."""
+    def start(self, sensors: Any, lane: int, random: np.random.Generator) -> None:
+        """Draw a lane's numbers from this generator from now on, those of its first reading at once."""
         self._random[lane] = random
-        self._used[lane] = AHEAD
+        self._draw(sensors, lane)
+        self._enough = 0
 
-    def write(self, noise: Array, lanes: NDArray[np.intp]) -> None:
-        """Noise of the next reading of these lanes into ``noise``, (readings, lanes), in their units."""
-        for lane in lanes[self._used[lanes] == AHEAD].tolist():
-            self._drawn[lane] = self._rms * self._random[lane].standard_normal(self._drawn.shape[1:])
-            self._used[lane] = 0
-        noise[:, lanes] = self._drawn[lanes, self._used[lanes]].T
-        self._used[lanes] += 1
+    def prepare(self, sensors: Any, skip: Any = None) -> None:
+        """See to it that all lanes, but those to skip, have the numbers of their next reading."""
+        if self._enough == 0:
+            spent = sensors.noise_used == AHEAD
+            for lane in np.flatnonzero(spent if skip is None else spent & ~skip).tolist():
+                self._draw(sensors, lane)
+            self._enough = AHEAD - int(sensors.noise_used.max())
+        if self._enough > 0:
+            self._enough -= 1
+
+    def _draw(self, sensors: Any, lane: int) -> None:
+        drawn = sensors.noise[lane]
+        drawn[:] = self._rms * self._random[lane].standard_normal(drawn.shape)
+        sensors.noise_used[lane] = 0

@@ -50,6 +50,9 @@ HARD_CONTACT_ERROR = 20
 """Of the standard deviation (%) where a hard contact is lost and the grid is ``HARD_CONTACT_GRID``."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
+CLAMPS = ((0.3, np.inf, np.inf), (1.0, 0.15, 5e-4), (np.inf, 0.125, 2.5e-4))
+"""Up to which mass of a clamp (kg) a grid (m) is fine and a time step (s) is short enough: a grid hangs it on
+two nodes."""
 HEAVY_CLAMP = 1.0
 """Mass of a clamp on the contact wire (kg) that wants the finest grid where waves are deep."""
 FAST_GRIDS = ((0.6, 0.5), (0.72, 0.4), (1.0, 1 / 3))
@@ -117,9 +120,18 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
+    clamps = _by_clamps(data)
+    spacing, longest = min(spacing, clamps.spacing), min(longest, clamps.time_step)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
     window = SLOW_WINDOW if slow < SLOW_TRAIN else WINDOW
     return Resolution(min(spacing, grid), min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)), window)
+
+
+def _by_clamps(data: FlexibleCatenaryData) -> Resolution:
+    """What the heaviest of the droppers' clamps wants."""
+    heaviest = max(data.droppers.contact_clamp_mass, data.droppers.messenger_clamp_mass)
+    grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
+    return Resolution(grid, step, WINDOW)
 
 
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
@@ -128,6 +140,9 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
     spacing = next((grid for share, grid in FAST_GRIDS if quick <= share * wave_speed), FAST_GRIDS[-1][1])
     spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
+    if np.isfinite(runs.shortest_wave):
+        spacing = min(spacing, FAST_GRIDS[-1][1])
+    spacing = min(spacing, 2 * _by_clamps(data).spacing)
     grid = data.span_length / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer) else shorter
     return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW)

@@ -53,10 +53,13 @@ def share_ends(x, rows):
 
 @inlined
 def read(x, row, rows):
-    """A row of nodes, of which those of the next segment follow a segment's last."""
+    """A row of nodes, of which those of the next segment follow a segment's last: up to three of them.
+
+    Beyond the window, where nothing hangs, is what its last row has.
+    """
     if row < rows + PAD:
         return load_row(x, row)
-    return shift_down(load_row(x, row - rows), load_row(x, row))
+    return shift_down(load_row(x, row - rows), load_row(x, min(row, rows + 2 * PAD - 1)))
 
 
 @inlined
