@@ -19,11 +19,11 @@ CODE = """
 import json, sys
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.control.step import control_step
+from panto_env.control.step import control_steps
 settings = json.loads(sys.argv[1])
 lanes = settings.pop("lanes", 1)
 Task(run_settings(settings), lanes=lanes)
-(assembly,) = control_step.inspect_asm().values()
+(assembly,) = control_steps.inspect_asm().values()
 print(assembly)
 """
 FEATURES = llvmlite.binding.get_host_cpu_features()

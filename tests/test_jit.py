@@ -14,7 +14,7 @@ import time, numpy as np
 from panto_env import simulate
 from panto_env.control import step
 run = simulate("periodic-stiffness", "three-mass", 200, distance=20.0)
-hits = sum(step.control_step.stats.cache_hits.values())
+hits = sum(step.control_steps.stats.cache_hits.values())
 print(hits, repr(float(run.contact_force.sum())))
 """
 

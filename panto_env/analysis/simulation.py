@@ -61,10 +61,10 @@ def simulate(
     task.run_in()
     if driver is None:
         task.run_passively()
-        return task.trajectory(0, seed=seed)
+        return task.trajectory(0, seed=seed, last=True)
     name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
     run_policy(task, driver, name, progress)
-    return task.trajectory(0, policy=name, seed=seed)
+    return task.trajectory(0, policy=name, seed=seed, last=True)
 
 
 def run_policy(

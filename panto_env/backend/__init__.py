@@ -10,7 +10,7 @@ With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 
 from .block import LANES_ABREAST, new_block, new_blocks
 from .cache import cache_folder
-from .compile import JIT, constants, inlined, kernel, python_function, subroutine
+from .compile import JIT, constants, inlined, kernel, python_function
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, floor
 from .memory import CACHE_LINE, aligned_zeros, copy_whole, lane_table
@@ -62,5 +62,4 @@ __all__ = [
     "shift_up",
     "smaller",
     "store_row",
-    "subroutine",
 ]

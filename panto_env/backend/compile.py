@@ -42,16 +42,7 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """A function that kernels call; its source is put in the place of the call before types are known."""
-    compiled: F = numba.njit(inline="always", **OPTIONS)(function)
-    return compiled
-
-
-def subroutine(function: F) -> F:
-    """A function that kernels call, compiled by itself and then inlined by the compiler.
-
-    It compiles sooner than an ``inlined`` one where it is called several times or is long.
-    """
+    """A function that kernels call, compiled by itself and then put in the place of the call."""
     compiled: F = numba.njit(forceinline=True, **OPTIONS)(function)
     return compiled
 

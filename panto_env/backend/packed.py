@@ -40,12 +40,42 @@ class Packed:
     def __init__(self, arguments: tuple[Any, ...]) -> None:
         """Pack ``arguments``, which stay alive with this object."""
         self.arguments = arguments
-        self._memory = [np.empty(_pack(argument, 0), dtype=np.uint8) for argument in arguments]
-        self._table = np.array([form.ctypes.data for form in self._memory], dtype=np.intp)
-        for argument, place in zip(arguments, self._table.tolist(), strict=True):
-            _pack(argument, place)
+        forms = tuple(type_of(argument) for argument in arguments)
+        writers = [entry(_pack, (form, types.intp)) for form in forms]
+        pairs = list(zip(writers, arguments, strict=True))
+        self._memory = [np.empty(write(argument, 0), dtype=np.uint8) for write, argument in pairs]
+        self._table = np.array([memory.ctypes.data for memory in self._memory], dtype=np.intp)
+        for (write, argument), place in zip(pairs, self._table.tolist(), strict=True):
+            write(argument, place)
         self.address = self._table.ctypes.data
-        self.type = PackedType(tuple(numba.typeof(argument) for argument in arguments))
+        self.type = PackedType(forms)
+
+
+_types: dict[Any, Any] = {}
+
+
+def type_of(value: Any) -> Any:
+    """Numba's type of a value; looked up by what it depends on, since to find it anew takes longer."""
+    key = (type(value), *map(_kind, value)) if isinstance(value, tuple) else (_kind(value),)
+    if key not in _types:
+        _types[key] = numba.typeof(value)
+    return _types[key]
+
+
+def _kind(value: Any) -> Any:
+    if not isinstance(value, np.ndarray):
+        return type(value)
+    flags = value.flags
+    return value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
+
+
+def entry(compiled: Any, signature: tuple[Any, ...]) -> Callable[..., Any]:
+    """A kernel's entry for arguments of these types, compiled if need be."""
+    known = compiled.overloads.get(signature)
+    if known is None:
+        compiled.compile(signature)
+        known = compiled.overloads[signature]
+    return known.entry_point  # type: ignore[no-any-return]
 
 
 class PackedType(types.Type):  # type: ignore[misc]
@@ -156,6 +186,5 @@ def bind(compiled: Callable[..., Any], packed: Any, *changing: Any) -> Callable[
     """
     if not JIT:
         return partial(compiled, packed)
-    signature = tuple(numba.typeof(argument) for argument in (packed, *changing))
-    compiled.compile(signature)  # type: ignore[attr-defined]
-    return partial(compiled.overloads[signature].entry_point, packed)  # type: ignore[attr-defined]
+    signature = (packed.type, *map(type_of, changing))
+    return partial(entry(compiled, signature), packed)

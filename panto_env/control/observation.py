@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import NOT_NEGATIVE, inlined, subroutine
+from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
@@ -89,7 +89,7 @@ def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
         lines += [f"    if chosen == {place}:", "        for i in range(count):"]
         lines += [f"            row[i] = ({value} - centre) * per_unit"]
     exec("\n".join(lines), names)
-    write: Callable[..., Any] = subroutine(names["write"])
+    write: Callable[..., Any] = inlined(names["write"])
     return write
 
 

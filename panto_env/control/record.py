@@ -37,12 +37,18 @@ def refuse_divergence(task: Task, lane: int, deviation: float, height: Array) ->
         )
 
 
-def trajectory(task: Task, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
-    """Record of a lane's run so far. Raises InputError where its computation diverged."""
+def trajectory(
+    task: Task, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
+) -> Trajectory:
+    """Record of a lane's run so far. Raises InputError where its computation diverged.
+
+    last: whether the task runs no more, so that large arrays need no copy.
+    """
     plant, steps = task.plant, int(task.plant.steps_done[lane])
     rows = task.samples.rows[lane, 1 : steps + 1, 0]
     deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
     refuse_divergence(task, lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
+    uplift, tension = (each[lane, 1 : steps + 1] for each in (task.samples.uplift, task.samples.tension))
     middle = (np.arange(steps) + 0.5) * plant.time_step
     return Trajectory(
         time=middle,
@@ -55,9 +61,9 @@ def trajectory(task: Task, lane: int, policy: str = "passive", seed: int = 0) ->
         frame_velocity=rows[:, Row.FRAME_VELOCITY].copy(),
         frame_force=rows[:, Row.FRAME_FORCE].copy(),
         head_force=rows[:, Row.HEAD_FORCE].copy(),
-        uplift=task.samples.uplift[lane, 1 : steps + 1].copy(),
+        uplift=uplift if last else uplift.copy(),
         support_position=plant.model.supports,
-        dropper_force=task.samples.tension[lane, 1 : steps + 1].copy(),
+        dropper_force=tension if last else tension.copy(),
         dropper_position=plant.model.droppers if task.record_droppers else np.zeros(0),
         catenary=plant.catenary.name,
         pantograph=plant.pantograph.name,

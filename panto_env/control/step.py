@@ -31,7 +31,8 @@ def command(episode, blocks, begin, count):
 
 @inlined
 def end_episodes(line, wire, episode, block, task, begin, count):
-    """Whether episodes end here."""
+    """Whether episodes end here, and whether any of them does."""
+    ended = False
     terminated = episode.terminated[begin : begin + count]
     truncated = episode.truncated[begin : begin + count]
     endings = episode.ending[begin : begin + count]
@@ -46,6 +47,8 @@ def end_episodes(line, wire, episode, block, task, begin, count):
         truncated[i] = block[ROW.STEP, i] >= task[TASK_ROW.END, i]
         if terminated[i]:
             charge_early_end(episode, block, task, i)
+        ended = ended or terminated[i] or truncated[i]
+    return ended
 
 
 @inlined
@@ -58,9 +61,10 @@ def lanes_not_idle(idle, begin, limit):
 
 
 @kernel
-def control_step(packed, first, last):
-    """One control step of the lanes from ``first`` to before ``last`` under ``episode.action``.
+def control_steps(packed, steps, first, last):
+    """Control steps of the lanes from ``first`` to before ``last`` under ``episode.action``.
 
+    Of lanes that go abreast none makes a further one once an episode of them has ended.
     packed: line, wire, pantographs, actuators, run, sensors, samples, episode and running figures.
     """
     line, wire, pantographs, actuators, run, sensors, samples, episode, running = open_packed(packed)
@@ -79,17 +83,19 @@ def control_step(packed, first, last):
             load(run.table[c], blocks[c], ROW.STEP, begin, count)
         load(episode.table, task, 0, begin, count)
         load(running.table, task[TASK_ROW.FILTER_STATE :], 0, begin, count)
-        begin_terms(block, task, count)
         command(episode, blocks, begin, count)
-        for step in range(1, episode.control_steps + 1):
-            step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count)
-            record_blocks(line, wire, samples, blocks, begin, count)
-            add_sample_to_terms(block, task, count)
-            add_sample_to_figures(running, samples, block, task, begin, count)
-            take_readings(sensors, step, block, task[TASK_ROW.READING :], begin, count)
-        compute_reward(episode, block, task, begin, count)
-        end_episodes(line, wire, episode, block, task, begin, count)
-        add_control_step_to_figures(task, count)
+        for _ in range(steps):
+            begin_terms(block, task, count)
+            for step in range(1, episode.control_steps + 1):
+                step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count)
+                record_blocks(line, wire, samples, blocks, begin, count)
+                add_sample_to_terms(block, task, count)
+                add_sample_to_figures(running, samples, block, task, begin, count)
+                take_readings(sensors, step, block, task[TASK_ROW.READING :], begin, count)
+            compute_reward(episode, block, task, begin, count)
+            add_control_step_to_figures(task, count)
+            if end_episodes(line, wire, episode, block, task, begin, count):
+                break
         store(task[TASK_ROW.FILTER_STATE :], running.table, begin, count)
         observe(episode, sensors, block, task, begin, count)
         for c in range(blocks.shape[0]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,11 @@ from .reward import MEAN_TIME
 from .running_figures import running_figures
 from .settings import RunSettings, speed_range
 from .state import EPISODE_ROWS, TaskRow
-from .step import control_step, observe_start
+from .step import control_steps, observe_start
 
-BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_step", "_observe_start")
+COASTED = 100
+"""Control steps without a policy that are made at once."""
+BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_steps", "_observe_start")
 """Attributes that ``Task._bind`` makes of the others."""
 
 
@@ -115,7 +118,7 @@ class Task:
         self._action = self.episode.action
         self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
         packed = pack(*self.plant.arrays, *self._arrays)
-        self._control_step = bind(control_step, packed, 0, 1)
+        self._control_steps = bind(control_steps, packed, 1, 0, 1)
         self._observe_start = bind(observe_start, packed, 0, 1)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -214,11 +217,13 @@ class Task:
 
         Raises InputError where a run leaves the plant's valid range before its episode has begun.
         """
-        steps, idle = self._steps_of_run_in.copy(), np.zeros_like(self._action)
-        self._steps_of_run_in[:] = 0
-        for done in range(int(steps.max())):
-            self.step(idle, skip=steps <= done)
-        for lane in np.flatnonzero(steps).tolist():
+        steps, done = self._steps_of_run_in, 0
+        begun = np.flatnonzero(steps).tolist()
+        for until in np.unique(steps[begun]).tolist():
+            self._coast(until - done, skip=steps < until)
+            done = until
+        steps[:] = 0
+        for lane in begun:
             if self.episode.terminated[lane]:
                 raise InputError(self.ending(lane))
             column, end = self.episode.table[:, lane], self.end(lane)
@@ -254,8 +259,11 @@ class Task:
             pantograph=self.plant.pantograph,
         )
 
-    def step(self, action: Array, skip: Flags | None = None) -> None:
+    def step(self, action: Array, skip: Flags | None = None, steps: int = 1) -> None:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
+
+        steps: more than one, as far as episodes go, where nobody looks at the observations between and no
+        noise is drawn for them.
 
         Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
         Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
@@ -266,18 +274,27 @@ class Task:
         if self._noise is not None:
             self._noise.prepare(self.sensors, skip)
         if self._threads is None:
-            self._control_step(0, self.lanes)
+            self._control_steps(steps, 0, self.lanes)
         else:
-            self._threads.run(self._control_step)
+            self._threads.run(partial(self._control_steps, steps))
         if skip is not None:
             self.episode.idle[:] = False
 
     def run_passively(self) -> None:
         """Run all lanes, just reset, to their ends without actuators."""
-        idle, ended = np.zeros_like(self._action), np.zeros(self.lanes, dtype=np.bool_)
+        ended = np.zeros(self.lanes, dtype=np.bool_)
         while not ended.all():
-            self.step(idle, skip=ended)
+            self._coast(COASTED if self._noise is None else 1, skip=ended)
             ended |= self.episode.terminated | self.episode.truncated
+
+    def _coast(self, steps: int, skip: Flags) -> None:
+        """So many control steps without control of lanes whose episodes don't end before the last of them.
+
+        Without noise they may end before.
+        """
+        idle, at_once = np.zeros_like(self._action), steps if self._noise is None else 1
+        for _ in range(0, steps, at_once):
+            self.step(idle, skip=skip, steps=at_once)
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's control steps so far, the same as its trajectory's summary.
@@ -297,9 +314,14 @@ class Task:
         target = target_mean(self.settings, float(self.speed[lane]))
         return math.nan if target is None else target
 
-    def trajectory(self, lane: int, policy: str = "passive", seed: int = 0) -> Trajectory:
-        """Record of a lane's run so far. Raises InputError where its computation diverged."""
-        return trajectory(self, lane, policy, seed)
+    def trajectory(
+        self, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
+    ) -> Trajectory:
+        """Record of a lane's run so far; last: of a task that runs no more, whose arrays it takes over.
+
+        Raises InputError where the computation diverged.
+        """
+        return trajectory(self, lane, policy, seed, last=last)
 
     def ending(self, lane: int) -> str:
         """Where and why a lane's run ended early, as a sentence; empty where it did not."""

@@ -47,6 +47,10 @@ class CatenaryData(Settings):
     )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
+    def __hash__(self) -> int:
+        """Of all that a line is made of: what is computed from it can be kept."""
+        return hash(tuple(getattr(self, name) for name in type(self).model_fields if name != "sources"))
+
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave of this frequency (Hz) that a dropper and a support send back; nan if none does."""
         return math.nan, math.nan

@@ -9,6 +9,7 @@ import numpy as np
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
 from ....base.arrays import Array, Index
 from ....base.errors import InputError
+from ....base.remember import remembered
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
@@ -48,6 +49,7 @@ class Links(NamedTuple):
     mass: Array  # (links, 2): that moves with its lower and upper end (kg)
 
 
+@remembered
 def constants(
     data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
 ) -> FlexibleLine:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.errors import InputError
+from ....base.remember import remembered
 from ..schema import Wire
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class PeriodicWire:
         return self.offset + green(self.wire, self.span, x, self.points) @ self.forces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StaticShape:
     """One span in equilibrium; dropper arrays are in the order of the catalogue."""
 
@@ -73,6 +74,7 @@ def green(wire: Wire, span: float, x: Array, points: Array) -> Array:
     return result
 
 
+@remembered
 def solve(line: FlexibleCatenaryData) -> StaticShape:
     """Static shape whose contact wire has the catalogue's sag at the droppers.
 
@@ -85,6 +87,7 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
         return _settle(line)
 
 
+@remembered
 def hang(line: FlexibleCatenaryData) -> StaticShape:
     """Static shape of a line that can hang so at rest: every dropper pulls, wires are in order and level.
 
