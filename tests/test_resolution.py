@@ -11,7 +11,7 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.resolution import GRIDS, Resolution, fine_enough, resolution
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
-from panto_env.plant.numerics import SLOW_WINDOW, WINDOW, Numerics, Runs
+from panto_env.plant.numerics import WINDOW, Numerics, Runs
 from panto_env.studies.en50318 import lines
 
 LINE = load_catenary("en50318-2002")
@@ -27,8 +27,7 @@ def chosen(runs, **numerics):
 
 def test_grid_and_step_go_by_the_slowest_and_the_fastest_train():
     ordinary, near_the_waves, slow = (chosen(runs(speed)) for speed in (300, 400, 60))
-    assert ordinary == Resolution(0.3, 1.25e-3, WINDOW)
-    assert slow.window == SLOW_WINDOW
+    assert ordinary == Resolution(0.3, 1.25e-3, WINDOW["full"])
     assert near_the_waves.spacing == GRIDS[-1][1]
     assert slow.time_step < ordinary.time_step
     both = chosen(runs(60, 400))

@@ -79,7 +79,7 @@ def test_window_is_the_whole_line_until_it_travels():
 @pytest.mark.parametrize(("catenary", "pantograph"), windows.LINES)
 @pytest.mark.parametrize("speed", windows.SPEEDS_KMH)
 def test_default_window_agrees_with_the_whole_line(catenary, pantograph, speed):
-    (check,) = windows.check_windows(catenary, pantograph, speed, [WINDOW])
+    (check,) = windows.check_windows(catenary, pantograph, speed, [WINDOW["full"]])
     assert abs(check.std) < 1
     assert abs(check.max) < 1
     assert abs(check.min) < 1  # % of the mean force

@@ -14,10 +14,8 @@ from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
-WINDOW, SLOW_WINDOW = 8, 16
-"""Spans computed about the train; about a slow one, to which waves come back from far along the line."""
-SLOW_TRAIN = 200 / 3.6
-"""Speed (m/s) below which a train is slow in this sense."""
+WINDOW = {"full": 16, "fast": 8}
+"""Spans computed about the train, by accuracy."""
 
 
 class Numerics(Settings):
@@ -39,8 +37,8 @@ class Numerics(Settings):
     window: int | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, of an even number one more "
-        f"ahead than behind; by default {WINDOW}, for trains below {3.6 * SLOW_TRAIN:g} km/h {SLOW_WINDOW} "
-        f'unless accuracy="fast"; 0: the whole line',
+        f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
+        "0: the whole line",
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'

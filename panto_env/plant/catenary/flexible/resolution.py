@@ -16,7 +16,7 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
-from ...numerics import SAMPLES_PER_WAVE, SLOW_TRAIN, SLOW_WINDOW, WINDOW, Numerics, Runs
+from ...numerics import SAMPLES_PER_WAVE, WINDOW, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
@@ -120,18 +120,18 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
-    clamps = _by_clamps(data)
-    spacing, longest = min(spacing, clamps.spacing), min(longest, clamps.time_step)
+    grid, step = _by_clamps(data)
+    spacing, longest = min(spacing, grid), min(longest, step)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
-    window = SLOW_WINDOW if slow < SLOW_TRAIN else WINDOW
-    return Resolution(min(spacing, grid), min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)), window)
+    longest = min(longest, step, runs.wave_step(SAMPLES_PER_WAVE))
+    return Resolution(min(spacing, grid), longest, WINDOW["full"])
 
 
-def _by_clamps(data: FlexibleCatenaryData) -> Resolution:
-    """What the heaviest of the droppers' clamps wants."""
+def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
+    """Grid (m) and time step (s) that the heaviest of the droppers' clamps wants."""
     heaviest = max(data.droppers.contact_clamp_mass, data.droppers.messenger_clamp_mass)
     grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
-    return Resolution(grid, step, WINDOW)
+    return grid, step
 
 
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
@@ -142,10 +142,10 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
     if np.isfinite(runs.shortest_wave):
         spacing = min(spacing, FAST_GRIDS[-1][1])
-    spacing = min(spacing, 2 * _by_clamps(data).spacing)
+    spacing = min(spacing, 2 * _by_clamps(data)[0])
     grid = data.span_length / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer) else shorter
-    return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW)
+    return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW["fast"])
 
 
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: Resolution) -> Resolution:
