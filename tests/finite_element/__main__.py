@@ -31,7 +31,7 @@ def main() -> None:
                 f"{speed:g}",
                 "finite differences",
                 f"{numerics.spacing:.3g}",
-                f"{1e3 * numerics.time_step:g}",
+                f"{1e3 * numerics.time_step:.3g}",
                 *row,
             )
         for element, step in FINITE_ELEMENTS:

@@ -68,9 +68,10 @@ def check_line(name: str, speed_kmh: float) -> list[LineCheck]:
             )
         return run.summary(SPANS)
 
-    true, checks = figures(CONVERGED), []
+    checks = []
     for numerics in ACCURACIES:
         used, ours = in_use(numerics, speed_kmh, name=name), figures(numerics)
+        true = figures(CONVERGED.model_copy(update={"window": used.window}))
         assert used.spacing is not None
         assert used.time_step is not None
         checks.append(

@@ -13,7 +13,7 @@ from ...metrics.low_pass import low_pass
 from ...metrics.trajectory import Trajectory
 from .convergence import WHOLE_LINE
 
-WINDOWS = (3, 5, 8, 10, 12)
+WINDOWS = (3, 5, 8, 12, 16)
 """Spans computed about the train."""
 LINES = (("en50318-2002", "en50318-2002"), ("benchmark-2015", "benchmark-2015"))
 """Catenaries and the pantographs on them."""

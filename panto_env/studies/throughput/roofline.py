@@ -10,11 +10,11 @@ import numpy as np
 from ...backend import kernel
 
 # Adds and multiplies of one step, counted in panto_env/plant/catenary/flexible/wires.py and links.py.
-FLOPS_PER_NODE = 14  # blend 2, stencil 8, increment 3, displacement 1
-FLOPS_PER_DROPPER = 90  # two differences 2 x 11, tension 12, two forces on wires 2 x 20, what surrounds them
-# Numbers that the leapfrog moves to or from the nearest cache for each node: u, d, q written;
-# u, d, five q read; u, d written.
-NUMBERS_PER_NODE = 12
+FLOPS_PER_NODE = 12  # blend 2, differences 2, stencil 4, increment 3, displacement 1
+FLOPS_PER_DROPPER = 60  # two differences 2 x 11, extension and tension 14, eight nodes moved 8 x 3
+# Numbers that the leapfrog moves to or from the nearest cache for each node: u and d read two nodes ahead and
+# at the node, and written.
+NUMBERS_PER_NODE = 6
 CHAIN = 32
 
 
