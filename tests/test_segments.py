@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.backend import WIDTH, kernel, load_row
+from panto_env.backend import JIT, WIDTH, kernel, load_row
 from panto_env.plant.catenary.flexible.build import Sets
 from panto_env.plant.catenary.flexible.line import PAD
 from panto_env.plant.catenary.flexible.segments import (
@@ -136,7 +136,7 @@ def test_what_hangs_in_the_same_rows_goes_abreast():
     np.testing.assert_array_equal(table[2, 1], [7, -1, 9, -1, -1, -1, -1, -1])
 
 
-@pytest.mark.skipif(not __import__("panto_env").backend.JIT, reason="slow in plain Python")
+@pytest.mark.skipif(not JIT, reason="slow in plain Python")
 @pytest.mark.parametrize("window", [3, 4, 5, 7, 9, 12, 16, 0])
 def test_any_window_that_has_not_travelled_gives_the_same_run(window):
     """However its segments lie to spans and droppers."""

@@ -4,7 +4,8 @@
 function differ by the type of what it works on; ``new_block`` gives a kernel memory on its stack; ``pack``
 and ``bind`` take a kernel's arguments apart only once; ``constants`` gives kernels the names of rows;
 ``lane_table`` and ``aligned_zeros`` are memory that vector instructions like, which ``copy_whole`` keeps in
-copies; ``lane_threads`` shares lanes among cores.
+copies; ``lane_threads`` shares lanes among cores; ``load_row`` and the rest of ``vectors`` compute with eight
+numbers at once.
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 

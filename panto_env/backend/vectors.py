@@ -4,8 +4,8 @@ A kernel reads one from a row of an array whose last axis has ``WIDTH`` places, 
 the functions below, and writes it to a row. A number beside a vector counts as a vector of equal numbers, in
 the vector's precision. The compiler makes of it what the machine has: a register of 256 bits, or two of 128.
 
-There are three forms of it. Compiled for the processor, a vector is LLVM's own. Without compilation it is a
-NumPy array. On a GPU (``backend.ptx``) each thread of a group of ``WIDTH`` holds one of the numbers.
+There are two forms of it. Compiled for the processor, a vector is LLVM's own; without compilation it is a
+NumPy array. A third is planned and not written: on a GPU each thread of a group would hold one number.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,20 +158,13 @@ class Sets:
     def __init__(self, wires: Index, node: Index, rows: int) -> None:
         """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
         row, self.segment = places(node, rows)
-        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are there already
+        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
         self.number = np.zeros(len(node), dtype=np.int64)
-        taken: set[tuple[int, int]] = set()
-        for k, (its_row, its_wires, segment) in enumerate(
-            zip(row, wires.tolist(), self.segment, strict=True)
-        ):
-            again = 0
-            while True:
-                number = found.setdefault((int(its_row), *its_wires, again), len(found))
-                if (number, segment) not in taken:
-                    break
-                again += 1
-            taken.add((number, segment))
-            self.number[k] = number
+        there: Counter[tuple[int, ...]] = Counter()
+        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
+            own = (*place, int(self.segment[k]))
+            self.number[k] = found.setdefault((*place, there[own]), len(found))
+            there[own] += 1
         keys = np.array(list(found), dtype=np.int64).reshape(len(found), -1)
         self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
 
@@ -232,8 +226,7 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
         static=np.ones((lanes, *sets), dtype=real),  # where there is no link, none is ever slack
         gap=np.zeros((lanes, *sets), dtype=real),
     )
-    for lane in range(lanes):
-        settle(line, wire, lane)
+    _take_links(line, wire, slice(None))
     return wire
 
 
@@ -241,8 +234,13 @@ def settle(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
     """Put one lane's wires at rest at the line's start."""
     for array in (wire.displacement, wire.increment, wire.change):
         array[lane] = 0.0
-    row, places = min(lane, len(line.link_static) - 1), (line.link_set, line.link_segment)
-    wire.static[lane][places] = line.link_static[row, : len(line.link_set)]
-    wire.gap[lane][places] = line.link_gap[row, : len(line.link_set)]
-    wire.extension[lane] = 0.0 - wire.gap[lane]
+    _take_links(line, wire, slice(lane, lane + 1))
     wire.first_span[lane] = 0
+
+
+def _take_links(line: FlexibleLine, wire: FlexibleWire, lanes: slice) -> None:
+    """Give lanes the links of the line's first window, at rest."""
+    rows, links = lanes if len(line.link_static) > 1 else slice(None), len(line.link_set)
+    wire.static[lanes][:, line.link_set, line.link_segment] = line.link_static[rows, :links]
+    wire.gap[lanes][:, line.link_set, line.link_segment] = line.link_gap[rows, :links]
+    wire.extension[lanes] = 0.0 - wire.gap[lanes]

@@ -20,8 +20,7 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
     """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
     angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
     for wire in (data.contact_wire, data.messenger_wire):
-        near, far = stencil_weights(wire, dx, step)
-        squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+        squared = _response(stencil_weights(wire, dx, step), angle)
         if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
             return False
     return True
@@ -35,13 +34,12 @@ def contact_gain(data: FlexibleCatenaryData, dx: float, step: float) -> float:
     the waves of the grid. Waves at the grid's own limit make it infinite.
     """
     angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
-    near, far = stencil_weights(data.contact_wire, dx, step)
-    squared = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+    squared = _response(stencil_weights(data.contact_wire, dx, step), angle)
     room = 4 - squared * (1 + 2 * data.damping.beta / step)
     if room.min() <= 0:
         return float(np.inf)
     _, weights = stencil(dx * np.linspace(0.0, 0.95, 20), dx)
-    seen = np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2  # (places, waves)
+    seen = _seen(weights, angle)
     largest = float(np.trapezoid(seen / room, angle, axis=1).max()) / np.pi
     return step**2 / (data.contact_wire.mass * dx) * largest
 
@@ -56,14 +54,23 @@ def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:
     """
     count = 512
     angle = (np.arange(count) + 0.5) * np.pi / count  # of a wave from node to node
-    near, far = stencil_weights(wire, dx, step) * wire.mass * dx / step**2
-    stiffness = 2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle))
+    stiffness = _response(stencil_weights(wire, dx, step) * wire.mass * dx / step**2, angle)
     second, fourth = wire.tension / dx, wire.bending_stiffness / dx**3
-    seen = np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2
-    carried = (1 / (second * angle**2 + fourth * angle**4) - seen / stiffness).mean(axis=1)
+    carried = (1 / (second * angle**2 + fourth * angle**4) - _seen(weights, angle) / stiffness).mean(axis=1)
     ratio = np.sqrt(fourth / second)
     shorter = (1 / np.pi - ratio * (np.pi / 2 - np.arctan(np.pi * ratio))) / (np.pi * second)
     return np.asarray(carried + shorter)
+
+
+def _response(weights: Array, angle: Array) -> Array:
+    """What a stencil of such weights answers to a wave, by its angle from node to node, for 1 of it."""
+    near, far = weights
+    return np.asarray(2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle)))
+
+
+def _seen(weights: Array, angle: Array) -> Array:
+    """Power of each wave that points among four nodes see, by their weights (points, 4): (points, waves)."""
+    return np.asarray(np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2)
 
 
 def spring_levels(stiffness: float, damping: float, step: float) -> Array:
