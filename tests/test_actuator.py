@@ -57,6 +57,11 @@ def test_the_impulse_of_a_command_does_not_depend_on_the_step(step):
     assert step * forces.sum() == pytest.approx(60 * (0.095 - 0.015 * rises(0.095)), rel=5e-4)
 
 
+def test_a_step_that_the_rate_alone_limits_counts_as_half_gone_with_a_lag_too():
+    forces = response(LaggedActuator(lag=0.015, rate_limit=2500.0), 100.0, 10)
+    assert forces == pytest.approx(2.5 * (np.arange(10) + 0.5))
+
+
 def test_rate_limit():
     """A ramp, whose mean over a step is that at its middle."""
     forces = response(LaggedActuator(rate_limit=2500.0), 100.0)

@@ -17,6 +17,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS
 from panto_env.plant.plant import Plant
+from panto_env.plant.state import Row
 
 LIVELY = {
     "sensors": "realistic",
@@ -138,28 +139,26 @@ def test_copy_needs_no_file_of_the_user(tmp_path):
 
 def test_tasks_and_plants_are_copied_too():
     task = Task(run_settings(settings_of("Pantograph-v0")), lanes=2)
-    for lane in range(2):
-        task.reset(lane, np.random.default_rng(lane))
+    task.reset(np.arange(2), np.random.default_rng)
     action = np.full((2, 1), 0.3)
     task.step(action)
     twin = copy.deepcopy(task)
     for _ in range(3):
         task.step(action)
         twin.step(action)
-    np.testing.assert_array_equal(twin.episode.observation, task.episode.observation)
-    np.testing.assert_array_equal(twin.reward_and_terms, task.reward_and_terms)
+    np.testing.assert_array_equal(twin.results.observation, task.results.observation)
+    np.testing.assert_array_equal(twin.results.reward_and_terms, task.results.reward_and_terms)
     np.testing.assert_equal(twin.figures(1).as_dict(), task.figures(1).as_dict())
     settings = run_settings({})
     plant = Plant(settings.catenary, settings.pantograph, lanes=2)
-    for lane in range(2):
-        plant.start(lane, 80.0 + lane)
+    plant.start(np.arange(2), np.array([80.0, 81.0]))
     samples = [each.samples(51) for each in (plant, plant)]
     twin = pickle.loads(pickle.dumps(plant))
     plant.advance_passively(50, samples[0])
     twin.advance_passively(50, samples[1])
     np.testing.assert_array_equal(samples[0].rows, samples[1].rows)
     assert np.ptp(samples[0].rows[:, -1, 0, 0]) > 0
-    np.testing.assert_array_equal(twin.steps_done, 50)
+    np.testing.assert_array_equal(twin.row(Row.STEP), 50)
 
 
 class Wire(NamedTuple):

@@ -16,6 +16,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task, mean_force, passive_mean, trim_of_pass
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.en50367 import largest_mean
+from panto_env.plant.state import Row
 
 PANTO = Path(sys.executable).with_name("panto")
 LIGHT = {"catenary": "periodic-stiffness", "pantograph": "identified-2dof"}
@@ -177,7 +178,7 @@ def test_an_environment_meets_it_at_any_speed_it_draws(speeds):
         "panto_env:PantographStiffness-v0", num_envs=2, **LIGHT, speed_kmh=speeds, mean_force=60.0
     )
     lanes.reset(seed=5)
-    assert lanes.unwrapped.task.plant.nominal_force[0] == applied
+    assert lanes.unwrapped.task.plant.of(0, Row.NOMINAL_FORCE) == applied
 
 
 def test_an_environment_is_not_slowed_down_before_it_is_used(empty_store):

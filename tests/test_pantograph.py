@@ -49,7 +49,7 @@ def test_matrices_of_two_masses_as_written_out():
 def test_rest_is_in_equilibrium_and_carries_the_lift_less_the_lowest_spring():
     data = load_pantograph("identified-2dof")
     compliance = 1 / 33e3
-    state = pantograph.rest_state(data, 54.0, 0.01, compliance)
+    (state,) = pantograph.rest_state(data, np.array([54.0]), np.array([0.01]), compliance)
     force = (state[0] - 0.01) / compliance
     assert force == pytest.approx(54.0 - data.stiffnesses[-1] * state[1])
     a, b = pantograph.matrices(data)

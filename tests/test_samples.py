@@ -141,7 +141,7 @@ def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
 
     def uplift(plant, samples, speed, steps):
         plant.start(0, speed)
-        plant.clear(samples, 0)
+        plant.clear(samples, np.array([0]))
         plant.advance_passively(steps, samples)
         return samples.uplift[0, 1 : steps + 1].copy()
 

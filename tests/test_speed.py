@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +12,7 @@ import panto_env
 from panto_env.base import machine
 from panto_env.base.errors import InputError
 from panto_env.cli import speed
+from panto_env.envs import IDS
 from panto_env.studies.throughput import environments, study, tables
 from panto_env.studies.throughput.plots import plot_speed
 
@@ -39,7 +39,7 @@ def test_every_plant_and_environment_is_measured(result):
     plants = {"en50318-2002", "periodic-stiffness", "ohl-three-span"}
     assert {row["catenary"] for row in result["plants"]} == plants
     assert all(row["times_real_time"] > 1 for row in result["plants"])
-    assert {"Pendulum-v1", "CartPole-v1"} < {row["id"] for row in result["environments"]}
+    assert {row["id"] for row in result["environments"]} == set(IDS)
 
 
 def test_cost_is_measured_over_spans_modes_grid_and_cores(result):
@@ -68,36 +68,87 @@ def test_cores_are_narrowed_and_given_back():
     assert os.sched_getaffinity(0) == allowed
 
 
-def shape(text):
-    """Lines with figures masked and the machine left out; cores may differ, so equal lines count once."""
-    masked = [re.sub(r"\d[\d,.]*(e[+-]\d+)?", "#", line) for line in text.splitlines()]
-    masked = [line.replace("cores", "core") for line in masked if "medians of" not in line]
-    return [line for k, line in enumerate(masked) if line and line not in masked[:k]]
+STORED = sorted((ROOT / "docs" / "speed").glob("*.json"))
+"""Results of ``panto speed --json``, each of a machine."""
 
 
-@chooses_cores
 @pytest.mark.parametrize(("document", "section"), [("README.md", 0), ("docs/speed.md", 1)])
-def test_documents_hold_what_the_command_prints(result, document, section):
+def test_documents_hold_what_the_command_prints_of_stored_results(document, section):
     text = (ROOT / document).read_text(encoding="utf-8")
     begin, end = tables.BEGIN, tables.END
     assert text.count(begin) == 1
-    block = begin + text.partition(begin)[2].partition(end)[0] + end
-    assert shape(block) == shape(tables.markdown(result)[section])
+    block = begin + text.partition(begin)[2].partition(end)[0] + end + "\n"
+    assert STORED
+    assert block == tables.markdown([study.read(path) for path in STORED])[section]
+
+
+def keys(value):
+    """Names in a result, and in its first rows."""
+    if isinstance(value, dict):
+        return {name: keys(each) for name, each in value.items()}
+    return keys(value[0]) if isinstance(value, list) and value else None
+
+
+@chooses_cores
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_stored_results_have_the_form_of_today(result, path):
+    assert keys(study.read(path)) == keys(result)
+
+
+def test_each_environment_stands_beside_a_yardstick_over_whole_episodes(result):
+    rows = result["environments"] + result["scaling"]["cores"]
+    for row in rows:
+        assert row["yardstick"] == ("Pendulum-v1" if row["lanes"] is None else "CartPole-v1")
+        own, its = row["steps_per_second"], row["yardstick_steps_per_second"]
+        assert row["ratio"] == pytest.approx(own / its)  # of one repeat
+    assert [row["ideal"] for row in result["environments"][:2]] == [True, False]
+
+
+def test_the_processor_is_named_with_the_width_of_its_vectors(result):
+    machine = result["machine"]
+    assert machine["vector_bits"] in (64, 128, 256, 512)
+    assert machine["family"] in tables.machine(result)
+    assert f"vectors of {machine['vector_bits']} bits" in tables.machine(result)
+
+
+def test_results_of_several_machines_stand_side_by_side(result, tmp_path, capsys):
+    other = json.loads(json.dumps(result))
+    other["machine"]["processor"] = "Another One"
+    for row in other["environments"]:
+        row["ratio"] = 7.7
+    paths = [tmp_path / "one.json", tmp_path / "other.json"]
+    for path, each in zip(paths, (result, other), strict=True):
+        path.write_text(json.dumps(each))
+    speed.speed(paths, markdown=True)
+    told = capsys.readouterr().out
+    assert "(2) Another One" in told
+    assert "| ratio (1) | speed (2) | ratio (2) |" in told
+    assert "| 7.7 |" in told
+    speed.speed(paths)
+    assert "Another One" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"machine": 1}', "\xff"])
+def test_what_is_no_result_is_refused(tmp_path, text):
+    path = tmp_path / "bad.json"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match=r"bad\.json is no result of 'panto speed --json'"):
+        speed.speed([path])
 
 
 def test_markdown_is_printed_unbroken(result, monkeypatch, capsys):
     monkeypatch.setattr(study, "run", lambda repeats, report: result)
     speed.speed(markdown=True)
-    assert capsys.readouterr().out == "\n".join(tables.markdown(result))
+    assert capsys.readouterr().out == "\n".join(tables.markdown([result]))
     speed.speed()
-    assert "yardstick" in capsys.readouterr().out
+    assert "yardsticks" in capsys.readouterr().out
 
 
 def test_where_cores_cannot_be_chosen_a_sentence_says_so(result, monkeypatch):
     monkeypatch.setattr(environments, "CAN_CHOOSE_CORES", False)
     assert environments.by_cores(1, lambda _: None) == []
     without = result | {"scaling": result["scaling"] | {"cores": []}}
-    assert "does not let a process choose its cores" in tables.markdown(without)[1]
+    assert "does not let a process choose its cores" in tables.markdown([without])[1]
     assert not plot_speed(without).axes[3].lines
 
 

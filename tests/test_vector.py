@@ -5,7 +5,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import ClipAction, NormalizeObservation, RecordEpisodeStatistics
 
 from panto_env import InputError
+from panto_env.backend import of_lanes
 from panto_env.envs import BARE, IDS
+from panto_env.plant.state import Row
 
 LIVELY = {"sensors": "realistic", "actuator": "realistic", "line_condition": "fair", "speed_kmh": (250, 300)}
 
@@ -72,6 +74,32 @@ def test_lanes_of_a_massless_line_are_single_environments():
     assert ends >= 6
 
 
+def test_lanes_of_a_group_run_in_each_as_far_as_it_draws():
+    """Those beside a lane that runs in stay as they are, also where more than a group of them are."""
+    settings = LIVELY | {"speed_kmh": (200, 330), "distance": 25.0, "run_in": 2.0}
+    vector = make("PantographStiffness-v0", 19, **settings)
+    singles = [gymnasium.make("panto_env:PantographStiffness-v0", **settings) for _ in range(19)]
+    observations, infos = vector.reset(seed=5)
+    seen = [env.reset(seed=5 + i) for i, env in enumerate(singles)]
+    assert len(set(infos["position"])) > 10
+    mask = np.arange(19) % 5 == 2
+    for actions in np.random.default_rng(0).uniform(-1, 1, (8, 19, 1)):
+        for i, (observation, info) in enumerate(seen):
+            np.testing.assert_array_equal(observations[i], observation)
+            assert infos["position"][i] == info["position"] or not infos["_position"][i]
+        observations, *_ = vector.step(actions)
+        for env, action in zip(singles, actions, strict=True):
+            env.step(action)
+        observations, infos = vector.reset(options={"reset_mask": mask})
+        seen = [
+            env.reset() if mask[i] else (observations[i], {"position": None}) for i, env in enumerate(singles)
+        ]
+        mask = np.roll(mask, 1)
+    observations, *_ = vector.step(actions)
+    for i, env in enumerate(singles):
+        np.testing.assert_array_equal(observations[i], env.step(actions[i])[0])
+
+
 def test_autoreset_modes_are_declared_and_kept():
     same = make(distance=10.0, autoreset_mode="SameStep")
     assert same.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
@@ -97,9 +125,9 @@ def test_disabled_autoreset_waits_for_a_masked_reset():
         ended = terminated | truncated
     with pytest.raises(InputError, match="has ended; call reset"):
         env.step(np.zeros((3, 1), np.float32))
-    before = env.unwrapped.task.plant.steps_done.copy()
+    before = env.unwrapped.task.plant.row(Row.STEP)
     env.reset(options={"reset_mask": ended})
-    after = env.unwrapped.task.plant.steps_done
+    after = env.unwrapped.task.plant.row(Row.STEP)
     assert (after[ended] == 0).all()
     assert (after[~ended] == before[~ended]).all()
     env.step(np.zeros((3, 1), np.float32))
@@ -130,7 +158,7 @@ def test_bad_actions_change_nothing(actions, message):
     env.reset(seed=0)
     with pytest.raises(InputError, match=message):
         env.step(actions)
-    assert (env.unwrapped.task.plant.steps_done == 0).all()
+    assert (env.unwrapped.task.plant.row(Row.STEP) == 0).all()
 
 
 @pytest.mark.parametrize(
@@ -179,10 +207,10 @@ def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
             seen, reward, *_ = single.step(actions[lane])
             np.testing.assert_array_equal(observations[lane], seen)
             assert rewards[lane] == reward
-    pantographs = env.unwrapped.task.plant.pantographs
-    assert len({pantographs.transition[variant].tobytes() for variant in pantographs.variant}) == 5
-    waves = env.unwrapped.task.plant.run.waves
-    assert {int(np.count_nonzero(waves[:, 0, lane])) for lane in range(5)} == {0, 4}
+    plant = env.unwrapped.task.plant
+    assert len({own.tobytes() for own in of_lanes(plant.pantographs.table, np.arange(5))}) == 5
+    amplitudes = of_lanes(plant.run.waves, np.arange(5))[:, ::3]
+    assert set(np.count_nonzero(amplitudes, axis=1)) == {0, 4}
 
 
 @pytest.mark.parametrize(

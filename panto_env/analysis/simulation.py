@@ -16,6 +16,7 @@ from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
+from ..plant.state import Row
 from ..policies import Policy, errors_name, find_policy, wishes
 
 _LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
@@ -58,7 +59,6 @@ def simulate(
     trim = trim_of_pass(checked, seed, evaluated, passive_mean)
     task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, np.random.default_rng(seed))
-    task.run_in()
     if driver is None:
         task.run_passively()
         return task.trajectory(0, seed=seed, last=True)
@@ -76,12 +76,11 @@ def run_policy(
     """
     with errors_name(name, "reset"):
         policy.reset(task.context(0))
-    episode = task.episode
-    shape = episode.action[0].shape
-    while not (episode.truncated[0] or episode.terminated[0]):
+    results, shape = task.results, (len(task.actuator.places),)
+    while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
             # A copy: a policy may keep what it was shown.
-            returned = policy.act(episode.observation[0].copy())
+            returned = policy.act(results.observation[0].copy())
             action = np.asarray(returned, dtype=float)
             if action.shape != shape or not np.isfinite(action).all():
                 raise InputError(
@@ -89,7 +88,7 @@ def run_policy(
                 )
         task.step(action[None])
         if progress is not None:
-            progress(float(task.plant.steps_done[0] / task.end(0)))
+            progress(task.plant.of(0, Row.STEP) / task.end(0))
 
 
 def _explicit() -> inspect.Signature:

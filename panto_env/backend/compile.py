@@ -8,9 +8,11 @@ from enum import IntEnum
 from typing import Any, TypeVar
 
 import numba
+from numba.core.extending import intrinsic
 
 from .cache import cache_folder
 from .once import compile_once
+from .parts import KERNEL_OPTIONS, PART_OPTIONS, refuse_calls
 
 F = TypeVar("F", bound=Callable[..., Any])
 E = TypeVar("E", bound=IntEnum)
@@ -33,7 +35,7 @@ def kernel(function: F) -> F:
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder())  # read by Numba when it decorates
     try:
-        compiled: F = numba.njit(cache=True, nogil=True, **OPTIONS)(function)
+        compiled: F = numba.njit(cache=True, nogil=True, **KERNEL_OPTIONS, **OPTIONS)(function)
     finally:
         numba.config.CACHE_DIR = previous
     if JIT:
@@ -43,8 +45,19 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """A function that kernels call, compiled by itself and then put in the place of the call."""
-    compiled: F = numba.njit(forceinline=True, **OPTIONS)(function)
-    return compiled
+    compiled: Any = numba.njit(**PART_OPTIONS, **OPTIONS)(function)
+    if JIT:
+        refuse_calls(compiled)
+    return compiled  # type: ignore[no-any-return]
+
+
+def in_python(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator of the compiled form of a function, an intrinsic of Numba; ``plain``: its form in Python."""
+
+    def choose_form(compiled: Callable[..., Any]) -> Any:
+        return intrinsic(compiled) if JIT else plain
+
+    return choose_form
 
 
 def python_function(compiled: Callable[..., Any]) -> Callable[..., Any]:

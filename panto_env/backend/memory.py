@@ -22,16 +22,6 @@ def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int = 0
     return spare[first : first + count].reshape(shape)
 
 
-def lane_table(*sizes: int) -> NDArray[np.float64]:
-    """Zeros of the shape ``sizes``, lanes last, with more columns than lanes: an odd number of cache lines.
-
-    Rows a power of two apart would fall on the same few places of a cache and drive each other out.
-    """
-    *rows, lanes = sizes
-    lines = -(-lanes // 8)
-    return aligned_zeros((*rows, 8 * (lines + 1 - lines % 2)))
-
-
 class _View(NamedTuple):
     """An array as a part of a block of memory."""
 

@@ -36,7 +36,7 @@ def compile_once(dispatcher: Any) -> None:
         with global_compiler_lock, _alone(f"{name}-{form}"):
             if _on_disk(dispatcher, signature):
                 return compile_here(signature)
-            with _announced("Compiling kernels, about 20 s, once per version and kind of line ..."):
+            with _announced("Compiling kernels, about 10 s, once per version and kind of line ..."):
                 return compile_here(signature)
 
     def save_alone(signature: Any, result: Any) -> None:

@@ -28,8 +28,9 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+from numpy.typing import NDArray
 
-from .compile import JIT, kernel
+from .compile import JIT
 
 POINTER = np.dtype(np.intp).itemsize
 
@@ -40,15 +41,17 @@ class Packed:
     def __init__(self, arguments: tuple[Any, ...]) -> None:
         """Pack ``arguments``, which stay alive with this object."""
         self.arguments = arguments
-        forms = tuple(type_of(argument) for argument in arguments)
-        writers = [entry(_pack, (form, types.intp)) for form in forms]
-        pairs = list(zip(writers, arguments, strict=True))
-        self._memory = [np.empty(write(argument, 0), dtype=np.uint8) for write, argument in pairs]
+        self._memory = [np.concatenate([_words(field) for field in each]) for each in arguments]
         self._table = np.array([memory.ctypes.data for memory in self._memory], dtype=np.intp)
-        for (write, argument), place in zip(pairs, self._table.tolist(), strict=True):
-            write(argument, place)
         self.address = self._table.ctypes.data
-        self.type = PackedType(forms)
+        self.type = PackedType(tuple(type_of(argument) for argument in arguments))
+
+
+def _words(value: Any) -> NDArray[np.int64]:
+    """The compiled form of an array, a float or an int, in words of 8 bytes."""
+    if isinstance(value, np.ndarray):  # no owner, no parent
+        return np.array([0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides])
+    return np.array([float(value)]).view(np.int64) if isinstance(value, float) else np.array([int(value)])
 
 
 _types: dict[Any, Any] = {}
@@ -152,25 +155,6 @@ class _PackedFields(AttributeTemplate):  # type: ignore[misc]
 def _field(context: Any, builder: Any, packed: PackedTupleType, value: Any, name: str) -> Any:
     form = builder.bitcast(value, context.get_value_type(packed.form).as_pointer())
     return _constant(builder, cgutils.gep_inbounds(builder, form, 0, packed.form.fields.index(name)))
-
-
-def _write(typing: Any, argument: Any, address: Any) -> Any:
-    def build(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        value, place = values
-        with builder.if_then(builder.icmp_unsigned("!=", place, ir.Constant(place.type, 0))):
-            builder.store(value, builder.inttoptr(place, value.type.as_pointer()), align=POINTER)
-        return context.get_constant(types.intp, context.get_abi_sizeof(value.type))
-
-    return types.intp(argument, types.intp), build
-
-
-_write_packed: Any = intrinsic(_write)
-
-
-@kernel
-def _pack(argument: Any, address: int) -> Any:
-    """Write the compiled form of a named tuple to an address, nowhere if that is 0; its size in bytes."""
-    return _write_packed(argument, address)
 
 
 def pack(*arguments: Any) -> Any:

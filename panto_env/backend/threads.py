@@ -1,91 +1,114 @@
-"""Threads that share the lanes of a batch: kernels run without Python's lock."""
+"""Threads that help with the lanes of a batch, each on a core of its own."""
 
 from __future__ import annotations
 
-import itertools
 import threading
+import time
 import weakref
-from collections import deque
 from collections.abc import Callable
-from queue import SimpleQueue
+from functools import partial
 from typing import Any
 
 from ..base.machine import cores
+from .compile import JIT
+from .shares import ALONE, HELPER, LEADER
 
-BLOCKS_PER_CHUNK = 4
-"""Blocks of lanes that a thread takes at a time; fewer are not worth the taking."""
-
-Share = tuple[Callable[[], None], "SimpleQueue[BaseException | None]"]
-"""A share of a work, and where to say that it is done, or what it ended with."""
+WORTH = 4e-6
+"""Shortest share (s) worth handing out: to hand over one takes some 0.2 us."""
+SHARES_PER_THREAD = 16
+"""Shares of a step per thread at most: a thread that comes late, or is slow, finds some left."""
+AWAKE = 2e-4
+"""How long (s) a helper waits for the next step inside the kernel, its core busy, before it sleeps."""
+TRIALS = 4
+"""Steps whose time is taken before it is decided how a batch is shared."""
+LOOKS = 1000
+"""Looks at what there is to do by which a helper learns how long one takes."""
 
 
 class LaneThreads:
-    """The caller's thread, and one further thread for each further core, until nobody holds this object.
+    """How the lanes of a batch are shared: the caller leads, others help, until nobody holds this object.
 
-    A pool of Python's own would do as well, but takes as long as some hundred lanes to be given work.
+    The first steps are done alone and their time is taken: a batch too small to be shared never is.
     """
 
-    def __init__(self, lanes: int, chunk: int, threads: int) -> None:
-        """Share ``lanes`` out in chunks."""
-        bounds = [*range(0, lanes, chunk), lanes]
-        self._chunks = list(itertools.pairwise(bounds))
-        self._others = threads - 1
-        self._shares: SimpleQueue[Share | None] = SimpleQueue()
-        for _ in range(self._others):
-            threading.Thread(target=_serve, args=(self._shares,), name="panto", daemon=True).start()
-        weakref.finalize(self, _dismiss, self._shares, self._others)
+    def __init__(self, run: Callable[..., Any], lanes: int, abreast: int, threads: int | None = None) -> None:
+        """run(first, last, size, role, patience): the kernel; abreast: lanes of a group.
 
-    def run(self, work: Callable[[int, int], Any]) -> None:
-        """Do ``work(first, last)`` for all lanes.
-
-        Each thread takes the next chunk when it is done with one, since some start late: the caller's from
-        the front, the others from the back, so that most lanes stay in the cache of one core.
+        threads: at most, by default as many as there are cores.
         """
-        left = deque(self._chunks)  # taking one is a single step under Python's lock
-        ends: SimpleQueue[BaseException | None] = SimpleQueue()
+        self._run, self._lanes, self._abreast = run, lanes, abreast
+        # Plain Python has but one thread that could be inside a kernel.
+        wanted = 1 if not JIT else cores() if threads is None else threads
+        self._threads = min(wanted, -(-lanes // abreast))
+        self._trials = TRIALS if self._threads > 1 else 0
+        self._shortest = float("inf")  # time of a step (s)
+        self._size = 0  # lanes of a share; 0: not shared
+        self._helpers: list[_Helper] = []
 
-        def take(next_chunk: Callable[[], tuple[int, int]]) -> None:
-            while left:
-                try:
-                    first, last = next_chunk()
-                except IndexError:
-                    return
-                work(first, last)
+    def step(self, *work: Any) -> Any:
+        """Do one step's ``work`` in all lanes; what the kernel returns."""
+        if self._size:
+            for helper in self._helpers:
+                helper.wake()
+            return self._run(*work, 0, self._lanes, self._size, LEADER, 0)
+        if not self._trials:
+            return self._run(*work, 0, self._lanes, self._lanes, ALONE, 0)
+        begun = time.perf_counter()
+        answer = self._run(*work, 0, self._lanes, self._lanes, ALONE, 0)
+        self._shortest = min(self._shortest, time.perf_counter() - begun)
+        self._trials -= 1
+        if self._trials == 0:
+            self._decide(work)
+        return answer
 
-        for _ in range(self._others):
-            self._shares.put((lambda: take(left.pop), ends))
-        try:
-            take(left.popleft)
-        except BaseException:
-            left.clear()
-            raise
-        finally:
-            errors = [ends.get() for _ in range(self._others)]  # none works on when this returns
-        for error in errors:
-            if error is not None:
-                raise error
+    def _decide(self, work: tuple[Any, ...]) -> None:
+        groups = -(-self._lanes // self._abreast)
+        shares = min(groups, int(self._shortest / WORTH), SHARES_PER_THREAD * self._threads)
+        helpers = min(self._threads, shares) - 1
+        if helpers > 0:
+            self._size = -(-groups // shares) * self._abreast
+            patience = int(LOOKS * AWAKE / min(self._time_of_looks(work) for _ in range(TRIALS)))
+            call = partial(self._run, *work, 0, 0, 0, HELPER, patience)
+            self._helpers = [_Helper(call) for _ in range(helpers)]
 
-
-def _serve(shares: SimpleQueue[Share | None]) -> None:
-    """What a further thread does: its shares of the works, until it is dismissed."""
-    while (share := shares.get()) is not None:
-        do, ends = share
-        error = None
-        try:
-            do()
-        except BaseException as raised:  # the caller's to deal with
-            error = raised
-        del share, do  # they would hold the arrays until the next work
-        ends.put(error)
+    def _time_of_looks(self, work: tuple[Any, ...]) -> float:
+        """Time (s) that a helper takes to look so often whether there is something to do."""
+        begun = time.perf_counter()
+        self._run(*work, 0, 0, 0, HELPER, LOOKS)
+        return time.perf_counter() - begun
 
 
-def _dismiss(shares: SimpleQueue[Share | None], threads: int) -> None:
-    for _ in range(threads):
-        shares.put(None)
+class _Helper:
+    """A thread that helps, asleep or inside the kernel."""
+
+    def __init__(self, help_with_steps: Callable[[], Any]) -> None:
+        self._called, self._state = threading.Event(), _State()
+        arguments = (help_with_steps, self._called, self._state)
+        threading.Thread(target=_serve, args=arguments, name="panto", daemon=True).start()
+        weakref.finalize(self, _dismiss, self._called, self._state)
+
+    def wake(self) -> None:
+        if self._state.asleep:
+            self._called.set()
 
 
-def lane_threads(lanes: int, lanes_abreast: int) -> LaneThreads | None:
-    """Threads for a batch of lanes, of which so many go abreast; None where one thread is enough."""
-    chunk = BLOCKS_PER_CHUNK * lanes_abreast
-    threads = min(cores(), lanes // (2 * chunk))
-    return LaneThreads(lanes, chunk, threads) if threads > 1 else None
+class _State:
+    """What owner and thread know of one another."""
+
+    asleep = False
+    dismissed = False
+
+
+def _serve(help_with_steps: Callable[[], Any], called: threading.Event, state: _State) -> None:
+    """What a helper does until it is dismissed."""
+    while not state.dismissed:
+        help_with_steps()
+        state.asleep = True
+        called.wait()
+        state.asleep = False
+        called.clear()
+
+
+def _dismiss(called: threading.Event, state: _State) -> None:
+    state.dismissed = True
+    called.set()

@@ -1,11 +1,13 @@
 """Vectors: eight numbers side by side, on which the processor computes at once.
 
-A kernel reads one from a row of an array whose last axis has ``WIDTH`` places, computes with ``+ - * /`` and
-the functions below, and writes it to a row. A number beside a vector counts as a vector of equal numbers, in
-the vector's precision. The compiler makes of it what the machine has: a register of 256 bits, or two of 128.
+A kernel reads one from a row of an array whose last axis has ``WIDTH`` places, computes with ``+ - * /``,
+comparisons and the functions of ``mathematics``, and writes it to a row. A number beside a vector counts as a
+vector of equal numbers, in the vector's precision. The compiler makes of it what the machine has: a register
+of 256 bits, or two of 128.
 
-There are two forms of it. Compiled for the processor, a vector is LLVM's own; without compilation it is a
-NumPy array. A third is planned and not written: on a GPU each thread of a group would hold one number.
+There are two forms of it. Compiled, a vector is LLVM's own, which a GPU's compiler takes as well: a thread
+then computes all its numbers. Without compilation it is a NumPy array. A third is planned: on a GPU each
+thread of a group would hold one number.
 """
 
 from __future__ import annotations
@@ -17,15 +19,13 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.extending import intrinsic
 from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
 from numba.np.arrayobj import make_array
 
-from .compile import JIT
+from .compile import in_python
 
 WIDTH = 8
 """Numbers in a vector: as many in single precision as a register of 256 bits has."""
@@ -36,9 +36,9 @@ FLAGS = ("contract",)
 class VectorType(types.Type):  # type: ignore[misc]
     """Type of a vector of float32 or float64."""
 
-    def __init__(self, item: Any) -> None:
-        self.item = item
-        super().__init__(f"Vector({item})")
+    def __init__(self, item: Any, count: int = WIDTH) -> None:
+        self.item, self.count = item, count
+        super().__init__(f"Vector({item}, {count})")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
         """A number can be a vector of equal numbers."""
@@ -48,32 +48,34 @@ class VectorType(types.Type):  # type: ignore[misc]
 class MaskType(types.Type):  # type: ignore[misc]
     """Type of a vector of truth values."""
 
-    def __init__(self) -> None:
-        super().__init__("Mask")
+    def __init__(self, count: int) -> None:
+        self.count = count
+        super().__init__(f"Mask({count})")
 
 
 @register_model(VectorType)
 class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, vector: VectorType) -> None:
-        super().__init__(manager, vector, ir.VectorType(manager.lookup(vector.item).get_value_type(), WIDTH))
+        item = manager.lookup(vector.item).get_value_type()
+        super().__init__(manager, vector, ir.VectorType(item, vector.count))
 
 
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, mask: MaskType) -> None:
-        super().__init__(manager, mask, ir.VectorType(ir.IntType(1), WIDTH))
+        super().__init__(manager, mask, ir.VectorType(ir.IntType(1), mask.count))
 
 
 def _places(numbers: list[int]) -> Any:
-    return ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), numbers)
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(numbers)), numbers)
 
 
 @lower_cast(types.Number, VectorType)  # type: ignore[untyped-decorator]
 def _spread(context: Any, builder: Any, number_type: Any, vector: Any, number: Any) -> Any:
     item = context.cast(builder, number, number_type, vector.item)
-    empty = ir.Constant(ir.VectorType(item.type, WIDTH), ir.Undefined)
+    empty = ir.Constant(ir.VectorType(item.type, vector.count), ir.Undefined)
     first = builder.insert_element(empty, item, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, first, _places([0] * WIDTH))
+    return builder.shuffle_vector(first, first, _places([0] * vector.count))
 
 
 def _operator(
@@ -102,8 +104,8 @@ def _itself(vector: Any) -> Any:
     return vector
 
 
-def _mask(_: Any) -> Any:
-    return MaskType()
+def _mask(vector: Any) -> Any:
+    return MaskType(vector.count)
 
 
 def _arithmetic(instruction: str, *functions: Any) -> None:
@@ -115,25 +117,27 @@ _arithmetic("fadd", operator.add, operator.iadd)
 _arithmetic("fsub", operator.sub, operator.isub)
 _arithmetic("fmul", operator.mul, operator.imul)
 _arithmetic("fdiv", operator.truediv, operator.itruediv)
-_operator(operator.neg, _itself, lambda builder, a: builder.fneg(a), inputs=1)
-_operator(operator.lt, _mask, lambda builder, a, b: builder.fcmp_ordered("<", a, b))
-_operator(operator.gt, _mask, lambda builder, a, b: builder.fcmp_ordered(">", a, b))
+# Not as an instruction of its own, which a GPU's compiler does not know.
+_operator(operator.neg, _itself, lambda builder, a: builder.fsub(ir.Constant(a.type, None), a), inputs=1)
 
 
-def _function(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: the compiled form of a function, as Numba's intrinsics are; ``plain``: that in Python."""
-
-    def choose_form(compiled: Callable[..., Any]) -> Any:
-        return intrinsic(compiled) if JIT else plain
-
-    return choose_form
+def _comparison(sign: str, function: Any) -> None:
+    _operator(function, _mask, lambda builder, a, b: builder.fcmp_ordered(sign, a, b))
 
 
-def _row(context: Any, builder: Any, array_type: Any, array: Any, i: Any) -> Any:
-    """Address of a row."""
+_comparison("<", operator.lt)
+_comparison(">", operator.gt)
+_comparison("<=", operator.le)
+_comparison(">=", operator.ge)
+_comparison("==", operator.eq)
+
+
+def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -> Any:
+    """Address of a row of so many numbers."""
+    array, i = values
     data = make_array(array_type)(context, builder, array).data
-    first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, WIDTH))])
-    return builder.bitcast(first, ir.VectorType(data.type.pointee, WIDTH).as_pointer())
+    first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, count))])
+    return builder.bitcast(first, ir.VectorType(data.type.pointee, count).as_pointer())
 
 
 def _is_table(array: Any) -> bool:
@@ -144,98 +148,42 @@ def _load_plain(rows: Any, i: int) -> Any:
     return rows[i].copy()
 
 
-@_function(_load_plain)
-def load_row(typing: Any, rows: Any, i: Any) -> Any:
-    """``load_row(rows, i)``: row i, not negative, of an array (rows, WIDTH) in C's order, as a vector."""
-    if not (_is_table(rows) and isinstance(i, types.Integer)):
-        return None
-
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        return builder.load(_row(context, builder, sig.args[0], *values), align=rows.dtype.bitwidth // 8)
-
-    return VectorType(rows.dtype)(rows, types.intp), build
-
-
 def _store_plain(rows: Any, i: int, vector: Any) -> None:
     rows[i] = vector
 
 
-@_function(_store_plain)
-def store_row(typing: Any, rows: Any, i: Any, vector: Any) -> Any:
-    """``store_row(rows, i, vector)``: write a vector to row i of an array (rows, WIDTH)."""
-    if not (_is_table(rows) and isinstance(i, types.Integer)):
-        return None
+def row_access(count: int) -> tuple[Any, Any]:
+    """``load_row`` and ``store_row`` for rows of so many numbers."""
 
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        array, place, value = values
-        builder.store(
-            value, _row(context, builder, sig.args[0], array, place), align=rows.dtype.bitwidth // 8
-        )
-        return context.get_dummy_value()
-
-    return types.void(rows, types.intp, VectorType(rows.dtype)), build
-
-
-def _vector_of(*given: Any) -> Any:
-    return next((each for each in given if isinstance(each, VectorType)), None)
-
-
-@_function(lambda mask, a, b: np.where(mask, a, b))
-def choose(typing: Any, mask: Any, a: Any, b: Any) -> Any:
-    """``choose(mask, a, b)``: of a where the mask is true, of b elsewhere."""
-    vector = _vector_of(a, b)
-
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        return builder.select(*values)
-
-    return vector(mask, vector, vector), build
-
-
-def _extreme(sign: str, plain: Any) -> Any:
-    def either(typing: Any, a: Any, b: Any) -> Any:
-        vector = _vector_of(a, b)
+    @in_python(_load_plain)
+    def load(typing: Any, rows: Any, i: Any) -> Any:
+        if not (_is_table(rows) and isinstance(i, types.Integer)):
+            return None
 
         def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            return builder.select(builder.fcmp_ordered(sign, *values), *values)
+            place = _row(context, builder, sig.args[0], values, count)
+            return builder.load(place, align=rows.dtype.bitwidth // 8)
 
-        return vector(vector, vector), build
+        return VectorType(rows.dtype, count)(rows, types.intp), build
 
-    return _function(plain)(either)
+    @in_python(_store_plain)
+    def store(typing: Any, rows: Any, i: Any, vector: Any) -> Any:
+        if not (_is_table(rows) and isinstance(i, types.Integer)):
+            return None
 
+        def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            place = _row(context, builder, sig.args[0], values[:2], count)
+            builder.store(values[2], place, align=rows.dtype.bitwidth // 8)
+            return context.get_dummy_value()
 
-smaller: Any = _extreme("<", np.minimum)
-"""``smaller(a, b)``: the smaller number at each place."""
-larger: Any = _extreme(">", np.maximum)
-"""``larger(a, b)``: the larger number at each place."""
+        return types.void(rows, types.intp, VectorType(rows.dtype, count)), build
 
-
-@_function(np.any)
-def any_of(typing: Any, mask: Any) -> Any:
-    """``any_of(mask)``: whether the mask is true at any place."""
-
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        bits = builder.bitcast(values[0], ir.IntType(WIDTH))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    return types.boolean(mask), build
+    return load, store
 
 
-def _root_plain(vector: Any) -> Any:
-    with np.errstate(invalid="ignore"):  # at places that are not chosen
-        return np.sqrt(vector)
-
-
-@_function(_root_plain)
-def root(typing: Any, vector: Any) -> Any:
-    """``root(vector)``: square roots."""
-
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        kind = values[0].type
-        name = f"llvm.sqrt.v{WIDTH}f{vector.item.bitwidth}"
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
-        return builder.call(function, values)
-
-    return vector(vector), build
+load_row, store_row = row_access(WIDTH)
+"""``load_row(rows, i)``: row i, not negative, of an array (rows, WIDTH) in C's order, as a vector;
+``store_row(rows, i, vector)``: write a vector to it."""
 
 
 def _shift(up: bool) -> Any:
@@ -251,7 +199,7 @@ def _shift(up: bool) -> Any:
 
         return vector(vector, vector), build
 
-    return _function(plain)(shift)
+    return in_python(plain)(shift)
 
 
 shift_up: Any = _shift(up=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,6 +15,10 @@ from ..terminal import Json, Plot, console, print_json, print_table, progress_co
 
 
 def speed(
+    results: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Results stored with --json, to print side by side instead of measuring."),
+    ] = None,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats to take the median of.")] = 9,
     plot: Plot = None,
     json: Json = False,
@@ -25,7 +30,8 @@ def speed(
     """Measure times real time of each plant on one core, and environment steps per second.
 
     Beside them stand Gymnasium's own Pendulum and native CartPole, and the limits of the machine; then
-    how the cost grows with spans, modes, grid, lanes and cores.
+    how the cost grows with spans, modes, grid, lanes and cores. Of several stored results the first one's
+    details are shown.
     """
     if json and markdown:
         raise InputError("Give one of --json and --markdown, not both.")
@@ -34,17 +40,21 @@ def speed(
     if plot is not None:
         from ..analysis.plots import save
         from ..studies.throughput.plots import plot_speed
-    with progress_console.status("measuring") as status:
-        result = study.run(repeats, report=lambda what: status.update(f"measuring {what}"))
+    if results:
+        found = [study.read(path) for path in results]
+    else:
+        with progress_console.status("measuring") as status:
+            found = [study.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
+    result = found[0]
     if plot is not None:
         save(plot_speed(result), plot)
     if json:
         print_json(result)
     elif markdown:
-        sys.stdout.write("\n".join(tables.markdown(result)))
+        sys.stdout.write("\n".join(tables.markdown(found)))
     else:
-        console.print(tables.machine(result))
-        for part in (tables.summary(result), *tables.details(result)):
+        console.print("\n".join(tables.machines(found)))
+        for part in (tables.summary(found), *tables.details(result)):
             if isinstance(part, str):
                 console.print(part)
             else:

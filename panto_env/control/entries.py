@@ -1,9 +1,9 @@
 """Entries of an observation, each in one piece: name, scale, unit, where it belongs, and its writer.
 
 A new entry is one decorated function here; its place in an observation is that among these functions.
-A writer gives the physical value of one lane. It may look at ``episode`` (``Episode``), ``block`` (rows of
-``Row``, column i) and ``task`` (rows of ``TaskRow``, column i); ``lane`` is the lane's place among all,
-``number`` tells entries apart that share a writer.
+A writer gives the physical value, of one lane or of all in a group at once. It may look at ``episode``
+(``Episode``), ``own`` (rows of ``Row``), ``task`` (of ``TaskRow``) and ``now`` (of ``Now``); ``number`` tells
+entries apart that share a writer.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
-from .state import TASK_ROW
+from .state import NOW, TASK_ROW
 
 MEASURED, FULL, CENTRED = "measured", "full", "centred"
 """Kinds of observation: what a train can measure; that and more, free of noise and delay; what it can
@@ -92,53 +92,53 @@ def entries_of(kind: str, actuator: ActuatorSettings, pantograph: PantographData
 
 
 @entry(MEASURED, "head displacement", 0.1, "m")
-def _head_displacement(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.HEAD_HEIGHT, i]
+def _head_displacement(episode, own, task, now, number):
+    return now[NOW.READING + READING.HEAD_HEIGHT]
 
 
 @entry(MEASURED, "frame displacement", 0.1, "m")
-def _frame_displacement(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.FRAME_HEIGHT, i]
+def _frame_displacement(episode, own, task, now, number):
+    return now[NOW.READING + READING.FRAME_HEIGHT]
 
 
 @entry(MEASURED, "head velocity", 1.0, "m/s")
-def _head_velocity(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.HEAD_VELOCITY, i]
+def _head_velocity(episode, own, task, now, number):
+    return now[NOW.READING + READING.HEAD_VELOCITY]
 
 
 @entry(MEASURED, "frame velocity", 1.0, "m/s")
-def _frame_velocity(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.FRAME_VELOCITY, i]
+def _frame_velocity(episode, own, task, now, number):
+    return now[NOW.READING + READING.FRAME_VELOCITY]
 
 
 @entry(MEASURED, "contact force", 100.0, "N")
-def _contact_force(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.CONTACT_FORCE, i]
+def _contact_force(episode, own, task, now, number):
+    return now[NOW.READING + READING.CONTACT_FORCE]
 
 
 @entry(MEASURED, "sine of span position", 1.0, "-")
-def _span_sine(episode, block, task, lane, number, i):
-    return sine_of_turns(task[TASK_ROW.SPANS, i])
+def _span_sine(episode, own, task, now, number):
+    return sine_of_turns(now[NOW.SPANS])
 
 
 @entry(MEASURED, "cosine of span position", 1.0, "-")
-def _span_cosine(episode, block, task, lane, number, i):
-    return cosine_of_turns(task[TASK_ROW.SPANS, i])
+def _span_cosine(episode, own, task, now, number):
+    return cosine_of_turns(now[NOW.SPANS])
 
 
 @entry(MEASURED, "speed", 100.0, "m/s")
-def _speed(episode, block, task, lane, number, i):
-    return block[ROW.STRIDE, i] / episode.time_step
+def _speed(episode, own, task, now, number):
+    return own[ROW.STRIDE] * (1.0 / episode.time_step)
 
 
 @entry(CENTRED, "force deviation", 0.3, "of the nominal force")
-def _force_deviation(episode, block, task, lane, number, i):
-    return task[TASK_ROW.READING + READING.CONTACT_FORCE, i] / block[ROW.NOMINAL_FORCE, i] - 1.0
+def _force_deviation(episode, own, task, now, number):
+    return now[NOW.READING + READING.CONTACT_FORCE] / own[ROW.NOMINAL_FORCE] - 1.0
 
 
 @entry(CENTRED, "nominal force", 30.0, "N")
-def _nominal_force(episode, block, task, lane, number, i):
-    return block[ROW.NOMINAL_FORCE, i]
+def _nominal_force(episode, own, task, now, number):
+    return own[ROW.NOMINAL_FORCE]
 
 
 def _actions(actuator: ActuatorSettings, _: PantographData) -> list[tuple[str, float, str, int]]:
@@ -146,23 +146,23 @@ def _actions(actuator: ActuatorSettings, _: PantographData) -> list[tuple[str, f
 
 
 @entries(MEASURED, _actions)
-def _last_action(episode, block, task, lane, number, i):
-    return episode.action[lane, number]
+def _last_action(episode, own, task, now, number):
+    return task[TASK_ROW.ACTION + number]
 
 
 @entry(FULL, "wire displacement", 0.1, "m")
-def _wire_displacement(episode, block, task, lane, number, i):
-    return block[ROW.WIRE_HEIGHT, i]
+def _wire_displacement(episode, own, task, now, number):
+    return own[ROW.WIRE_HEIGHT]
 
 
 @entries(FULL, lambda actuator, _: [("frame force", actuator.force_limit, "N", 0)])
-def _frame_force(episode, block, task, lane, number, i):
-    return block[ROW.FRAME_FORCE, i]
+def _frame_force(episode, own, task, now, number):
+    return own[ROW.FRAME_FORCE]
 
 
 @entries(FULL, lambda actuator, _: [("head force", actuator.force_limit, "N", 0)])
-def _head_force(episode, block, task, lane, number, i):
-    return block[ROW.HEAD_FORCE, i]
+def _head_force(episode, own, task, now, number):
+    return own[ROW.HEAD_FORCE]
 
 
 def _inner_masses(_: ActuatorSettings, pantograph: PantographData) -> list[tuple[str, float, str, int]]:
@@ -177,5 +177,5 @@ def _inner_masses(_: ActuatorSettings, pantograph: PantographData) -> list[tuple
 
 
 @entries(FULL, _inner_masses)
-def _pantograph_state(episode, block, task, lane, number, i):
-    return block[ROW.STATE + number, i]
+def _pantograph_state(episode, own, task, now, number):
+    return own[ROW.STATE + number]

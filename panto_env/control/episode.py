@@ -1,31 +1,35 @@
-"""What the task knows of all lanes, as arrays for kernels."""
+"""What the task knows of all lanes, and what it tells of them, as arrays for kernels."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..backend import lane_table
 from ..base.arrays import Array, Index
+from ..plant.plant import Plant
+from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
+from .observation import Layout
+from .reward import MEAN_TIME
+from .settings import RunSettings
+from .state import RESULT_ROWS, Flag, Result, TaskRow
 
 Flags = NDArray[np.bool_]
 
 
 class Episode(NamedTuple):
-    """One episode per lane, in all of them."""
+    """One episode per lane, in all of them; arrays by lane have a place for each lane of whole groups."""
 
-    action: Array  # (lanes, actions): the present one, -1..1
-    last_action: Array  # (lanes, actions): the one before
+    action: Array  # (actions, lanes): asked for in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
-    table: Array  # (EPISODE_ROWS, lanes): rows of ``TaskRow``
+    table: Array  # (groups, ACTION + actions, lanes abreast): rows of ``TaskRow``
     weights: Array  # (terms,): of the reward
-    idle: Flags  # (lanes,): lanes that the next step leaves as they are
-    terminated: Flags  # (lanes,): whether the plant has left its valid range
-    ending: Index  # (lanes,): by what, an ``Ending``
-    truncated: Flags  # (lanes,): whether the end of the run is reached
-    observation: NDArray[np.float32]  # (lanes, entries)
+    idle: Flags  # (lanes,): lanes that are to stay as they are
+    steps: Index  # (lanes,): control steps that a call makes, more than one only where lanes go one by one
     writers: Index  # (entries, 2): writer and number of each entry of the observation
     centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
@@ -35,3 +39,77 @@ class Episode(NamedTuple):
     mean_share: float  # of the running mean of the force that a control step replaces
     loss_limit: int  # plant steps without contact that end an episode
     head_range: float  # height of the head (m), either way, that ends an episode
+
+
+def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_steps: int) -> Episode:
+    """Of all lanes of a plant, none begun; control_steps: plant steps in a control step."""
+    lanes, abreast, actuator = plant.lanes, plant.lanes_abreast, settings.actuator
+    table = lane_table(TaskRow.ACTION + len(actuator.places), lanes, abreast)
+    table[:, TaskRow.DISTANCE] = 1.0  # of places without a lane: it is divided by
+    # An odd number of groups: rows a power of two apart would drive each other out of a cache.
+    places = (len(table) | 1) * abreast
+    return Episode(
+        action=np.zeros((len(actuator.places), places)),
+        places=np.array(actuator.places, dtype=np.int64),
+        force_limit=actuator.force_limit,
+        table=table,
+        weights=settings.reward.weights,
+        idle=np.arange(places) >= lanes,
+        steps=np.ones(places, dtype=np.int64),
+        writers=layout.writers,
+        centre=layout.centre,
+        per_unit=1 / layout.scale,
+        spans_per_metre=1.0 / float(plant.catenary.span_length),
+        time_step=plant.time_step,
+        control_steps=control_steps,
+        mean_share=1 - math.exp(-settings.control_interval / MEAN_TIME),
+        loss_limit=round(LOSS_TIME / plant.time_step),
+        head_range=HEAD_RANGE,
+    )
+
+
+class Results(NamedTuple):
+    """What a control step, or the start of an episode, tells of all lanes.
+
+    Arrays have a place for each lane of whole groups. They have a row per number, so that a group of lanes is
+    written at once.
+    """
+
+    lanes: int
+    entries: NDArray[np.float32]  # (entries, places): of the observation
+    values: Array  # (RESULT_ROWS, places): rows of ``Result``
+    flags: Flags  # (flags, places): rows of ``Flag``
+
+    @property
+    def observation(self) -> NDArray[np.float32]:
+        """(lanes, entries), a view."""
+        return self.entries[:, : self.lanes].T
+
+    @property
+    def terminated(self) -> Flags:
+        """(lanes,): whether the plant has left its valid range, a view."""
+        return self.flags[Flag.TERMINATED, : self.lanes]
+
+    @property
+    def truncated(self) -> Flags:
+        """(lanes,): whether the end of the run is reached within it, a view."""
+        return self.flags[Flag.TRUNCATED, : self.lanes]
+
+    @property
+    def reward_and_terms(self) -> Array:
+        """(1 + terms, lanes): the reward, and its terms, not weighted; a view."""
+        return self.values[Result.REWARD : Result.CONTACT_FORCE, : self.lanes]
+
+    def copy(self) -> Results:
+        """The same in arrays of its own."""
+        return Results(self.lanes, self.entries.copy(), self.values.copy(), self.flags.copy())
+
+
+def new_results(lanes: int, places: int, entries: int) -> Results:
+    """Room for the results of so many lanes, which take so many places in whole groups."""
+    return Results(
+        lanes,
+        np.empty((entries, places), dtype=np.float32),
+        np.empty((RESULT_ROWS, places)),
+        np.empty((len(Flag), places), dtype=np.bool_),
+    )

@@ -106,7 +106,7 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
     target = target_mean(settings, speed)
     assert target is not None  # else there is nothing to trim
     aerodynamic = settings.pantograph.nominal_force(speed) - settings.pantograph.static_force
-    force = target - aerodynamic
+    force = float(target - aerodynamic)
     before: tuple[float, float] | None = None
     for _ in range(MOST_RUNS):
         if force < 0:

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import NOT_NEGATIVE, inlined
+from ..backend import (
+    NOT_NEGATIVE,
+    inlined,
+    larger,
+    number_at,
+    put_number,
+    rows_from,
+    smaller,
+    width_of,
+)
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
@@ -17,7 +26,7 @@ from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
 from ..plant.state import ROW
 from .entries import CENTRED, FULL, MEASURED, WRITERS, Entry, entries_of
-from .state import MAX_ENTRIES, TASK_ROW
+from .state import MAX_ENTRIES, NOW
 
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
@@ -78,16 +87,15 @@ def layout(kind: str, actuator: ActuatorSettings, pantograph: PantographData) ->
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """Kernel code that writes a row of entries with the writer at a place known only as it runs.
+    """Kernel code that writes an entry with the writer at a place known only as it runs.
 
     Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
     """
     names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
-    lines = ["def write(chosen, episode, block, task, begin, number, centre, per_unit, row, count):"]
+    lines = ["def write(chosen, episode, own, task, now, number, entry):"]
     for place in range(len(writers)):
-        value = f"writer_{place}(episode, block, task, (begin + i) & {NOT_NEGATIVE}, number, i)"
-        lines += [f"    if chosen == {place}:", "        for i in range(count):"]
-        lines += [f"            row[i] = ({value} - centre) * per_unit"]
+        lines += [f"    if chosen == {place}:"]
+        lines += [f"        entry[0] = writer_{place}(episode, own, task, now, number)"]
     exec("\n".join(lines), names)
     write: Callable[..., Any] = inlined(names["write"])
     return write
@@ -97,23 +105,27 @@ _write = _branches(WRITERS)
 
 
 @inlined
-def observe(episode, sensors, block, task, begin, count):
-    """Observation of a block into ``episode.observation``; noise is added to the readings."""
-    readings, entries = task[TASK_ROW.READING :], task[TASK_ROW.ENTRY :]
-    if sensors.noise.shape[1] > 0:
-        for i in range(count):
-            lane = (begin + i) & NOT_NEGATIVE
-            noise = sensors.noise[lane, sensors.noise_used[lane] & NOT_NEGATIVE]
+def add_noise(sensors, idle, readings, lane):
+    """Add to the readings of a group the noise that is next in each of its lanes that is not idle."""
+    for i in range(width_of(readings)):
+        its = (lane + i) & NOT_NEGATIVE
+        if not idle[its]:
+            noise = sensors.noise[its, sensors.noise_used[its] & NOT_NEGATIVE]
             for k in range(noise.size):
-                readings[k, i] += noise[k]
-            sensors.noise_used[lane] += 1
-    for i in range(count):
-        task[TASK_ROW.SPANS, i] = block[ROW.STRIDE, i] * block[ROW.STEP, i] * episode.spans_per_metre
-    for k in range(episode.writers.shape[0]):
-        chosen, number = episode.writers[k, 0], episode.writers[k, 1]
-        centre, per_unit = episode.centre[k], episode.per_unit[k]
-        _write(chosen, episode, block, task, begin, number, centre, per_unit, entries[k], count)
-    for k in range(episode.writers.shape[0]):
-        seen = episode.observation[begin : begin + count, k]
-        for i in range(count):
-            seen[i] = min(max(entries[k, i], -BOUND), BOUND)
+                put_number(readings, k, i, number_at(readings, k, i) + noise[k])
+            sensors.noise_used[its] += 1
+
+
+@inlined
+def prepare_entries(episode, sensors, own, now, lane):
+    """Make ready what entries of an observation look at: noise is added to the readings of a group."""
+    if sensors.noise.shape[1] > 0:
+        add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
+    now[NOW.SPANS] = own[ROW.STRIDE] * own[ROW.STEP] * episode.spans_per_metre
+
+
+@inlined
+def entry_of(episode, own, task, now, k, entry):
+    """Entry k of the observation of a group, within its bounds; entry: room for one row."""
+    _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1], entry)
+    return smaller(larger((entry[0] - episode.centre[k]) * episode.per_unit[k], -BOUND), BOUND)

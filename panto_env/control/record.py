@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..backend import of_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.compliance import LineFacts
@@ -13,6 +14,7 @@ from ..metrics.trajectory import Trajectory
 from ..plant.state import Row
 from ..plant.valid_range import Ending, reason
 from .identity import identity
+from .state import TaskRow
 
 if TYPE_CHECKING:
     from .task import Task
@@ -23,12 +25,13 @@ LARGEST_HEIGHT = 3.0
 """Height of the wire (m), either way, beyond which it has, too."""
 
 
-def refuse_divergence(task: Task, lane: int, deviation: float, height: Array) -> None:
-    """Raise InputError where a lane's mean deviation from its nominal force (N) or its wire height (m)
-    is that of no line.
+def refuse_divergence(task: Task, lanes: Any, deviation: Array, height: Array) -> None:
+    """Raise InputError where the mean deviation of a lane, (n,), from its nominal force (N) or its wire
+    height (m) is that of no line.
     """
-    possible = deviation < LARGEST_DEVIATION and (np.abs(height) < LARGEST_HEIGHT).all()
-    if not possible or task.episode.ending[lane] == Ending.DIVERGED:
+    possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
+    endings = of_lanes(task.episode.table, lanes)[:, TaskRow.ENDING]
+    for lane in lanes[~possible | (endings == Ending.DIVERGED)].tolist():
         plant = task.plant
         raise InputError(
             f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
@@ -44,10 +47,13 @@ def trajectory(
 
     last: whether the task runs no more, so that large arrays need no copy.
     """
-    plant, steps = task.plant, int(task.plant.steps_done[lane])
+    plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE)
+    steps = int(plant.of(lane, Row.STEP))
     rows = task.samples.rows[lane, 1 : steps + 1, 0]
-    deviation = np.abs(rows[:, Row.CONTACT_FORCE] - plant.nominal_force[lane])
-    refuse_divergence(task, lane, float(deviation.mean()) if steps else 0.0, rows[:, Row.WIRE_HEIGHT])
+    if steps:
+        deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - nominal_force))
+        highest = np.max(np.abs(rows[:, Row.WIRE_HEIGHT]))
+        refuse_divergence(task, np.array([lane]), deviation[None], highest[None])
     uplift, tension = (each[lane, 1 : steps + 1] for each in (task.samples.uplift, task.samples.tension))
     middle = (np.arange(steps) + 0.5) * plant.time_step
     return Trajectory(
@@ -70,12 +76,12 @@ def trajectory(
         speed_kmh=3.6 * float(task.speed[lane]),
         span_length=plant.catenary.span_length,
         time_step=plant.time_step,
-        nominal_force=float(plant.nominal_force[lane]),
+        nominal_force=nominal_force,
         target_mean=task.target_mean(lane),
         settings=identity(task.settings, plant, task.distance),
         policy=policy,
         seed=seed,
-        terminated=bool(task.episode.terminated[lane]),
+        terminated=_ending(task, lane) is not Ending.NONE,
         ending=ending(task, lane),
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
     )
@@ -83,13 +89,17 @@ def trajectory(
 
 def ending(task: Task, lane: int) -> str:
     """Where and why a lane's run ended early, as a sentence; empty where it did not."""
-    which = Ending(task.episode.ending[lane])
+    which = _ending(task, lane)
     if which is Ending.NONE:
         return ""
     plant = task.plant
-    time = float(plant.steps_done[lane] * plant.time_step)
+    time = plant.of(lane, Row.STEP) * plant.time_step
     position, line = time * float(task.speed[lane]), plant.catenary
     return (
         f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
         f"{time:.2f} s): {reason(which, line.free_uplift)}."
     )
+
+
+def _ending(task: Task, lane: int) -> Ending:
+    return Ending(int(of_lanes(task.episode.table, lane)[TaskRow.ENDING]))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ..backend import inlined
+from ..backend import choose, inlined, magnitude, rows_from
 from ..base.arrays import Array
 from ..base.settings import NonNegative, Settings
 from ..plant.state import ROW
-from .state import TASK_ROW, TERM, TERMS
+from .state import NOW, RESULT, TASK_ROW, TERM, TERMS
 
 MEAN_TIME = 1.0
 """Time constant (s) of the running mean of the contact force: a few spans at speed."""
@@ -38,73 +38,55 @@ class Reward(Settings):
 
 
 @inlined
-def begin_terms(block, task, count):
+def begin_terms(now):
     """Begin a control step."""
-    for i in range(count):
-        task[TASK_ROW.FORCE_BEFORE, i] = block[ROW.FORCE, i]
-        task[TASK_ROW.COST, i] = 0.0
-        task[TASK_ROW.LOSS_STEPS, i] = 0.0
-        task[TASK_ROW.SIGNED_DEVIATION, i] = 0.0
+    now[NOW.COST] = 0.0
+    now[NOW.LOSS_STEPS] = 0.0
+    now[NOW.SIGNED_DEVIATION] = 0.0
 
 
 @inlined
-def add_sample_to_terms(block, task, count):
-    """Add the plant step that a block has just made to the cost and the loss of its control step."""
-    for i in range(count):
-        force, nominal_force = block[ROW.FORCE, i], block[ROW.NOMINAL_FORCE, i]
-        # An interval lies between two samples: before the first one there is none.
-        between = 1.0 if block[ROW.STEP, i] > 1.5 else 0.0
-        task[TASK_ROW.COST, i] += between * (
-            abs(task[TASK_ROW.FORCE_BEFORE, i] - nominal_force) + abs(force - nominal_force)
-        )
-        lost = 1.0 if force <= 0.0 else 0.0
-        task[TASK_ROW.LOSS_STEPS, i] += lost
-        task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] = lost * (task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] + 1.0)
-        task[TASK_ROW.FORCE_BEFORE, i] = force
-        task[TASK_ROW.SIGNED_DEVIATION, i] += force - nominal_force
+def add_sample_to_terms(own, task, now, force_before):
+    """Add a plant step to the cost and the loss of its control step; force_before: of contact (N)."""
+    force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.NOMINAL_FORCE]
+    # An interval lies between two samples: before the first one there is none.
+    between = choose(own[ROW.STEP] > 1.5, 1.0, 0.0)
+    now[NOW.COST] += between * (magnitude(force_before - nominal_force) + magnitude(force - nominal_force))
+    lost = choose(force <= 0.0, 1.0, 0.0)
+    now[NOW.LOSS_STEPS] += lost
+    task[TASK_ROW.LOSS_STEPS_IN_A_ROW] = lost * (task[TASK_ROW.LOSS_STEPS_IN_A_ROW] + 1.0)
+    now[NOW.SIGNED_DEVIATION] += force - nominal_force
 
 
 @inlined
-def compute_reward(episode, block, task, begin, count):
-    """Terms and reward of the control step that a block has just made.
+def compute_reward(episode, own, task, now, values):
+    """Terms and reward of a control step.
 
     The terms "cost_function" (N m) and "contact_loss" (%) sum over an episode to the CF and CL of its
     trajectory.
     """
-    steps, weights = episode.control_steps, episode.weights
-    for i in range(count):
-        task[TASK_ROW.TERM + TERM.EFFORT, i] = 0.0
-        task[TASK_ROW.TERM + TERM.RATE, i] = 0.0
-    for a in range(episode.places.size):
-        action = episode.action[begin : begin + count, a]
-        last_action = episode.last_action[begin : begin + count, a]
-        for i in range(count):
-            change = 0.5 * (action[i] - last_action[i])
-            task[TASK_ROW.TERM + TERM.EFFORT, i] += action[i] * action[i]
-            task[TASK_ROW.TERM + TERM.RATE, i] += change * change
-            last_action[i] = action[i]
-    for i in range(count):
-        cost, loss_steps = 0.5 * task[TASK_ROW.COST, i], task[TASK_ROW.LOSS_STEPS, i]
-        stride, nominal_force = block[ROW.STRIDE, i], block[ROW.NOMINAL_FORCE, i]
-        change = task[TASK_ROW.SIGNED_DEVIATION, i] / steps - task[TASK_ROW.MEAN_DEVIATION, i]
-        task[TASK_ROW.MEAN_DEVIATION, i] += episode.mean_share * change
-        mean_deviation = task[TASK_ROW.MEAN_DEVIATION, i] / nominal_force
-        task[TASK_ROW.TERM + TERM.MEAN_FORCE, i] = mean_deviation * mean_deviation
-        task[TASK_ROW.TERM + TERM.COST_FUNCTION, i] = stride * cost
-        task[TASK_ROW.TERM + TERM.CONTACT_LOSS, i] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE, i]
-        task[TASK_ROW.REWARD, i] = -(
-            weights[TERM.COST_FUNCTION] * cost / (nominal_force * steps)
-            + weights[TERM.CONTACT_LOSS] * loss_steps / steps
-            + weights[TERM.EFFORT] * task[TASK_ROW.TERM + TERM.EFFORT, i]
-            + weights[TERM.RATE] * task[TASK_ROW.TERM + TERM.RATE, i]
-            + weights[TERM.MEAN_FORCE] * task[TASK_ROW.TERM + TERM.MEAN_FORCE, i]
-        )
+    per_step, weights, terms = 1.0 / episode.control_steps, episode.weights, rows_from(values, RESULT.TERM)
+    cost, loss_steps = 0.5 * now[NOW.COST], now[NOW.LOSS_STEPS]
+    stride, per_nominal_force = own[ROW.STRIDE], 1.0 / own[ROW.NOMINAL_FORCE]
+    change = now[NOW.SIGNED_DEVIATION] * per_step - task[TASK_ROW.MEAN_DEVIATION]
+    task[TASK_ROW.MEAN_DEVIATION] += episode.mean_share * change
+    mean_deviation = task[TASK_ROW.MEAN_DEVIATION] * per_nominal_force
+    terms[TERM.COST_FUNCTION] = stride * cost
+    terms[TERM.CONTACT_LOSS] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE]
+    terms[TERM.EFFORT] = now[NOW.EFFORT]
+    terms[TERM.RATE] = now[NOW.RATE]
+    terms[TERM.MEAN_FORCE] = mean_deviation * mean_deviation
+    values[RESULT.REWARD] = -(
+        weights[TERM.COST_FUNCTION] * per_step * cost * per_nominal_force
+        + weights[TERM.CONTACT_LOSS] * per_step * loss_steps
+        + weights[TERM.EFFORT] * now[NOW.EFFORT]
+        + weights[TERM.RATE] * now[NOW.RATE]
+        + weights[TERM.MEAN_FORCE] * (mean_deviation * mean_deviation)
+    )
 
 
 @inlined
-def charge_early_end(episode, block, task, i):
-    """A run that ends early pays as if it went on without contact: ending must not be a way out."""
-    left = (task[TASK_ROW.END, i] - block[ROW.STEP, i]) / episode.control_steps
-    task[TASK_ROW.REWARD, i] -= left * (
-        episode.weights[TERM.COST_FUNCTION] + episode.weights[TERM.CONTACT_LOSS]
-    )
+def early_end_charge(episode, own, task):
+    """What a run that ends here pays, as if it went on without contact: ending must not be a way out."""
+    left = (task[TASK_ROW.END] - own[ROW.STEP]) * (1.0 / episode.control_steps)
+    return left * (episode.weights[TERM.COST_FUNCTION] + episode.weights[TERM.CONTACT_LOSS])

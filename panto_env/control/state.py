@@ -8,7 +8,7 @@ from ..backend import constants
 from ..plant.sensors import Reading
 
 MAX_ENTRIES = 32
-"""Entries of an observation at most: a block has room for so many."""
+"""Entries of an observation at most."""
 
 
 class Term(IntEnum):
@@ -26,17 +26,15 @@ TERMS = tuple(term.name.lower() for term in Term)
 
 
 class TaskRow(IntEnum):
-    """Rows of the tables of all lanes, one column per lane, and of a block of lanes in a kernel."""
+    """Rows of the table of all lanes."""
 
-    # Of ``Episode.table``.
     DISTANCE = 0  # that the episode covers (m)
     END = 1  # plant steps that the episode has
-    LOSS_STEPS_IN_A_ROW = 2  # plant steps since contact was lost
-    REWARD = 3  # of the last control step
-    TERM = 4  # of the last control step, one row per term
-    MEAN_DEVIATION = TERM + len(Term)  # running mean of the contact force less the nominal one (N)
-    # Of ``RunningFigures.table``.
-    FILTER_STATE = MEAN_DEVIATION + 1  # of EN 50317's filter, two rows for each of three sections
+    ENDING = 2  # why it ended early, an ``Ending``
+    LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
+    MEAN_DEVIATION = 4  # running mean of the contact force less the nominal one (N)
+    # Running figures.
+    FILTER_STATE = 5  # of EN 50317's filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6
     DEVIATION = FILTER_STATE + 7  # sum of the filtered contact force less the nominal one (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum (N^2)
@@ -46,22 +44,44 @@ class TaskRow(IntEnum):
     ALL_COST = FILTER_STATE + 12  # sum of the cost function's term (N m)
     SQUARED_EFFORT = FILTER_STATE + 13  # sum over both places (N^2)
     SQUARED_CHANGE = FILTER_STATE + 14  # sum of the actuator forces' changes from step to step (N^2)
-    LAST_ACTUATOR_FORCE = FILTER_STATE + 15  # of the last sample (N), one row per place
-    # Rows that only a block has.
-    FORCE_BEFORE = FILTER_STATE + 17  # contact force of the last sample but one (N)
-    COST = FILTER_STATE + 18  # sum of deviations at both ends of each interval (N)
-    LOSS_STEPS = FILTER_STATE + 19  # plant steps without contact in this control step
-    FILTERED_FORCE = FILTER_STATE + 20  # contact force (N)
-    SPANS = FILTER_STATE + 21  # travelled since the start (-)
-    SIGNED_DEVIATION = FILTER_STATE + 22  # sum of the contact force less the nominal one (N)
-    READING = FILTER_STATE + 23  # what the sensors read, one row per ``Reading``
-    ENTRY = READING + len(Reading)  # of the observation
+    ACTION = FILTER_STATE + 15  # the present one, -1..1, one row per entry
 
 
-TASK_ROW, TERM = constants(TaskRow), constants(Term)
-EPISODE_ROWS = int(TaskRow.FILTER_STATE)
-"""Rows of ``Episode.table``."""
-FIGURE_ROWS = int(TaskRow.FORCE_BEFORE) - EPISODE_ROWS
-"""Rows of ``RunningFigures.table``, which in a block lie behind those of the episode."""
-TASK_BLOCK_ROWS = int(TaskRow.ENTRY) + MAX_ENTRIES
-"""Rows of a block."""
+class Now(IntEnum):
+    """Rows of what a kernel keeps of a group of lanes during a control step."""
+
+    COST = 0  # sum of deviations at both ends of each interval (N)
+    LOSS_STEPS = 1  # plant steps without contact
+    SIGNED_DEVIATION = 2  # sum of the contact force less the nominal one (N)
+    EFFORT = 3  # the reward's term
+    RATE = 4  # likewise
+    SPANS = 5  # travelled since the start (-)
+    READING = 6  # what the sensors read, one row per ``Reading``
+
+
+class Result(IntEnum):
+    """Rows of what a control step tells of all lanes beside their observations."""
+
+    REWARD = 0
+    TERM = 1  # of the reward, one row per term
+    CONTACT_FORCE = TERM + len(Term)  # of the last sample (N)
+    HEAD_HEIGHT = CONTACT_FORCE + 1  # m
+    WIRE_HEIGHT = CONTACT_FORCE + 2  # m
+    FRAME_FORCE = CONTACT_FORCE + 3  # of the actuator (N)
+    HEAD_FORCE = CONTACT_FORCE + 4  # of the actuator (N)
+    POSITION = CONTACT_FORCE + 5  # of the pantograph along the line (m)
+
+
+class Flag(IntEnum):
+    """Rows of what it tells that is true or not."""
+
+    TERMINATED = 0  # whether the plant has left its valid range
+    TRUNCATED = 1  # whether the end of the run is reached, within it
+
+
+TASK_ROW, TERM, NOW = constants(TaskRow), constants(Term), constants(Now)
+RESULT, FLAG = constants(Result), constants(Flag)
+NOW_ROWS = int(Now.READING) + len(Reading)
+"""Rows of ``Now``."""
+RESULT_ROWS = int(Result.POSITION) + 1
+"""Rows of ``Result``."""

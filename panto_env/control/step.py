@@ -2,117 +2,191 @@
 
 from __future__ import annotations
 
-from ..backend import inlined, kernel, new_block, new_blocks, open_packed
+from ..backend import (
+    HELPER,
+    LEADER,
+    any_of,
+    choose,
+    columns,
+    columns_across,
+    found_anywhere,
+    hand_out,
+    inlined,
+    kernel,
+    larger,
+    magnitude,
+    new_columns,
+    next_share,
+    number_at,
+    open_packed,
+    put_across,
+    results_of,
+    rows_from,
+    share_done,
+    smaller,
+    width_of,
+)
 from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
-from ..plant.state import BLOCK_ROWS, CONTACTS, PLACE, ROW
-from ..plant.step import lanes_of_one_variant, load, record_blocks, step_blocks, store
+from ..plant.state import CONTACTS, PLACE, ROW, SCRATCH, SCRATCH_ROWS
+from ..plant.step import new_scratch, record_group, step_group
 from ..plant.valid_range import ENDING
-from .observation import observe
-from .reward import add_sample_to_terms, begin_terms, charge_early_end, compute_reward
+from .observation import entry_of, prepare_entries
+from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
-from .state import TASK_BLOCK_ROWS, TASK_ROW
+from .state import FLAG, MAX_ENTRIES, NOW, NOW_ROWS, RESULT, RESULT_ROWS, TASK_ROW
 
 
 @inlined
-def command(episode, blocks, begin, count):
-    """Clip the actions of a block; the forces that they ask for, on the first contact's pantograph."""
-    for c in range(blocks.shape[0]):
-        for place in range(2):
-            for i in range(count):
-                blocks[c, ROW.COMMAND + place, i] = 0.0
+def take_action(line, episode, task, now, scratch, lane):
+    """Clip the actions of a group; the forces that they ask for, and the reward's terms of them."""
+    for c in range(CONTACTS):
+        scratch[0][c * SCRATCH_ROWS + SCRATCH.COMMAND + PLACE.FRAME] = 0.0
+        scratch[0][c * SCRATCH_ROWS + SCRATCH.COMMAND + PLACE.HEAD] = 0.0
+    now[NOW.EFFORT] = 0.0
+    now[NOW.RATE] = 0.0
+    asked = columns_across(line, episode.action, lane)
     for a in range(episode.places.size):
-        row = ROW.COMMAND + PLACE.HEAD if episode.places[a] == PLACE.HEAD else ROW.COMMAND + PLACE.FRAME
-        action = episode.action[begin : begin + count, a]
-        for i in range(count):
-            action[i] = min(max(action[i], -1.0), 1.0)
-            blocks[0, row, i] = action[i] * episode.force_limit
+        action = smaller(larger(asked[a], -1.0), 1.0)
+        change = 0.5 * (action - task[TASK_ROW.ACTION + a])
+        now[NOW.EFFORT] += action * action
+        now[NOW.RATE] += change * change
+        task[TASK_ROW.ACTION + a] = action
+        force = action * episode.force_limit
+        if episode.places[a] == PLACE.FRAME:
+            scratch[0][SCRATCH.COMMAND + PLACE.FRAME] = force
+        else:
+            scratch[0][SCRATCH.COMMAND + PLACE.HEAD] = force
 
 
 @inlined
-def end_episodes(line, wire, episode, block, task, begin, count):
-    """Whether episodes end here, and whether any of them does."""
+def end_episodes(line, wire, episode, own, task, values, flags, lane):
+    """Whether episodes end here; those that end early pay for it."""
+    ending = 0.0 * own[ROW.STEP] + ending_by_wire(line, wire, lane)
+    ending = choose(task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit, ENDING.LOSS, ending)
+    ending = choose(magnitude(own[ROW.STATE]) <= episode.head_range, ending, ENDING.HEAD)  # nor is NaN
+    early, at_end = ending > 0.0, own[ROW.STEP] >= task[TASK_ROW.END]
+    values[RESULT.REWARD] -= choose(early, early_end_charge(episode, own, task), 0.0)
+    task[TASK_ROW.ENDING] = ending
+    put_across(flags, FLAG.TERMINATED, lane, early)
+    put_across(flags, FLAG.TRUNCATED, lane, choose(early, 0.0, choose(at_end, 1.0, 0.0)) > 0.0)
+    return any_of(early) or any_of(at_end)
+
+
+@inlined
+def tell(own, told):
+    """Write what is told of the last sample of a group."""
+    told[RESULT.CONTACT_FORCE] = own[ROW.CONTACT_FORCE]
+    told[RESULT.HEAD_HEIGHT] = own[ROW.HEAD_HEIGHT]
+    told[RESULT.WIRE_HEIGHT] = own[ROW.WIRE_HEIGHT]
+    told[RESULT.FRAME_FORCE] = own[ROW.FRAME_FORCE]
+    told[RESULT.HEAD_FORCE] = own[ROW.HEAD_FORCE]
+    told[RESULT.POSITION] = own[ROW.STEP] * own[ROW.STRIDE]
+
+
+@inlined
+def control_group(packed, scratch, now, entry, entries, values, flags, lane):
+    """Control steps of the group of lanes that begins at ``lane``, none beyond the end of an episode.
+
+    Returns whether an episode has ended. entry: room for one row.
+    """
+    line, wire, pantographs, actuators, run, sensors, samples, episode, running, _ = open_packed(packed)
+    own, task = columns(line, run.table[0], lane), columns(line, episode.table, lane)
+    told = columns_across(line, values, lane)
+    take_action(line, episode, task, now, scratch, lane)
     ended = False
-    terminated = episode.terminated[begin : begin + count]
-    truncated = episode.truncated[begin : begin + count]
-    endings = episode.ending[begin : begin + count]
-    for i in range(count):
-        ending = ending_by_wire(line, wire, begin + i)
-        if task[TASK_ROW.LOSS_STEPS_IN_A_ROW, i] >= episode.loss_limit:
-            ending = ENDING.LOSS
-        if not abs(block[ROW.STATE, i]) <= episode.head_range:  # nor is NaN
-            ending = ENDING.HEAD
-        endings[i] = ending
-        terminated[i] = ending != ENDING.NONE
-        truncated[i] = block[ROW.STEP, i] >= task[TASK_ROW.END, i]
-        if terminated[i]:
-            charge_early_end(episode, block, task, i)
-        ended = ended or terminated[i] or truncated[i]
+    for _ in range(episode.steps[lane]):
+        begin_terms(now)
+        for step in range(1, episode.control_steps + 1):
+            force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+            step_group(line, wire, pantographs, actuators, run, scratch, lane)
+            record_group(line, wire, run, samples, lane)
+            add_sample_to_terms(own, task, now, force)
+            add_sample_to_figures(running, samples, own, task, frame, head, lane)
+            take_readings(sensors, step, own, rows_from(now, NOW.READING), lane)
+        compute_reward(episode, own, task, now, told)
+        add_control_step_to_figures(task, now, told)
+        ended = end_episodes(line, wire, episode, own, task, told, flags, lane)
+        if ended:
+            break
+    prepare_entries(episode, sensors, own, now, lane)
+    for k in range(entries.shape[0]):
+        put_across(entries, k, lane, entry_of(episode, own, task, now, k, entry))
+    tell(own, told)
     return ended
 
 
 @inlined
-def lanes_not_idle(idle, begin, limit):
-    """How many lanes from ``begin`` on, which is one, are not idle, up to a limit."""
-    count = 1
-    while count < limit and not idle[begin + count]:
-        count += 1
-    return count
+def all_idle(episode, lane, count):
+    """Whether all of so many lanes from one on are idle."""
+    idle = True
+    for i in range(count):
+        idle = idle and episode.idle[lane + i]
+    return idle
+
+
+@inlined
+def all_finite(line, action):
+    """Whether all actions, (actions, lanes of whole groups), are finite."""
+    total = 0.0 * columns_across(line, action, 0)[0]  # nan where one is not
+    for lane in range(0, action.shape[1], width_of(line)):
+        asked = columns_across(line, action, lane)
+        for a in range(action.shape[0]):
+            total += 0.0 * asked[a]
+    return not any_of(choose(total == 0.0, 0.0, 1.0) > 0.0)
 
 
 @kernel
-def control_steps(packed, steps, first, last):
+def control_steps(packed, entries, values, flags, first, last, size, role, patience):
     """Control steps of the lanes from ``first`` to before ``last`` under ``episode.action``.
 
-    Of lanes that go abreast none makes a further one once an episode of them has ended.
-    packed: line, wire, pantographs, actuators, run, sensors, samples, episode and running figures.
+    Returns 0 where no episode has ended, 1 where one may have, and -1, having done nothing, where an action
+    is not finite. Results go to entries, values and flags, as of ``Results``. A lane that is idle stays as it
+    is, unless another one of its group is not. size, role, patience: of shares, as of ``LaneThreads``.
+    packed: line, wire, pantographs, actuators, run, sensors, samples, episode, running figures, shares.
     """
-    line, wire, pantographs, actuators, run, sensors, samples, episode, running = open_packed(packed)
-    blocks, task = new_blocks(line, CONTACTS, BLOCK_ROWS), new_block(line, TASK_BLOCK_ROWS)
-    block = blocks[0]
-    begin = first
-    while begin < last:
-        if episode.idle[begin]:
-            for a in range(episode.places.size):
-                episode.action[begin, a] = 0.0
-            begin += 1
-            continue
-        count = lanes_of_one_variant(pantographs, begin, min(blocks.shape[2], last - begin))
-        count = lanes_not_idle(episode.idle, begin, count)
-        for c in range(blocks.shape[0]):
-            load(run.table[c], blocks[c], ROW.STEP, begin, count)
-        load(episode.table, task, 0, begin, count)
-        load(running.table, task[TASK_ROW.FILTER_STATE :], 0, begin, count)
-        command(episode, blocks, begin, count)
-        for _ in range(steps):
-            begin_terms(block, task, count)
-            for step in range(1, episode.control_steps + 1):
-                step_blocks(line, wire, pantographs, actuators, run, blocks, begin, count)
-                record_blocks(line, wire, samples, blocks, begin, count)
-                add_sample_to_terms(block, task, count)
-                add_sample_to_figures(running, samples, block, task, begin, count)
-                take_readings(sensors, step, block, task[TASK_ROW.READING :], begin, count)
-            compute_reward(episode, block, task, begin, count)
-            add_control_step_to_figures(task, count)
-            if end_episodes(line, wire, episode, block, task, begin, count):
-                break
-        store(task[TASK_ROW.FILTER_STATE :], running.table, begin, count)
-        observe(episode, sensors, block, task, begin, count)
-        for c in range(blocks.shape[0]):
-            store(blocks[c], run.table[c], begin, count)
-        store(task, episode.table, begin, count)
-        begin += count
+    line, _, _, _, _, _, _, episode, _, shares = open_packed(packed)
+    scratch, now, entry = new_scratch(line), new_columns(line, NOW_ROWS), new_columns(line, 1)
+    if role != HELPER and not all_finite(line, episode.action):
+        return -1
+    if role == LEADER:
+        hand_out(shares, first, last, size, entries, values, flags)
+    taken, ended = 0, False
+    while True:
+        begin, end = next_share(shares, role, taken, patience, first, last, size)
+        if begin < 0:
+            break
+        taken += 1
+        entries, values, flags = results_of(shares, role, entries, values, flags)
+        for lane in range(begin, end, width_of(line)):
+            if not all_idle(episode, lane, width_of(line)):
+                here = control_group(packed, scratch, now, entry, entries, values, flags, lane)
+                ended = ended or here
+        share_done(shares, role, ended)
+    return 1 if found_anywhere(shares, role, ended) else 0
 
 
 @kernel
-def observe_start(packed, first, last):
-    """Observations of the lanes from ``first`` to before ``last`` at their start; packed: as above."""
-    line, _, pantographs, _, run, sensors, _, episode, _ = open_packed(packed)
-    block, task = new_block(line, BLOCK_ROWS), new_block(line, TASK_BLOCK_ROWS)
-    begin = first
-    while begin < last:
-        count = lanes_of_one_variant(pantographs, begin, min(block.shape[1], last - begin))
-        load(run.table[0], block, 0, begin, count)
-        take_first_readings(sensors, block, task[TASK_ROW.READING :], begin, count)
-        observe(episode, sensors, block, task, begin, count)
-        begin += count
+def observe_start(packed, entries, values, flags, first, last):
+    """Results of the lanes from ``first`` to before ``last`` at their start, but of idle ones; as above."""
+    line, _, _, _, run, sensors, _, episode, _, _ = open_packed(packed)
+    now, seen = new_columns(line, NOW_ROWS), new_columns(line, MAX_ENTRIES)
+    told, entry = new_columns(line, RESULT_ROWS), new_columns(line, 1)
+    width = width_of(line)
+    for lane in range(first - first % width, last, width):
+        own, task = columns(line, run.table[0], lane), columns(line, episode.table, lane)
+        take_first_readings(sensors, own, rows_from(now, NOW.READING), lane)
+        prepare_entries(episode, sensors, own, now, lane)
+        for k in range(entries.shape[0]):
+            seen[k] = entry_of(episode, own, task, now, k, entry)
+        for k in range(RESULT_ROWS):
+            told[k] = 0.0
+        tell(own, told)
+        for i in range(width):
+            if not episode.idle[lane + i]:
+                for k in range(RESULT_ROWS):
+                    values[k, lane + i] = number_at(told, k, i)
+                for k in range(entries.shape[0]):
+                    entries[k, lane + i] = number_at(seen, k, i)
+                for k in range(flags.shape[0]):
+                    flags[k, lane + i] = False

@@ -8,34 +8,42 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import bind, copy_whole, lane_table, lane_threads, pack
+from ..backend import (
+    ALONE,
+    Lanes,
+    LaneThreads,
+    bind,
+    copy_whole,
+    new_shares,
+    of_lanes,
+    pack,
+    set_lanes,
+)
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
-from ..plant.line_condition import draw
-from ..plant.pantograph.build import with_scatter
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
-from ..plant.state import Row
-from ..plant.valid_range import HEAD_RANGE, LOSS_TIME, Ending
+from ..plant.state import SAMPLE_ROWS, Row
+from ..plant.valid_range import Ending
 from .context import Context
-from .episode import Episode, Flags
+from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
 from .observation import layout
 from .record import ending, refuse_divergence, trajectory
-from .reward import MEAN_TIME
-from .running_figures import running_figures
+from .running_figures import figures_so_far, no_figures, running_figures
 from .settings import RunSettings, speed_range
-from .state import EPISODE_ROWS, TaskRow
+from .start import LaneGenerators, draw_starts
+from .state import Result, TaskRow
 from .step import control_steps, observe_start
 
 COASTED = 100
 """Control steps without a policy that are made at once."""
-BOUND_ANEW = ("reward_and_terms", "_action", "_threads", "_control_steps", "_observe_start")
+BOUND_ANEW = ("_action", "_threads", "_plain_step", "_observe_start")
 """Attributes that ``Task._bind`` makes of the others."""
 
 
@@ -89,16 +97,17 @@ class Task:
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
-        self.episode = self._episode()
-        self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes)
+        abreast = plant.lanes_abreast
+        self.episode = new_episode(settings, plant, self.layout, self.control_steps)
+        self.results = self.new_results()
+        self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes, abreast)
         rms = settings.sensors.noise_rms
         self._noise = None if rms is None else Noise(rms, lanes)
-        self._steps_of_run_in = np.zeros(lanes, dtype=np.int64)  # control steps still to be made
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         slow = self.speed_range[0]
         longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
-        rows = self._steps(slow, longest) + 1 if keep_samples else 1
+        rows = int(self._steps(slow, longest)) + 1 if keep_samples else 1
         supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
         self.memory = record_size(lanes, rows - 1, supports, droppers)
         check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
@@ -113,13 +122,14 @@ class Task:
         return self.sensors, self.samples, self.episode, self.running
 
     def _bind(self) -> None:
-        """Look at the arrays by name, and bind the kernels to them."""
-        self.reward_and_terms = self.episode.table[TaskRow.REWARD : TaskRow.MEAN_DEVIATION, : self.lanes]
-        self._action = self.episode.action
-        self._threads = lane_threads(self.lanes, self.plant.lanes_abreast)
-        packed = pack(*self.plant.arrays, *self._arrays)
-        self._control_steps = bind(control_steps, packed, 1, 0, 1)
-        self._observe_start = bind(observe_start, packed, 0, 1)
+        """Bind the kernels to the arrays."""
+        self._action = self.episode.action[:, : self.lanes].T
+        packed = pack(*self.plant.arrays, *self._arrays, new_shares())
+        run = bind(control_steps, packed, *self.results[1:], 0, self.lanes, self.lanes, ALONE, 0)
+        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast)
+        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results[1:]
+        self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
+        self._observe_start = bind(observe_start, packed, *self.results[1:], 0, self.lanes)
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what a copy has to bind anew, since its arrays lie elsewhere."""
@@ -130,30 +140,9 @@ class Task:
         copy_whole(*self._arrays)
         self._bind()
 
-    def _episode(self) -> Episode:
-        lanes, actions, time_step = self.lanes, len(self.actuator.places), self.plant.time_step
-        return Episode(
-            action=np.zeros((lanes, actions)),
-            last_action=np.zeros((lanes, actions)),
-            places=np.array(self.actuator.places, dtype=np.int64),
-            force_limit=self.actuator.force_limit,
-            table=lane_table(EPISODE_ROWS, lanes),
-            weights=self.settings.reward.weights,
-            idle=np.zeros(lanes, dtype=np.bool_),
-            terminated=np.zeros(lanes, dtype=np.bool_),
-            ending=np.zeros(lanes, dtype=np.int64),
-            truncated=np.zeros(lanes, dtype=np.bool_),
-            observation=np.zeros((lanes, len(self.layout.entries)), dtype=np.float32),
-            writers=self.layout.writers,
-            centre=self.layout.centre,
-            per_unit=1 / self.layout.scale,
-            spans_per_metre=1.0 / float(self.plant.catenary.span_length),
-            time_step=time_step,
-            control_steps=self.control_steps,
-            mean_share=1 - math.exp(-self.control_interval / MEAN_TIME),
-            loss_limit=round(LOSS_TIME / time_step),
-            head_range=HEAD_RANGE,
-        )
+    def new_results(self) -> Results:
+        """Room for the results of a step."""
+        return new_results(self.lanes, self.episode.action.shape[1], len(self.layout.entries))
 
     def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
         """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
@@ -162,151 +151,201 @@ class Task:
             self.plant.check_speed(speed)
         return low, high
 
-    def _steps(self, speed: float, run_in: int = 0) -> int:
+    def _steps(self, speed: Any, run_in: Any = 0) -> Any:
         """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
 
-        run_in: control steps before the episode begins.
+        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins.
         """
         stride = speed * self.control_interval
-        wanted = run_in + math.ceil(self.distance / stride - 1e-9)
+        wanted = run_in + np.ceil(self.distance / stride - 1e-9)
         possible = self.plant.model.length / stride + 1e-9
-        return max(1, math.floor(min(wanted, possible))) * self.control_steps
+        return np.maximum(1, np.floor(np.minimum(wanted, possible))) * self.control_steps
 
     @property
     def most_control_steps(self) -> int:
         """Control steps of an episode at the lowest speed: the longest that there are."""
-        return self._steps(self.speed_range[0]) // self.control_steps
+        return int(self._steps(self.speed_range[0])) // self.control_steps
 
-    def reset(self, lane: int, random: np.random.Generator) -> None:
-        """Start an episode in one lane: draw its speed, its line, its pantograph and how far it runs in.
+    def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
+        """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.
 
-        Lanes that run in are at the beginning of their episodes only after ``run_in``.
+        random: the generator of all lanes, or of each, from which its speed, its line, its pantograph and how
+        far it runs in are drawn; it is not asked for where nothing is. Results go to ``results``, by default
+        the task's own. Raises InputError where a run leaves the plant's valid range before its episode.
         """
-        low, high = self.speed_range
-        speed = low if low == high else float(random.uniform(low, high))
-        plant, episode, scatter = self.plant, self.episode, self.settings.pantograph_scatter
-        line = draw(self.settings.line_condition, random, len(plant.model.droppers))
-        own = with_scatter(plant.pantograph, scatter, random) if scatter else None
-        plant.start(lane, speed, line, own, self._static_force(speed))
-        run_in = 0
-        if self.settings.run_in > 0:
-            way = random.uniform(0, self.settings.run_in) * plant.catenary.span_length
-            run_in = round(way / (speed * self.control_interval))
-        self.speed[lane] = speed
-        end = self._steps(speed, run_in)
-        self._steps_of_run_in[lane] = min(run_in, end // self.control_steps - 1)
-        column = episode.table[:, lane]
-        column[:] = 0.0
-        column[TaskRow.END] = end
-        column[TaskRow.DISTANCE] = end * plant.stride[lane]
-        episode.action[lane] = episode.last_action[lane] = 0.0
-        episode.terminated[lane] = episode.truncated[lane] = False
-        episode.ending[lane] = Ending.NONE
-        plant.clear(self.samples, lane)
-        sample = plant.sample[:, lane]
-        self.sensors.reset(lane, sample)
+        lanes, results, plant = np.atleast_1d(lanes), results or self.results, self.plant
+        of_lane = random if callable(random) else lambda _: random
+        drawn = draw_starts(self.settings, self.speed_range, len(plant.model.droppers), lanes, of_lane)
+        plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, self._static_forces(drawn.speed))
+        run_in = np.round(drawn.way / (drawn.speed * self.control_interval))
+        end = self._steps(drawn.speed, run_in)
+        run_in = np.minimum(run_in, end // self.control_steps - 1).astype(np.int64)
+        self.speed[lanes] = drawn.speed
+        self._begin(lanes, end)
+        plant.clear(self.samples, lanes)
+        samples = of_lanes(plant.run.table[0], lanes)[:, :SAMPLE_ROWS]
+        self.sensors.reset(lanes, samples)
         if self.keep_samples:
-            self.samples.rows[lane, 0, 0] = sample
-        self.running.clear(lane)
+            self.samples.rows[lanes, 0, 0] = samples
         if self._noise is not None:
-            self._noise.start(self.sensors, lane, random)
-        self._observe_start(lane, lane + 1)
+            for lane in lanes.tolist():
+                self._noise.start(self.sensors, lane, of_lane(lane))
+        idle = self.episode.idle
+        idle[:] = True
+        idle[lanes] = False
+        self._observe_start(*results[1:], int(lanes.min()), int(lanes.max()) + 1)
+        idle[: self.lanes] = False
+        if run_in.any():
+            self._run_in(lanes[run_in > 0], run_in[run_in > 0], results)
 
-    def run_in(self) -> None:
-        """Run lanes just reset without control as far as drawn; the figures of their episodes begin there.
+    def _begin(self, lanes: Any, end: Array) -> None:
+        """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
+        run, table = self.plant.run.table[0], self.episode.table
+        start = of_lanes(run, lanes)
+        rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
+        rows[:, TaskRow.END] = end
+        rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+        set_lanes(table, lanes, rows)
+        self.running.peak[lanes] = -np.inf
 
-        Raises InputError where a run leaves the plant's valid range before its episode has begun.
-        """
-        steps, done = self._steps_of_run_in, 0
-        begun = np.flatnonzero(steps).tolist()
-        for until in np.unique(steps[begun]).tolist():
-            self._coast(until - done, skip=steps < until)
-            done = until
-        steps[:] = 0
-        for lane in begun:
-            if self.episode.terminated[lane]:
-                raise InputError(self.ending(lane))
-            column, end = self.episode.table[:, lane], self.end(lane)
-            column[:] = 0.0
-            column[TaskRow.END] = end
-            column[TaskRow.DISTANCE] = (end - self.plant.steps_done[lane]) * self.plant.stride[lane]
-            self.running.clear(lane)
+    def _run_in(self, lanes: Any, steps: Any, results: Results) -> None:
+        """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
+        left = np.zeros(self.lanes, dtype=np.int64)
+        left[lanes] = steps
+        self._coast(left, results)
+        for lane in lanes[self._ending(lanes) != Ending.NONE].tolist():
+            raise InputError(self.ending(lane))
+        self._begin(lanes, of_lanes(self.episode.table, lanes)[:, TaskRow.END])
+        results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
 
-    def _static_force(self, speed: float) -> float | None:
-        """Static force (N) at a speed (m/s) where a mean force is to be met, else None."""
-        if target_mean(self.settings, speed) is None:
+    def _static_forces(self, speeds: Array) -> Array | None:
+        """Static forces (N) at speeds (m/s) where a mean force is to be met, else None."""
+        if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
             self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
-        return self.trim.static_force(speed)
+        return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
+
+    def _ending(self, lanes: Any) -> Array:
+        """Each lane's ``Ending``, (n,)."""
+        return of_lanes(self.episode.table, lanes)[:, TaskRow.ENDING]
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
-        return int(self.episode.table[TaskRow.END, lane])
+        return int(of_lanes(self.episode.table, lane)[TaskRow.END])
 
     def context(self, lane: int) -> Context:
         """What a policy may know of a lane's episode."""
         return Context(
             layout=self.layout,
-            actions=self.episode.action.shape[1],
+            actions=len(self.actuator.places),
             channels=tuple(int(place) for place in self.actuator.places),
             force_limit=self.actuator.force_limit,
             control_interval=self.control_interval,
             speed=float(self.speed[lane]),
             span_length=self.plant.catenary.span_length,
-            nominal_force=float(self.plant.nominal_force[lane]),
+            nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),
             catenary=self.plant.catenary,
             pantograph=self.plant.pantograph,
         )
 
-    def step(self, action: Array, skip: Flags | None = None, steps: int = 1) -> None:
+    def step(
+        self,
+        action: Array,
+        skip: Flags | None = None,
+        results: Results | None = None,
+        *,
+        keep: bool = True,
+    ) -> bool:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
-        steps: more than one, as far as episodes go, where nobody looks at the observations between and no
-        noise is drawn for them.
-
-        Actions are clipped to -1..1. A lane just reset may be skipped: it stays as it is.
-        Results are in ``episode`` (observation, terminated, truncated) and ``reward_and_terms``.
+        Returns whether an episode may have ended: False where none has. Actions are clipped to -1..1.
+        Results go to ``results``, by default the task's own. Lanes that are skipped stay as they are; without
+        ``keep``, they may be left anyhow, to be reset next. Raises InputError, and changes nothing, for an
+        action that is not finite.
         """
         self._action[...] = action
-        if skip is not None:
-            self.episode.idle[:] = skip
         if self._noise is not None:
             self._noise.prepare(self.sensors, skip)
-        if self._threads is None:
-            self._control_steps(steps, 0, self.lanes)
-        else:
-            self._threads.run(partial(self._control_steps, steps))
-        if skip is not None:
-            self.episode.idle[:] = False
+        if skip is None and results is None:
+            return self._told(self._plain_step())  # the usual step, as short as it can be
+        results = results or self.results
+        if skip is None:
+            return self._told(self._threads.step(*results[1:]))
+        idle, lanes = self.episode.idle[: self.lanes], np.flatnonzero(skip)
+        idle[:] = skip
+        tables = self._tables if keep and self.plant.lanes_abreast > 1 else []
+        kept, told = [of_lanes(table, lanes) for table in tables], [each[:, lanes] for each in results[1:]]
+        answer = self._threads.step(*results[1:])
+        for table, values in zip(tables, kept, strict=True):
+            set_lanes(table, lanes, values)
+        if tables:
+            for each, before in zip(results[1:], told, strict=True):
+                each[:, lanes] = before
+        idle[:] = False
+        return self._told(answer)
+
+    def _told(self, answer: int) -> bool:
+        """What a kernel has answered: whether an episode may have ended; InputError for a wrong action."""
+        if answer < 0:
+            wrong = self._action[~np.isfinite(self._action).all(axis=1)][0]
+            raise InputError(f"The action must be finite, not {wrong}; check the policy.")
+        return answer > 0
+
+    @property
+    def _tables(self) -> list[Array]:
+        """All that a step changes of lanes that go in groups."""
+        plant = self.plant
+        return [*plant.run.table, *plant.actuators.table, self.sensors.table, self.episode.table]
 
     def run_passively(self) -> None:
         """Run all lanes, just reset, to their ends without actuators."""
-        ended = np.zeros(self.lanes, dtype=np.bool_)
+        ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
         while not ended.all():
-            self._coast(COASTED if self._noise is None else 1, skip=ended)
-            ended |= self.episode.terminated | self.episode.truncated
+            self._coast(np.where(ended, 0, at_once), self.results)
+            ended = self.results.terminated | self.results.truncated
 
-    def _coast(self, steps: int, skip: Flags) -> None:
-        """So many control steps without control of lanes whose episodes don't end before the last of them.
+    @property
+    def _one_by_one(self) -> bool:
+        """Whether each lane can make control steps of its own, as many as its episode has at most."""
+        return self.plant.lanes_abreast == 1
 
-        Without noise they may end before.
+    def _coast(self, steps: Any, results: Results) -> None:
+        """Control steps without control, (lanes,) of them in each lane, whose episode must not end before.
+
+        Where lanes go one by one a call makes all, none beyond an episode's end, and noise is drawn for the
+        observation behind the last alone.
         """
-        idle, at_once = np.zeros_like(self._action), steps if self._noise is None else 1
-        for _ in range(0, steps, at_once):
-            self.step(idle, skip=skip, steps=at_once)
+        action = np.zeros_like(self._action)
+        if not self._one_by_one:
+            for done in range(int(steps.max())):
+                self.step(action, steps <= done, results)
+            return
+        own = self.episode.steps[: self.lanes]
+        own[:] = steps
+        self.step(action, steps == 0, results)
+        own[:] = 1
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's control steps so far, the same as its trajectory's summary.
 
         Raises InputError where the computation diverged.
         """
-        plant = self.plant
-        nominal_force, stride = float(plant.nominal_force[lane]), float(plant.stride[lane])
-        steps, supports = float(plant.steps_done[lane]), plant.model.supports
-        figures = self.running.figures(lane, nominal_force, stride, plant.time_step, supports, steps)
-        deviation = figures.cost_function / figures.distance if figures.distance > 0 else 0.0
-        refuse_divergence(self, lane, deviation, plant.sample[Row.WIRE_HEIGHT, lane])
+        values = self.figures_of(np.array([lane]))
+        return Figures(**{name: float(value[0]) for name, value in values.items()})
+
+    def figures_of(self, lanes: Any) -> dict[str, Array]:
+        """The same of several lanes, (n,), by name.
+
+        Raises InputError where the computation diverged.
+        """
+        run, supports = of_lanes(self.plant.run.table[0], lanes), self.plant.model.supports
+        figures = figures_so_far(
+            of_lanes(self.episode.table, lanes), self.running.peak[lanes], run, supports, self.plant.time_step
+        )
+        distance = figures["distance"]
+        deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
+        refuse_divergence(self, lanes, deviation, run[:, Row.WIRE_HEIGHT])
         return figures
 
     def target_mean(self, lane: int) -> float:

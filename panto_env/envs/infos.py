@@ -9,14 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Array
 from ..control import Task
+from ..control.episode import Flags
+from ..control.state import Result
 from ..metrics.figures import Figures
-from ..plant.state import Row
-from .lanes import Answer, answer_of
+from .lanes import Answer
 
-# Rows of a sample as plain integers: members of an enum would take longer.
-CONTACT_FORCE, HEAD, WIRE = int(Row.CONTACT_FORCE), int(Row.HEAD_HEIGHT), int(Row.WIRE_HEIGHT)
-FRAME_FORCE, HEAD_FORCE = int(Row.FRAME_FORCE), int(Row.HEAD_FORCE)
+# Rows of results as plain integers: members of an enum would take longer.
+REWARD, TERM = int(Result.REWARD), int(Result.TERM)
+CONTACT_FORCE, HEAD, WIRE = int(Result.CONTACT_FORCE), int(Result.HEAD_HEIGHT), int(Result.WIRE_HEIGHT)
+FRAME_FORCE, HEAD_FORCE = int(Result.FRAME_FORCE), int(Result.HEAD_FORCE)
+POSITION = int(Result.POSITION)
 
 FIGURES_TO_COME = {field.name: math.inf for field in fields(Figures)}
 """Figures of an episode that has not ended. Recorders want the same keys in every info, and nan would not do:
@@ -33,20 +37,21 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
 
     Each key holds an array with a value per lane, or a dictionary of such; "_key" marks who has it.
     """
-    _, rewards, sample, position, speed_kmh, _, _, lanes = answer
-    _, cost_function, contact_loss, effort, rate, mean_force = rewards
+    (count, _, values, _), speed_kmh, lanes = answer
+    rows = values[:, :count]
+    cost_function, contact_loss, effort, rate, mean_force = rows[TERM:CONTACT_FORCE]
     return {
-        "contact_force": sample[CONTACT_FORCE],
+        "contact_force": rows[CONTACT_FORCE],
         "_contact_force": lanes,
-        "head": sample[HEAD],
+        "head": rows[HEAD],
         "_head": lanes,
-        "wire": sample[WIRE],
+        "wire": rows[WIRE],
         "_wire": lanes,
-        "frame_force": sample[FRAME_FORCE],
+        "frame_force": rows[FRAME_FORCE],
         "_frame_force": lanes,
-        "head_force": sample[HEAD_FORCE],
+        "head_force": rows[HEAD_FORCE],
         "_head_force": lanes,
-        "position": position,
+        "position": rows[POSITION],
         "_position": lanes,
         "speed_kmh": speed_kmh,
         "_speed_kmh": lanes,
@@ -66,17 +71,12 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     }
 
 
-def lane_figures(figures: Mapping[int, Figures], lanes: int) -> dict[str, Any]:
-    """Figures of the lanes whose episodes have ended, by lane, as they stand in infos."""
-    mask = np.zeros(lanes, dtype=np.bool_)
-    mask[list(figures)] = True
+def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
+    """Figures, (lanes,), by name, of the lanes whose episodes have ended, as they stand in infos."""
     values: dict[str, Any] = {}
-    for name in FIGURES_TO_COME:
-        values[name], values[f"_{name}"] = np.zeros(lanes), mask
-    for lane, its in figures.items():
-        for name, value in told(its).items():
-            values[name][lane] = value
-    return {"figures": values, "_figures": mask}
+    for name, value in figures.items():
+        values[name], values[f"_{name}"] = np.where(np.isnan(value), np.inf, value), lanes.copy()
+    return {"figures": values, "_figures": lanes.copy()}
 
 
 def first_info(task: Task) -> dict[str, Any]:
@@ -86,6 +86,5 @@ def first_info(task: Task) -> dict[str, Any]:
         plain = {key: value for key, value in infos.items() if not key.startswith("_")}
         return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
 
-    return of_lane(lane_infos(answer_of(task, np.ones(1, dtype=np.bool_)))) | {
-        "figures": FIGURES_TO_COME.copy()
-    }
+    answer = Answer(task.results, 3.6 * task.speed, np.ones(1, dtype=np.bool_))
+    return of_lane(lane_infos(answer)) | {"figures": FIGURES_TO_COME.copy()}

@@ -2,39 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..control import Task
-from ..control.episode import Flags
-from ..metrics.figures import Figures
+from ..control.episode import Flags, Results
+from ..control.start import LaneGenerators
 
 
 class Answer(NamedTuple):
-    """What lanes have come to, in arrays of its own."""
+    """What lanes have come to."""
 
-    observation: NDArray[np.float32]  # (lanes, entries)
-    rewards: Array  # (1 + terms, lanes): the reward, and its terms, of the last control step
-    sample: Array  # (SAMPLE_ROWS, lanes): of the last time step
-    position: Array  # (lanes,): m
+    results: Results
     speed_kmh: Array  # (lanes,): km/h
-    terminated: Flags  # (lanes,)
-    truncated: Flags  # (lanes,)
     lanes: Flags  # (lanes,): which of them it is of; it has zeros for the others
 
     def of(self, lanes: Flags) -> Answer:
-        """What is of these lanes."""
-        return self._replace(
-            rewards=np.where(lanes, self.rewards, 0.0),
-            sample=np.where(lanes, self.sample, 0.0),
-            position=np.where(lanes, self.position, 0.0),
-            speed_kmh=np.where(lanes, self.speed_kmh, 0.0),
-            lanes=lanes.copy(),
-        )
+        """What is of these lanes, in arrays of its own."""
+        values = self.results.values.copy()
+        values[:, : len(lanes)][:, ~lanes] = 0.0
+        speed_kmh = np.where(lanes, self.speed_kmh, 0.0)
+        return Answer(self.results._replace(values=values), speed_kmh, lanes.copy())
 
 
 class Lanes:
@@ -43,61 +34,74 @@ class Lanes:
     def __init__(self, usual: Task) -> None:
         """usual: the task of episodes without options, of all lanes."""
         self.usual = usual
-        self._all = np.ones(usual.lanes, dtype=np.bool_)
+        self._results = usual.results  # of the last step, in arrays that nobody writes to once answered
         self._others: list[tuple[Task, Flags]] = []  # tasks of episodes with options, and whose they are
+        self._speed_kmh = np.zeros(usual.lanes)
 
-    def begin(self, lanes: Flags, task: Task, random: Mapping[int, np.random.Generator]) -> None:
+    def begin(self, lanes: Flags, task: Task, random: LaneGenerators) -> None:
         """Begin episodes of a task, the usual one or another of as many lanes, in the lanes marked."""
+        self._results = self._results.copy()
+        self._begin(lanes, task, random)
+
+    def step(self, action: Array, waiting: Flags | None, random: LaneGenerators) -> bool:
+        """One control step of all lanes under actions, (lanes, actions), but those waiting to begin anew.
+
+        Returns whether an episode may have ended: False where none has. Raises InputError, and changes
+        nothing, for an action that is not finite.
+        """
+        results, ended = self.usual.new_results(), False
+        for task, its in self._tasks():
+            idle = waiting
+            if self._others:
+                idle = ~its if waiting is None else ~its | waiting
+            own = results if task is self.usual else task.results
+            ended = task.step(action, idle, results=own, keep=False) or ended
+            self._results = results
+            self._take(own, its)
+        if waiting is not None:
+            self._begin(waiting, self.usual, random)
+        return ended
+
+    def _begin(self, lanes: Flags, task: Task, random: LaneGenerators) -> None:
         for _, its in self._others:
             its[lanes] = False
         self._others = [(other, its) for other, its in self._others if its.any()]
+        own = self._results
         if task is not self.usual:
             self._others.append((task, lanes.copy()))
-        for lane in np.flatnonzero(lanes).tolist():
-            task.reset(lane, random[lane])
-        task.run_in()
+            own = task.results
+        task.reset(np.flatnonzero(lanes), random, own)
+        self._take(own, lanes)
+        self._speed_kmh[lanes] = 3.6 * task.speed[lanes]
 
-    def step(self, action: Array, waiting: Flags | None) -> None:
-        """One control step of all lanes, but those that wait, under actions, (lanes, actions)."""
-        if not self._others:
-            self.usual.step(action, skip=waiting)
-            return
-        for task, its in self._tasks():
-            task.step(action, skip=~its if waiting is None else ~its | waiting)
+    def _take(self, results: Results, lanes: Flags) -> None:
+        """Take over the results of some lanes."""
+        if results is not self._results:
+            own = np.flatnonzero(lanes)
+            for taken, given in zip(self._results[1:], results[1:], strict=True):
+                taken[:, own] = given[:, own]
 
     def answer(self) -> Answer:
         """What all lanes have come to."""
-        whole = answer_of(self.usual, self._all.copy())
-        for task, its in self._others:
-            answer = answer_of(task, its)
-            whole.observation[its] = answer.observation[its]
-            for all_lanes, its_own in zip(whole[1:-1], answer[1:-1], strict=True):
-                all_lanes[..., its] = its_own[..., its]
-        return whole
+        return Answer(self._results, self._speed_kmh.copy(), np.ones(self.usual.lanes, dtype=np.bool_))
 
-    def figures(self, lane: int) -> Figures:
-        """Figures of a lane's episode. Raises InputError where its computation diverged."""
-        return next(task for task, its in self._tasks() if its[lane]).figures(lane)
+    def figures(self, lanes: Flags) -> dict[str, Array]:
+        """Figures of the episodes of lanes, by name, (lanes,), zero for the others.
+
+        Raises InputError where a computation diverged.
+        """
+        values: dict[str, Array] = {}
+        for task, its in self._tasks():
+            own = np.flatnonzero(its & lanes)
+            for name, value in task.figures_of(own).items() if len(own) else ():
+                values.setdefault(name, np.zeros(len(lanes)))[own] = value
+        return values
 
     def _tasks(self) -> Iterator[tuple[Task, Flags]]:
-        usual = self._all.copy()
-        for task, its in self._others:
+        """The usual one first: of a group of lanes it may write those of others, too."""
+        usual = np.ones(self.usual.lanes, dtype=np.bool_)
+        for _, its in self._others:
             usual &= ~its
-            yield task, its
         if usual.any():
             yield self.usual, usual
-
-
-def answer_of(task: Task, lanes: Flags) -> Answer:
-    """What these lanes, all of those of one task, have come to."""
-    episode, plant = task.episode, task.plant
-    return Answer(
-        episode.observation.copy(),
-        task.reward_and_terms.copy(),
-        plant.sample.copy(),
-        plant.steps_done * plant.stride,
-        3.6 * task.speed,
-        episode.terminated.copy(),
-        episode.truncated > episode.terminated,
-        lanes,
-    )
+        yield from self._others

@@ -21,7 +21,7 @@ from ..control.episode import Flags
 from ..control.observation import BOUND
 from ..control.settings import read_settings
 from .episodes import task_with_options, with_longest_episode
-from .infos import lane_figures, lane_infos
+from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer, Lanes
 from .settings import VectorSettings
 from .single import checked
@@ -59,19 +59,20 @@ class PantographVectorEnv(
         self.num_envs = settings.num_envs
         self.render_mode = None
         self.task = Task(settings, lanes=self.num_envs, keep_samples=False)
-        episode = self.task.episode
         self.single_observation_space = gymnasium.spaces.Box(
-            -BOUND, BOUND, episode.observation[0].shape, np.float32
+            -BOUND, BOUND, self.task.results.observation[0].shape, np.float32
         )
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, episode.action[0].shape, np.float32)
+        self.single_action_space = gymnasium.spaces.Box(
+            -1.0, 1.0, (len(self.task.actuator.places),), np.float32
+        )
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._shape = episode.action.shape
+        self._shape = (self.num_envs, *self.single_action_space.shape)
         self._spec: EnvSpec | None = None
         self._limit = settings.max_episode_steps
         self._lanes = Lanes(self.task)
-        self._random: dict[int, np.random.Generator] = {}  # by lane, and what it was seeded with
-        self._seeds: dict[int, int] = {}
+        self._random: dict[int, np.random.Generator] = {}  # by lane, made when first asked for
+        self._seeds: dict[int, int | None] = {}  # what each is, or will be, seeded with; None: anything
         self._running = False
         self._steps = np.zeros(self.num_envs, dtype=np.int64)  # of each lane's episode so far
         self._ended: Flags = np.zeros(self.num_envs, dtype=np.bool_)
@@ -89,14 +90,16 @@ class PantographVectorEnv(
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """Each lane's generator."""
-        self._seed(self._all, None)
-        return tuple(self._random[lane] for lane in range(self.num_envs))
+        return tuple(self._generator(lane) for lane in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """What each lane's generator was seeded with."""
-        self._seed(self._all, None)
-        return tuple(self._seeds[lane] for lane in range(self.num_envs))
+        seeds = []
+        for lane in range(self.num_envs):
+            self._generator(lane)
+            seeds.append(self._seeds[lane])
+        return tuple(seeds)  # type: ignore[arg-type]
 
     def reset(
         self,
@@ -117,7 +120,7 @@ class PantographVectorEnv(
         self._begin(lanes, task)
         self._running = True
         answer = self._lanes.answer()
-        return answer.observation, lane_infos(answer if mask is None else answer.of(mask))
+        return answer.results.observation, lane_infos(answer if mask is None else answer.of(mask))
 
     def step(
         self, actions: NDArray[np.float32]
@@ -136,34 +139,36 @@ class PantographVectorEnv(
             )
         waiting = None  # in "NextStep": lanes that begin anew instead of stepping
         if self._any_ended:
-            waiting = self._ended.copy()
-            self._begin(waiting, self.task)
-        self._lanes.step(force, waiting)
+            waiting = self._ended
+        ended = self._lanes.step(force, waiting, self._generator)
         answer = self._lanes.answer()
-        observation, terminated, truncated = answer.observation, answer.terminated, answer.truncated
+        results = answer.results
+        terminated, truncated = results.terminated, results.truncated
         if self._limit is not None:
-            self._steps += 1 if waiting is None else ~waiting
+            self._steps += 1
+            self._steps[self._ended] = 0
             truncated |= self._steps >= self._limit
-        self._ended = terminated | truncated
-        self._any_ended = bool(np.count_nonzero(self._ended))  # sooner than ``any``
-        if not self._any_ended:
-            infos = lane_infos(answer)
-        elif self.autoreset_mode == AutoresetMode.SAME_STEP:
+        if ended or self._any_ended or self._limit is not None:
+            self._ended = terminated | truncated
+            self._any_ended = bool(self._ended.any())
+        observation, reward = results.observation, results.values[REWARD, : self.num_envs]
+        if self._any_ended and self.autoreset_mode == AutoresetMode.SAME_STEP:
             observation, infos = self._begin_at_once(answer)
         else:
-            infos = lane_infos(answer) | self._figures()
-        return observation, answer.rewards[0], terminated, truncated, infos
+            infos = lane_infos(answer)
+            if self._any_ended:
+                infos |= self._figures()
+        return observation, reward, terminated, truncated, infos
 
     def _figures(self) -> dict[str, Any]:
-        ended = np.flatnonzero(self._ended).tolist()
-        return lane_figures({lane: self._lanes.figures(lane) for lane in ended}, self.num_envs)
+        return lane_figures(self._lanes.figures(self._ended), self._ended)
 
     def _begin_at_once(self, answer: Answer) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin anew where episodes have ended; what they ended with goes to the infos."""
+        """Begin anew where episodes have ended: observation, and infos with what they ended with."""
         ended = self._ended.copy()
         final_observation = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended).tolist():
-            final_observation[lane] = answer.observation[lane]
+            final_observation[lane] = answer.results.observation[lane].copy()
         final = {
             "final_obs": final_observation,
             "_final_obs": ended,
@@ -172,14 +177,14 @@ class PantographVectorEnv(
         }
         self._begin(ended, self.task)
         begun = self._lanes.answer()
-        return begun.observation, lane_infos(begun) | final
+        return begun.results.observation, lane_infos(begun) | final
 
     @property
     def _all(self) -> Flags:
         return np.ones(self.num_envs, dtype=np.bool_)
 
     def _begin(self, lanes: Flags, task: Task) -> None:
-        self._lanes.begin(lanes, task, self._random)
+        self._lanes.begin(lanes, task, self._generator)
         self._steps[lanes] = 0
         self._ended[lanes] = False
         self._any_ended = bool(self._ended.any())
@@ -198,10 +203,18 @@ class PantographVectorEnv(
     def _seed(self, lanes: Flags, seed: int | Sequence[int | None] | None) -> None:
         """Seed the lanes marked; one without a seed of its own keeps its generator if it has one."""
         seeds = self._lane_seeds(seed)
-        wanted = [k for k in np.flatnonzero(lanes).tolist() if seeds[k] is not None or k not in self._random]
-        fresh = {lane: seeding.np_random(seeds[lane]) for lane in wanted}
-        for lane, (random, used) in fresh.items():
-            self._random[lane], self._seeds[lane] = random, used
+        for wrong in (each for each in seeds if each is not None and each < 0):
+            seeding.np_random(wrong)  # which says so
+        for lane in np.flatnonzero(lanes).tolist():
+            if seeds[lane] is not None or lane not in self._seeds:
+                self._seeds[lane] = seeds[lane]
+                self._random.pop(lane, None)
+
+    def _generator(self, lane: int) -> np.random.Generator:
+        """A lane's generator. To make one takes longer than an episode of some lanes."""
+        if lane not in self._random:
+            self._random[lane], self._seeds[lane] = seeding.np_random(self._seeds.get(lane))
+        return self._random[lane]
 
     def _lane_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:

@@ -59,6 +59,11 @@ class LineCondition(Settings):
         return value
 
     @property
+    def random(self) -> bool:
+        """Whether two lines in this condition differ."""
+        return self.irregularity > 0 or self.dropper_scatter > 0
+
+    @property
     def waves(self) -> int:
         """How many cosines it takes."""
         return len(IRREGULARITY) * (self.irregularity > 0) + (self.wear_depth > 0)

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..backend import LANES_ABREAST, bind, copy_whole, lane_table, pack
+from ..backend import (
+    Lanes,
+    bind,
+    copy_whole,
+    lane_table,
+    lanes_abreast,
+    of_lanes,
+    pack,
+    set_lanes,
+)
 from ..base.arrays import Array
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
@@ -17,11 +26,9 @@ from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
+from .pantograph.step import Part
 from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples
 from .step import advance
-
-SEEN = ("steps_done", "stride", "contact_force", "nominal_force", "sample", "_advance")
-"""Attributes that ``Plant._look`` makes of the others."""
 
 
 class Plant:
@@ -59,40 +66,35 @@ class Plant:
         )
         self.time_step = self.model.time_step
         size = 2 * len(pantograph.masses)
-        self.pantographs = pantographs(size, lanes, lanes if varied else 1)
-        if varied:
-            self.pantographs.variant[:] = np.arange(lanes)
-        self._set_variant(0, pantograph)
-        self.actuators = (actuator or actuator_settings("ideal")).arrays(self.time_step, lanes)
+        self.lanes_abreast = abreast = lanes_abreast(self.model.line)
+        self.pantographs = pantographs(size, lanes if varied else 1, abreast)
+        self.pantographs.set_lanes(np.arange(lanes if varied else abreast), pantograph, self.model)
+        self.actuators = (actuator or actuator_settings("ideal")).arrays(self.time_step, lanes, abreast)
+        waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
-            table=lane_table(CONTACTS, Row.STATE + size, lanes),
-            waves=np.zeros((max(condition.waves for condition in runs.conditions), 3, lanes)),
+            table=lane_table(Row.STATE + size, lanes, abreast, CONTACTS),
+            waves=lane_table(3 * waves, lanes, abreast),
             lowest_force=-np.inf if bilateral else 0.0,
         )
-        self.lanes_abreast = LANES_ABREAST.get(type(self.model.line), 1)
+        self.run.table[:, :, Row.NOMINAL_FORCE] = 1.0  # of places without a lane: it is divided by
         copy_whole(*self.arrays)
-        self._look()
-
-    def _look(self) -> None:
-        """Look at the arrays by name; no kernel is bound to them as yet."""
-        # Of the first contact, which the figures are of.
-        own = self.run.table[0, :, : self.lanes]
-        self.steps_done, self.stride = own[Row.STEP], own[Row.STRIDE]
-        self.contact_force, self.nominal_force = own[Row.FORCE], own[Row.NOMINAL_FORCE]
-        self.sample = own[:SAMPLE_ROWS]  # of the last step
-        self._advance: Callable[..., Any] | None = None
+        self._advance: Callable[..., Any] | None = None  # bound to the arrays when it is wanted
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what a copy has to see anew, since its arrays lie elsewhere."""
-        return {name: value for name, value in vars(self).items() if name not in SEEN}
+        """All but what is bound to the arrays, since a copy's lie elsewhere."""
+        return vars(self) | {"_advance": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         copy_whole(*self.arrays)
-        self._look()
 
-    def _set_variant(self, variant: int, pantograph: PantographData) -> None:
-        self.pantographs.set_variant(variant, pantograph, self.model)
+    def row(self, row: Row) -> Array:
+        """A row of the first contact's in all lanes, (lanes,), a copy."""
+        return of_lanes(self.run.table[0], np.arange(self.lanes))[:, row]
+
+    def of(self, lane: int, row: Row) -> float:
+        """The same of one lane."""
+        return float(of_lanes(self.run.table[0], lane)[row])
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -105,45 +107,52 @@ class Plant:
 
     def start(
         self,
-        lane: int,
-        speed: float,
-        drawn: DrawnLine | None = None,
-        pantograph: PantographData | None = None,
-        static_force: float | None = None,
+        lanes: Lanes,
+        speeds: Any,
+        drawn: Sequence[DrawnLine] = (),
+        pantographs: Sequence[PantographData] = (),
+        static_forces: Array | None = None,
     ) -> None:
-        """Put a lane at the start of the line, at rest under the nominal force.
+        """Put lanes at the start of the line, at rest under the nominal force.
 
-        speed: of the train (m/s), not beyond the waves of the wire. drawn: what is random about its
-        line, as ``line_condition.draw`` gives it. pantograph: the lane's own, where they are varied.
-        static_force: instead of the pantograph's (N). Raises InputError for a bad speed.
+        lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), not beyond the waves of the
+        wire. drawn: what is random about their lines, as ``line_condition.draw`` gives it. pantographs: the
+        lanes' own, where they are varied. static_forces: instead of the pantograph's, (n,) (N). Raises
+        InputError for a bad speed.
         """
-        self.check_speed(speed)
-        run, variant = self.run, int(self.pantographs.variant[lane])
-        data = pantograph or self.pantograph
-        if pantograph is not None:
-            self._set_variant(variant, pantograph)
-        drawn = drawn or DrawnLine(self.runs.conditions[0])
-        run.waves[:, :, lane] = 0.0
-        run.waves[: len(drawn.waves), :, lane] = drawn.waves
+        lanes, run = np.atleast_1d(lanes), self.run
+        speeds = np.full(len(lanes), speeds, dtype=float)
+        check_speeds(self.catenary.name, self.model.wave_speed, (speeds.min(), speeds.max()))
+        drawn = drawn or [DrawnLine(self.runs.conditions[0])] * len(lanes)
+        for lane, own in zip(lanes, pantographs, strict=False):
+            self.pantographs.set_lanes(lane, own, self.model)
+        waves = np.zeros((len(lanes), run.waves.shape[1]))
+        for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
+            own_waves[: line.waves.size] = line.waves.ravel()
+        set_lanes(run.waves, lanes, waves)
         height, wire, spring = self.model.start_point
-        height += float(run.waves[:, 0, lane] @ np.cos(2 * np.pi * run.waves[:, 2, lane]))
-        strip = float(self.pantographs.strip_compliance[variant])
+        heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
+        strip = float(self.pantographs.table[0, Part.STRIP_COMPLIANCE, 0])  # all have the same strips
         compliance = strip + wire + spring
-        trimmed = 0.0 if static_force is None else static_force - data.static_force
-        nominal_force = data.nominal_force(speed) + trimmed
-        state = rest_state(data, nominal_force, height, compliance)
-        force = float(state[0] - height) / compliance
-        self.model.settle(lane, drawn, force)
-        self.actuators.reset(lane)
-        column = run.table[:, :, lane]
-        column[:] = 0.0
-        column[:, Row.STRIDE] = speed * self.time_step
-        column[:, Row.NOMINAL_FORCE] = nominal_force
-        column[:, [Row.FORCE, Row.CONTACT_FORCE]] = force
-        column[:, Row.STATE :] = state
-        column[:, Row.HEAD_HEIGHT] = state[0]
-        column[:, Row.FRAME_HEIGHT] = state[len(state) // 2 - 1]
-        column[:, Row.WIRE_HEIGHT] = state[0] - force * strip
+        nominal_forces = self.pantograph.nominal_force(speeds)
+        if static_forces is not None:
+            nominal_forces = nominal_forces + (static_forces - self.pantograph.static_force)
+        state = rest_state(pantographs or self.pantograph, nominal_forces, heights, compliance)
+        forces = (state[:, 0] - heights) / compliance
+        if not self.model.massless:
+            for lane, line, force in zip(lanes.tolist(), drawn, forces.tolist(), strict=True):
+                self.model.settle(lane, line, force)
+        table = np.zeros((len(lanes), run.table.shape[2]))
+        table[:, Row.STRIDE] = speeds * self.time_step
+        table[:, Row.NOMINAL_FORCE] = nominal_forces
+        table[:, Row.CONTACT_FORCE] = forces
+        table[:, Row.STATE :] = state
+        table[:, Row.HEAD_HEIGHT] = state[:, 0]
+        table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
+        table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
+        for contact in range(CONTACTS):
+            set_lanes(run.table[contact], lanes, table)
+            set_lanes(self.actuators.table[contact], lanes, 0.0)
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays of ``rows`` rows for kernels to record in: one more than steps are to be kept."""
@@ -154,11 +163,12 @@ class Plant:
             tension=np.zeros((self.lanes, rows, droppers)),
         )
 
-    def clear(self, samples: Samples, lane: int) -> None:
-        """Forget a lane's earlier run: what lies beyond the window is not written, but at rest."""
-        samples.uplift[lane] = 0.0
+    def clear(self, samples: Samples, lanes: Array) -> None:
+        """Forget earlier runs of lanes, (n,): what lies beyond the window is not written, but at rest."""
+        samples.uplift[lanes] = 0.0
         if samples.tension.shape[2]:
-            samples.tension[lane] = self.model.rest_tension(lane)
+            for lane in lanes.tolist():
+                samples.tension[lane] = self.model.rest_tension(lane)
 
     def advance(self, command: Array, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` under commands (N), (lanes, contacts, places).

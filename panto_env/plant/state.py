@@ -22,7 +22,7 @@ class Place(IntEnum):
 
 
 class Row(IntEnum):
-    """Rows of the table of all lanes, one column per lane, and of a block of lanes in a kernel.
+    """Rows of the table of all lanes.
 
     The sample of the last step comes first; each of its values is the mean over the step, so it belongs
     to the middle of the step.
@@ -34,36 +34,37 @@ class Row(IntEnum):
     WIRE_HEIGHT = 3  # m
     HEAD_VELOCITY = 4  # m/s
     FRAME_VELOCITY = 5  # m/s
-    FRAME_FORCE = 6  # of the actuator (N)
-    HEAD_FORCE = 7  # of the actuator (N)
+    FRAME_FORCE = 6  # of the actuator (N), one row per place
+    HEAD_FORCE = 7  # likewise
     STEP = 8  # steps since the start
     STRIDE = 9  # distance covered in one step (m)
     NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
-    FORCE = 11  # mean contact force over the last step (N)
-    ACTUATOR_FORCE = 12  # now (N), one row per place
-    STATE = 14  # displacements (m), then velocities (m/s) of the pantograph, head first
-    # Rows that only a block has.
-    FREE_STATE = STATE + MAX_STATE  # the state at the end of the step, were there no contact force
-    COMMAND = FREE_STATE + MAX_STATE  # of the actuators (N), one row per place
-    ARRIVING_COMMAND = COMMAND + len(Place)  # the command that arrives at an actuator now (N)
-    IRREGULARITY = ARRIVING_COMMAND + 1  # of the contact wire's height, at mid-step (m)
-    WIRE_BEFORE = ARRIVING_COMMAND + 2  # height of the wire where it is touched, at the step's start (m)
-    WIRE_MIDDLE = ARRIVING_COMMAND + 3  # likewise at mid-step, as far as this step's forces don't count (m)
-    RISE = ARRIVING_COMMAND + 4  # of the wire along the step's way, at mid-step (m)
+    STATE = 11  # displacements (m), then velocities (m/s) of the pantograph, head first
 
 
-ROW, PLACE = constants(Row), constants(Place)
+class Scratch(IntEnum):
+    """Rows of what a kernel keeps of a contact during a step."""
+
+    COMMAND = 0  # of the actuators (N), one row per place
+    IRREGULARITY = COMMAND + len(Place)  # of the contact wire's height, at mid-step (m)
+    WIRE_BEFORE = IRREGULARITY + 1  # height of the wire where it is touched, at the step's start (m)
+    WIRE_MIDDLE = IRREGULARITY + 2  # likewise at mid-step, as far as this step's forces don't count (m)
+
+
+ROW, PLACE, SCRATCH = constants(Row), constants(Place), constants(Scratch)
 SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 """Rows of a sample: the first ones."""
-BLOCK_ROWS = int(Row.RISE) + 1
-"""Rows of a block."""
+SCRATCH_ROWS = int(Scratch.WIRE_MIDDLE) + 1
+"""Rows of ``Scratch`` for each contact."""
+ALL_SCRATCH_ROWS, ALL_FREE_ROWS = CONTACTS * SCRATCH_ROWS, CONTACTS * MAX_STATE
+"""Of all contacts, and of their states as they would be at the end of the step without contact force."""
 
 
 class Run(NamedTuple):
     """Where each lane is on its line, its pantographs' motion, and their contacts."""
 
-    table: Array  # (contacts, STATE + 2n, lanes and spare columns): the rows above
-    waves: Array  # (waves, 3, lanes): irregularity as amplitude (m), turns per metre (1/m), phase in turns
+    table: Array  # (contacts, groups, STATE + 2n, lanes abreast): the rows above
+    waves: Array  # (groups, 3 waves, lanes abreast): irregularity, each as a ``Wave``
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 

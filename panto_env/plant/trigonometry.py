@@ -1,6 +1,4 @@
-"""Cosine and sine of whole turns as plain arithmetic: a call of the library's functions would keep loops
-over lanes from becoming vector instructions.
-"""
+"""Cosine and sine of whole turns as plain arithmetic, for numbers and vectors alike."""
 
 from __future__ import annotations
 

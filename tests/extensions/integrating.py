@@ -7,9 +7,9 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import implements
+from ...backend import columns, implements, lane_table
 from ...base.ranges import Between
-from ..state import CONTACTS, Place
+from ..state import CONTACTS, ROW, Place
 from .base import ActuatorSettings, drive
 
 
@@ -19,26 +19,22 @@ class IntegratingActuator(ActuatorSettings):
         0.1, description="time in which the full command is reached (s)"
     )
 
-    def arrays(self, time_step, lanes):
-        turned = np.zeros((CONTACTS, len(Place), lanes))
-        return IntegratingArrays(turned, np.full(1, time_step / self.time))
+    def arrays(self, time_step, lanes, abreast):
+        table = lane_table(len(Place), lanes, abreast, CONTACTS)
+        return IntegratingArrays(table, time_step / self.time)
 
 
 KIND = IntegratingActuator
 
 
 class IntegratingArrays(NamedTuple):
-    turned: np.ndarray  # (contacts, places, lanes): force that the motor has wound up (N)
-    share: np.ndarray  # (1,): of the command, per step
-
-    def reset(self, lane):
-        self.turned[..., lane] = 0.0
+    table: np.ndarray  # (contacts, groups, places, lanes abreast): force that the motor has wound up (N)
+    share: float  # of the command, per step
 
 
 @implements(drive, IntegratingArrays)
-def _drive(actuators, contact, force, command, arriving, begin, count):
-    for p in range(actuators.turned.shape[1]):
-        turned = actuators.turned[contact, p, begin : begin + count]
-        for i in range(count):
-            turned[i] += actuators.share[0] * command[p, i]
-            force[p, i] = turned[i]
+def _drive(actuators, contact, own, command, lane):
+    turned = columns(own, actuators.table[contact], lane)
+    for place in range(actuators.table.shape[2]):
+        turned[place] += actuators.share * command[place]
+        own[ROW.FRAME_FORCE + place] = turned[place]

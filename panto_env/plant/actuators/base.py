@@ -17,8 +17,9 @@ from ..state import Place
 class ActuatorArrays(Protocol):
     """Actuators of all lanes: a named tuple of arrays, whose type picks the source of ``drive``."""
 
-    def reset(self, lane: int) -> None:
-        """Put one lane's actuators at rest."""
+    @property
+    def table(self) -> Array:
+        """All that changes, (contacts, groups, rows, lanes abreast); zero at rest."""
 
 
 class ActuatorSettings(Settings, ABC):
@@ -35,15 +36,14 @@ class ActuatorSettings(Settings, ABC):
         return {"frame": (Place.FRAME,), "head": (Place.HEAD,), "both": (Place.FRAME, Place.HEAD)}[self.place]
 
     @abstractmethod
-    def arrays(self, time_step: float, lanes: int) -> ActuatorArrays:
-        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
+    def arrays(self, time_step: float, lanes: int, abreast: int) -> ActuatorArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
 
 
 @operation
-def drive(
-    actuators: Any, contact: int, force: Array, command: Array, arriving: Array, begin: int, count: int
-) -> None:
-    """Move the forces (N) on one contact's pantograph, (places, count), by a step towards their commands.
+def drive(actuators: Any, contact: int, own: Any, command: Any, lane: int) -> None:
+    """Move the forces on one contact's pantographs by a step towards their commands.
 
-    Of the lanes from ``begin`` on. command: (places, count) (N). arriving: (count,), scratch.
+    Of the group of lanes that begins at ``lane``: own: its rows of ``Row``, of which FRAME_FORCE and
+    HEAD_FORCE are to be the means over the step. command: (places,) (N).
     """

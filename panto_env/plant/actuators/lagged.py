@@ -7,11 +7,23 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import implements
-from ...base.arrays import Array
+from ...backend import (
+    choose,
+    columns,
+    implements,
+    inlined,
+    lane_table,
+    larger,
+    magnitude,
+    rows_from,
+    smaller,
+)
+from ...base.arrays import Array, Index
 from ...base.ranges import Between
-from ..state import CONTACTS, Place
+from ..state import CONTACTS, ROW, Place
 from .base import ActuatorSettings, drive
+
+_PLACES = len(Place)
 
 
 class LaggedActuator(ActuatorSettings):
@@ -26,23 +38,22 @@ class LaggedActuator(ActuatorSettings):
         None, description="largest change of force (N/s)"
     )
 
-    def arrays(self, time_step: float, lanes: int) -> LaggedArrays:
-        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
+    def arrays(self, time_step: float, lanes: int, abreast: int) -> LaggedArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
         steps = int(self.delay / time_step + 1e-6)
         late = max(self.delay / time_step - steps, 0.0)
         late = 0.0 if late < 1e-6 else late
         share = 1.0 if self.lag == 0 else 1.0 - np.exp(-time_step / self.lag)
-        mean = 1.0 if self.lag == 0 else 1.0 / share - self.lag / time_step
         rate = np.inf if self.rate_limit is None else self.rate_limit * time_step
         return LaggedArrays(
-            pending=np.zeros((CONTACTS, steps + (late > 0), len(Place), lanes)),
+            table=lane_table(_PLACES * (1 + steps + (late > 0)), lanes, abreast, CONTACTS),
             late=late,
-            reached=np.zeros((CONTACTS, len(Place), lanes)),
-            share=np.full(len(Place), share),
-            mean=np.full(len(Place), mean),
-            ramp=np.full(len(Place), 0.5 if self.lag == 0 else 0.0),
-            rate=np.full(len(Place), rate),
-            limit=np.full(len(Place), self.force_limit),
+            share=share,
+            mean=1.0 if self.lag == 0 else 1.0 / share - self.lag / time_step,
+            ramp=0.5 / rate if self.lag == 0 else 0.0,
+            rate=rate,
+            limit=self.force_limit,
+            places=np.array(self.places, dtype=np.int64),
         )
 
 
@@ -50,48 +61,44 @@ KIND = LaggedActuator
 
 
 class LaggedArrays(NamedTuple):
-    """Actuators of all lanes; all have a row per place."""
+    """Actuators of all lanes. Rows of the table: the force at the step's end, one row per place; then
+    commands on their way, the next to arrive first, likewise (N).
+    """
 
-    pending: Array  # (contacts, delay, places, lanes): commands on their way, the next to arrive first (N)
+    table: Array  # (contacts, groups, places (1 + delay), lanes abreast)
     late: float  # share of a step before the next one arrives: the delay's part that is no whole step
-    reached: Array  # (contacts, places, lanes): force at the step's end (N)
-    share: Array  # (places,): of the way to the command that is gone in one step
-    mean: Array  # (places,): share of the way gone that the step's mean force has gone
-    ramp: Array  # (places,): how much less of it the mean has gone where the rate alone limits
-    rate: Array  # (places,): largest change of force in one step (N)
-    limit: Array  # (places,): largest force (N)
+    share: float  # of the way to the command that is gone in one step
+    mean: float  # share of the way gone that the step's mean force has gone
+    ramp: float  # how much less of it the mean has gone where the rate alone limits, over that rate (1/N)
+    rate: float  # largest change of force in one step (N)
+    limit: float  # largest force (N)
+    places: Index  # (used,): where there is one, a ``Place``
 
-    def reset(self, lane: int) -> None:
-        """Let no command be on its way in one lane."""
-        self.pending[..., lane] = 0.0
-        self.reached[..., lane] = 0.0
+
+@inlined
+def arriving(actuators, pending, command, place):
+    """The command (N) that arrives at one place in this step, the mean over it; send off the one of now."""
+    rows, late, here = actuators.table.shape[2] - _PLACES, actuators.late, pending[place]
+    if late > 0.0:  # the command changes within the step: its mean counts
+        after = pending[place + _PLACES] if rows > _PLACES else command[place]
+        here = late * here + (1.0 - late) * after
+    for k in range(place, rows - _PLACES, _PLACES):
+        pending[k] = pending[k + _PLACES]
+    pending[rows - _PLACES + place] = command[place]
+    return here
 
 
 @implements(drive, LaggedArrays)
-def _drive(actuators, contact, force, command, arriving, begin, count):
-    steps, late = actuators.pending.shape[1], actuators.late
-    for p in range(actuators.share.size):
-        share, rate, limit = actuators.share[p], actuators.rate[p], actuators.limit[p]
-        mean, ramp = actuators.mean[p], actuators.ramp[p]
-        reached = actuators.reached[contact, p, begin : begin + count]
-        for i in range(count):
-            arriving[i] = command[p, i]
-        if steps > 0:
-            pending = actuators.pending[contact, :, p, begin : begin + count]
-            for i in range(count):
-                next_one = pending[1, i] if steps > 1 else command[p, i]
-                arriving[i] = pending[0, i]
-                if late > 0.0:  # the command changes within the step: its mean counts
-                    arriving[i] = late * pending[0, i] + (1.0 - late) * next_one
-                for k in range(steps - 1):
-                    pending[k, i] = pending[k + 1, i]
-                pending[steps - 1, i] = command[p, i]
-        for i in range(count):
-            target = min(max(arriving[i], -limit), limit)
-            wanted = share * (target - reached[i])
-            change = min(max(wanted, -rate), rate)
-            gone = mean - ramp * abs(change) / rate
-            if abs(wanted) > rate:
-                gone = 0.5
-            force[p, i] = reached[i] + gone * change
-            reached[i] += change
+def _drive(actuators, contact, own, command, lane):
+    reached = columns(own, actuators.table[contact], lane)
+    for place in actuators.places:
+        asked = command[place]
+        if actuators.table.shape[2] > _PLACES:
+            asked = arriving(actuators, rows_from(reached, _PLACES), command, place)
+        target = smaller(larger(asked, -actuators.limit), actuators.limit)
+        wanted = actuators.share * (target - reached[place])
+        change = smaller(larger(wanted, -actuators.rate), actuators.rate)
+        gone = actuators.mean - actuators.ramp * magnitude(change)
+        gone = choose(magnitude(wanted) > actuators.rate, 0.5, gone)
+        own[ROW.FRAME_FORCE + place] = reached[place] + gone * change
+        reached[place] += change

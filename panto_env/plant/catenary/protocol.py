@@ -62,7 +62,10 @@ class CatenaryModel(Protocol):
         """
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
-        """Put one lane's wire at rest, as ``drawn`` has it, under a force (N) at the starting point."""
+        """Put one lane's wire at rest, as ``drawn`` has it, under a force (N) at the starting point.
+
+        A massless wire, which has nothing to settle, is not asked to.
+        """
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""

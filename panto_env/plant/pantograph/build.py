@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Array, Index
+from ...backend import Lanes, lane_table, set_lanes
+from ...base.arrays import Array
 from ..catenary.protocol import CatenaryModel
 from .schema import PantographData
+from .step import Part
 
 STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
@@ -21,48 +24,35 @@ STABILITY_MARGIN = 0.3
 
 
 class Pantographs(NamedTuple):
-    """What the pantographs of all lanes are made of: all alike, or each a variant of its own.
+    """What the pantographs of all lanes are made of: all alike, or each its own.
 
     n masses: the state is n displacements, then n velocities.
     """
 
-    variant: Index  # (lanes,): which of the variants a lane has
-    transition: Array  # (variants, 2n, 2n): exp(A dt)
-    contact_input: Array  # (variants, 2n): change of the state by 1 N of contact force over a step
-    frame_input: Array  # (variants, 2n): by 1 N up on the frame (the lowest mass)
-    head_input: Array  # (variants, 2n): by 1 N up on the head and down on the mass below it
-    strip_compliance: Array  # (variants,): of the contact spring (m/N)
-    strip_damping: Array  # (variants,): of the damper beside it, divided by the time step (N/m)
-    implicit_share: Array  # (variants,): of the wire's height in the contact law, 0 explicit, 1 implicit
+    size: int  # 2n: entries of the state
+    table: Array  # (groups, rows of ``Part``, lanes abreast); one group for all lanes where they are alike
 
-    def set_variant(self, variant: int, pantograph: PantographData, catenary: CatenaryModel) -> None:
-        """Make one variant this pantograph; under a massless wire a strip can be rigid."""
-        time_step = catenary.time_step
-        transition, inputs = discretise(pantograph, time_step)
-        self.transition[variant] = transition
-        self.contact_input[variant] = inputs[:, 0]
-        self.frame_input[variant] = inputs[:, 1]
-        self.head_input[variant] = inputs[:, 2]
-        rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
-        stiffness = pantograph.contact_stiffness
-        self.strip_compliance[variant] = rigid if stiffness == "rigid" else 1 / stiffness
-        self.strip_damping[variant] = pantograph.contact_damping / time_step
-        bearable, gain = STABILITY_MARGIN * self.strip_compliance[variant], catenary.contact_gain
-        self.implicit_share[variant] = 0.0 if bearable >= gain else 1.0 - bearable / gain
+    def set_lanes(self, lanes: Lanes, pantograph: PantographData, catenary: CatenaryModel) -> None:
+        """Make those of some lanes, of the only group where all are alike, this one."""
+        set_lanes(self.table, lanes, parts(pantograph, catenary))
 
 
-def pantographs(size: int, lanes: int, variants: int = 1) -> Pantographs:
+def parts(pantograph: PantographData, catenary: CatenaryModel) -> Array:
+    """What a pantograph is made of, as rows of ``Part``; under a massless wire a strip can be rigid."""
+    time_step = catenary.time_step
+    transition, inputs = discretise(pantograph, time_step)
+    rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
+    stiffness = pantograph.contact_stiffness
+    compliance = rigid if stiffness == "rigid" else 1 / stiffness
+    bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
+    share = 0.0 if bearable >= gain else 1.0 - bearable / gain
+    damping = pantograph.contact_damping / time_step
+    return np.concatenate([[compliance, damping, share], inputs.T.ravel(), transition.ravel()])
+
+
+def pantographs(size: int, lanes: int, abreast: int) -> Pantographs:
     """Arrays for the pantographs of ``lanes`` lanes, of ``size`` entries of state each, all zero."""
-    return Pantographs(
-        variant=np.zeros(lanes, dtype=np.int64),
-        transition=np.zeros((variants, size, size)),
-        contact_input=np.zeros((variants, size)),
-        frame_input=np.zeros((variants, size)),
-        head_input=np.zeros((variants, size)),
-        strip_compliance=np.zeros(variants),
-        strip_damping=np.zeros(variants),
-        implicit_share=np.zeros(variants),
-    )
+    return Pantographs(size, lane_table(Part.CONTACT_INPUT + 3 * size + size**2, lanes, abreast))
 
 
 def matrices(pantograph: PantographData) -> tuple[Array, Array]:
@@ -127,15 +117,23 @@ def with_scatter(pantograph: PantographData, scatter: float, random: np.random.G
 
 
 def rest_state(
-    pantograph: PantographData, nominal_force: float, wire_height: float, compliance: float
+    pantographs: PantographData | Sequence[PantographData],
+    nominal_forces: Array,
+    wire_heights: Array,
+    compliance: float,
 ) -> Array:
-    """State, (2n,), in static equilibrium under the nominal force (N) against a point of the wire.
+    """States, (lanes, 2n), in static equilibrium under nominal forces (N) against points of the wire.
 
-    The point stands at ``wire_height`` (m) and yields ``compliance`` (m/N), contact spring included.
+    The points stand at ``wire_heights`` (m) and yield ``compliance`` (m/N), contact spring included.
+    pantographs: one for all lanes, or each lane's own.
     """
-    flexibility = _flexibility(pantograph.stiffnesses, compliance)
-    heights = flexibility[:, -1] * nominal_force + flexibility[:, 0] * (wire_height / compliance)
-    return np.concatenate([heights, np.zeros(len(heights))])
+    if isinstance(pantographs, PantographData):
+        flexibility = _flexibility(pantographs.stiffnesses, compliance)[None]
+    else:
+        flexibility = np.array([_flexibility(own.stiffnesses, compliance) for own in pantographs])
+    forces = nominal_forces[:, None], (wire_heights / compliance)[:, None]
+    heights = flexibility[:, :, -1] * forces[0] + flexibility[:, :, 0] * forces[1]
+    return np.concatenate([heights, np.zeros_like(heights)], axis=1)
 
 
 @lru_cache(maxsize=64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -68,6 +68,6 @@ class PantographData(Settings):
         stiffness = 0.0 if self.contact_stiffness == "rigid" else self.contact_stiffness
         return stiffness > HARD_STIFFNESS or self.contact_damping > HARD_DAMPING
 
-    def nominal_force(self, speed: float) -> float:
-        """Force that lifts the pantograph (N) at a train speed (m/s)."""
+    def nominal_force(self, speed: Any) -> Any:
+        """Force that lifts the pantograph (N) at a train speed (m/s), or at each of an array."""
         return self.static_force + self.aerodynamic_coefficient * (3.6 * speed) ** 2

@@ -2,33 +2,52 @@
 
 from __future__ import annotations
 
-from ...backend import inlined
-from ..state import PLACE
+from enum import IntEnum
+
+from ...backend import columns, constants, inlined, rows_from
+from ..state import ROW
+
+
+class Part(IntEnum):
+    """Rows of the table of what pantographs are made of; n: entries of the state.
+
+    Behind the change of the state by 1 N of contact force over a step, n rows, come those by 1 N up on the
+    frame (the lowest mass) and by 1 N up on the head and down on the mass below it; then the transition of
+    the state exp(A dt), row by row.
+    """
+
+    STRIP_COMPLIANCE = 0  # of the contact spring (m/N)
+    STRIP_DAMPING = 1  # of the damper beside it, divided by the time step (N/m)
+    IMPLICIT_SHARE = 2  # of the wire's height in the contact law, 0 explicit, 1 implicit
+    CONTACT_INPUT = 3  # n rows
+
+
+PART = constants(Part)
 
 
 @inlined
-def move_freely(pantographs, variant, state, free_state, nominal_force, actuator_force, count):
-    """States, (2n, count), after a step without contact force, into ``free_state``; forces in N."""
-    size = pantographs.transition.shape[1]
-    for r in range(size):
-        frame_input, head_input = pantographs.frame_input[variant, r], pantographs.head_input[variant, r]
-        a, b = pantographs.transition[variant, r, 0], pantographs.transition[variant, r, 1]
-        for i in range(count):
-            forced = (
-                frame_input * (nominal_force[i] + actuator_force[PLACE.FRAME, i])
-                + head_input * actuator_force[PLACE.HEAD, i]
-            )
-            free_state[r, i] = forced + (a * state[0, i] + b * state[1, i])
-        for j in range(2, size, 2):  # in pairs: there are as many velocities as displacements
-            a, b = pantographs.transition[variant, r, j], pantographs.transition[variant, r, j + 1]
-            for i in range(count):
-                free_state[r, i] += a * state[j, i] + b * state[j + 1, i]
+def move_freely(pantographs, own, free_state, lane):
+    """State of a group after a step without contact force, into ``free_state``."""
+    size, parts = pantographs.size, columns(own, pantographs.table, lane)
+    frame_input = rows_from(parts, PART.CONTACT_INPUT + size)
+    head_input = rows_from(parts, PART.CONTACT_INPUT + 2 * size)
+    transition, state = rows_from(parts, PART.CONTACT_INPUT + 3 * size), rows_from(own, ROW.STATE)
+    on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+    for r in range(0, size, 2):  # in pairs, that a processor has more to do at once
+        total = frame_input[r] * on_frame + head_input[r] * on_head
+        other = frame_input[r + 1] * on_frame + head_input[r + 1] * on_head
+        first, second = rows_from(transition, r * size), rows_from(transition, (r + 1) * size)
+        for j in range(size):
+            total += first[j] * state[j]
+            other += second[j] * state[j]
+        free_state[r] = total
+        free_state[r + 1] = other
 
 
 @inlined
-def add_contact_force(pantographs, variant, state, free_state, force, count):
-    """End the step: the free motion and what the contact force (N) adds to it."""
-    for r in range(pantographs.transition.shape[1]):
-        contact_input = pantographs.contact_input[variant, r]
-        for i in range(count):
-            state[r, i] = free_state[r, i] + contact_input * force[i]
+def add_contact_force(pantographs, own, free_state, lane):
+    """End the step: the free motion and what the contact force adds to it."""
+    contact_input = rows_from(columns(own, pantographs.table, lane), PART.CONTACT_INPUT)
+    state, force = rows_from(own, ROW.STATE), own[ROW.CONTACT_FORCE]
+    for r in range(pantographs.size):
+        state[r] = free_state[r] + contact_input[r] * force

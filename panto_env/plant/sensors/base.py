@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from enum import IntEnum
 from typing import Any, Protocol
 
-from ...backend import constants, operation
+from ...backend import Lanes, constants, operation
 from ...base.arrays import Array, Index
 from ...base.settings import Settings
 
@@ -28,6 +28,10 @@ class SensorArrays(Protocol):
     """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
 
     @property
+    def table(self) -> Array:
+        """All that changes but the noise, (groups, rows, lanes abreast)."""
+
+    @property
     def noise(self) -> Array:
         """Noise of the next readings, (lanes, times, readings), in their units; no times for none."""
 
@@ -35,8 +39,8 @@ class SensorArrays(Protocol):
     def noise_used(self) -> Index:
         """How many of them each lane has used, (lanes,)."""
 
-    def reset(self, lane: int, sample: Array) -> None:
-        """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""
+    def reset(self, lanes: Lanes, samples: Array) -> None:
+        """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
 
 
 class SensorSettings(Settings, ABC):
@@ -48,19 +52,21 @@ class SensorSettings(Settings, ABC):
         """Noise of each ``Reading``, rms, in its unit; None where no reading carries any."""
 
     @abstractmethod
-    def arrays(self, time_step: float, control_steps: int, lanes: int) -> SensorArrays:
-        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
+    def arrays(self, time_step: float, control_steps: int, lanes: int, abreast: int) -> SensorArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step;
+        abreast: lanes of a group.
+        """
 
 
 @operation
-def take_readings(sensors: Any, step: int, block: Array, readings: Array, begin: int, count: int) -> None:
+def take_readings(sensors: Any, step: int, own: Any, readings: Any, lane: int) -> None:
     """What the sensors read after plant step ``step`` of a control step, counted from 1, without noise.
 
-    block: of the lanes from ``begin`` on, at the end of the step. readings: (readings, count), written to
-    at least once in each control step.
+    Of the group of lanes that begins at ``lane``: own: its rows of ``Row``, at the end of the step.
+    readings: its rows of ``Reading``, written to at least once in each control step.
     """
 
 
 @operation
-def take_first_readings(sensors: Any, block: Array, readings: Array, begin: int, count: int) -> None:
-    """What the sensors read at the start of a run, in a block as above."""
+def take_first_readings(sensors: Any, own: Any, readings: Any, lane: int) -> None:
+    """What the sensors read at the start of a run; arguments as above."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import implements, inlined
+from ...backend import Lanes, columns, implements, inlined, lane_table, rows_from, set_lanes
 from ...base.arrays import Array, Index
 from ...base.ranges import Between
 from ..state import Row
@@ -17,6 +17,7 @@ from .noise import AHEAD
 SENSED = (Row.HEAD_HEIGHT, Row.FRAME_HEIGHT, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.CONTACT_FORCE)
 """Rows of a sample that are read, in the order of ``Reading``."""
 _SENSED = tuple(int(row) for row in SENSED)
+_READINGS = len(Reading)
 
 
 class DelayedSensors(SensorSettings):
@@ -43,19 +44,20 @@ class DelayedSensors(SensorSettings):
         rms = (displacement, displacement, velocity, velocity, self.force_noise)
         return rms if any(rms) else None
 
-    def arrays(self, time_step: float, control_steps: int, lanes: int) -> DelayedArrays:
-        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
+    def arrays(self, time_step: float, control_steps: int, lanes: int, abreast: int) -> DelayedArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step;
+        abreast: lanes of a group.
+        """
         # A sample is a mean over its step, so half a step old when that ends; between two it is interpolated.
         age = max(self.delay / time_step - 0.5, 0.0)
         late = age - int(age + 1e-6)
         whole, rest = divmod(int(age + 1e-6), control_steps)
         read_at = control_steps - rest
         return DelayedArrays(
-            past=np.zeros((whole, len(Reading), lanes)),
+            table=lane_table(_READINGS * (1 + whole), lanes, abreast),
             read_at=read_at,
             older_at=read_at - 1 if read_at > 1 else control_steps,
             older_share=0.0 if late < 1e-6 else late,
-            older=np.zeros((len(Reading), lanes)),
             noise=np.zeros((lanes, AHEAD if self.noise_rms else 0, len(Reading))),
             noise_used=np.zeros(lanes, dtype=np.int64),
         )
@@ -65,56 +67,53 @@ KIND = DelayedSensors
 
 
 class DelayedArrays(NamedTuple):
-    """Sensors of all lanes."""
+    """Sensors of all lanes. Rows of the table: the older sample, one row per reading; then readings on their
+    way, the next to arrive first, one control step after the other.
+    """
 
-    past: Array  # (control steps, readings, lanes): readings on their way, the next to arrive first
+    table: Array  # (groups, readings (1 + control steps), lanes abreast)
     read_at: int  # plant step of a control step whose sample is read, counted from 1
     older_at: int  # plant step whose sample, the one before, is read too
     older_share: float  # weight of that
-    older: Array  # (readings, lanes): that sample
     noise: Array  # (lanes, times, readings): of the next readings, in their units; no times for none
     noise_used: Index  # (lanes,): how many of them have been used
 
-    def reset(self, lane: int, sample: Array) -> None:
-        """Let one lane's past have been as this sample, (SAMPLE_ROWS,)."""
-        self.past[:, :, lane] = sample[list(SENSED)]
-        self.older[:, lane] = sample[list(SENSED)]
+    def reset(self, lanes: Lanes, samples: Array) -> None:
+        """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
+        past = np.tile(samples[..., list(SENSED)], self.table.shape[1] // _READINGS)
+        set_lanes(self.table, lanes, past)
 
 
 @inlined
-def read(sensors, block, readings, begin, count):
+def read(sensors, own, readings, lane):
     """Take the reading that arrives in this control step, and send off the one taken now."""
-    control_steps, share = sensors.past.shape[0], sensors.older_share
-    for k in range(len(_SENSED)):
-        for i in range(count):
-            readings[k, i] = block[_SENSED[k], i]
+    rows, share = sensors.table.shape[1] - _READINGS, sensors.older_share
+    older = columns(own, sensors.table, lane)
+    past = rows_from(older, _READINGS)
+    for k in range(_READINGS):
+        taken = own[_SENSED[k]]
         if share > 0.0:
-            older = sensors.older[k, begin : begin + count]
-            for i in range(count):
-                readings[k, i] += share * (older[i] - readings[k, i])
-        if control_steps > 0:
-            past = sensors.past[:, k, begin : begin + count]
-            for i in range(count):
-                taken = readings[k, i]
-                readings[k, i] = past[0, i]
-                for j in range(control_steps - 1):
-                    past[j, i] = past[j + 1, i]
-                past[control_steps - 1, i] = taken
+            taken += share * (older[k] - taken)
+        if rows > 0:
+            arrived = past[k]
+            for j in range(k, rows - _READINGS, _READINGS):
+                past[j] = past[j + _READINGS]
+            past[rows - _READINGS + k] = taken
+            taken = arrived
+        readings[k] = taken
 
 
 @implements(take_readings, DelayedArrays)
-def _take_readings(sensors, step, block, readings, begin, count):
+def _take_readings(sensors, step, own, readings, lane):
     if step == sensors.read_at:
-        read(sensors, block, readings, begin, count)
+        read(sensors, own, readings, lane)
     if step == sensors.older_at and sensors.older_share > 0.0:
-        for k in range(len(_SENSED)):
-            older = sensors.older[k, begin : begin + count]
-            for i in range(count):
-                older[i] = block[_SENSED[k], i]
+        older = columns(own, sensors.table, lane)
+        for k in range(_READINGS):
+            older[k] = own[_SENSED[k]]
 
 
 @implements(take_first_readings, DelayedArrays)
-def _take_first_readings(sensors, block, readings, begin, count):
-    for k in range(len(_SENSED)):
-        for i in range(count):
-            readings[k, i] = block[_SENSED[k], i]
+def _take_first_readings(sensors, own, readings, lane):
+    for k in range(_READINGS):
+        readings[k] = own[_SENSED[k]]

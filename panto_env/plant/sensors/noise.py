@@ -28,7 +28,7 @@ class Noise:
     def prepare(self, sensors: Any, skip: Any = None) -> None:
         """See to it that all lanes, but those to skip, have the numbers of their next reading."""
         if self._enough == 0:
-            spent = sensors.noise_used == AHEAD
+            spent = sensors.noise_used >= AHEAD
             for lane in np.flatnonzero(spent if skip is None else spent & ~skip).tolist():
                 self._draw(sensors, lane)
             self._enough = AHEAD - int(sensors.noise_used.max())

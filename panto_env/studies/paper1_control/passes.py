@@ -79,14 +79,14 @@ def records(cases: Sequence[Case], pantograph: str | PantographData = PANTOGRAPH
     for lane, policy in enumerate(policies):
         task.reset(lane, np.random.default_rng(0))
         policy.reset(task.context(lane))
-    episode = task.episode
-    action = np.zeros_like(episode.action)
-    while not episode.truncated[0]:
+    results = task.results
+    action = np.zeros((len(cases), len(task.actuator.places)))
+    while not results.truncated[0]:
         for lane, policy in enumerate(policies):
-            action[lane] = policy.act(episode.observation[lane])
+            action[lane] = policy.act(results.observation[lane])
         task.step(action)
-        if episode.terminated.any():
-            ended = cases[int(np.argmax(episode.terminated))]
+        if results.terminated.any():
+            ended = cases[int(np.argmax(results.terminated))]
             raise InputError(f"The pass {ended} left the valid range of the simulation; leave it out.")
     return [task.trajectory(lane, policy=case.policy) for lane, case in enumerate(cases)]
 

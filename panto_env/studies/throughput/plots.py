@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def plot_speed(result: Row) -> Figure:
-    """How cost grows: plants over spans and modes, vector environments over lanes and cores."""
+    """How cost grows on a machine: plants over spans and modes, vector environments over lanes, cores."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 7), layout="constrained")
@@ -40,6 +40,9 @@ def _draw_lanes(axis: Axes, rows: Sequence[Row]) -> None:
     for name, of_environment in _by_environment(rows).items():
         rates = [row["steps_per_second"] for row in of_environment]
         axis.loglog([row["lanes"] for row in of_environment], rates, "o-", label=name)
+    widest = max(_by_environment(rows).values(), key=lambda its: its[-1]["lanes"])
+    rates = [row["yardstick_steps_per_second"] for row in widest]
+    axis.loglog([row["lanes"] for row in widest], rates, "s:", color="0.5", label=widest[0]["yardstick"])
     axis.set(xlabel="lanes, on all cores", ylabel="environment steps per second")
     axis.legend(fontsize="small")
 
@@ -51,11 +54,10 @@ def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
         axis.text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
         return
     counts = sorted({row["cores"] for row in rows})
-    for name, of_environment in _by_environment(rows).items():
-        first = of_environment[0]
-        gain = [row["steps_per_second"] / first["steps_per_second"] for row in of_environment]
-        label = f"{name}, {first['lanes']} lanes"
-        axis.plot([row["cores"] for row in of_environment], gain, "o-", label=label)
+    for name, lanes in dict.fromkeys((row["id"], row["lanes"]) for row in rows):
+        own = [row for row in rows if (row["id"], row["lanes"]) == (name, lanes)]
+        gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
+        axis.plot([row["cores"] for row in own], gain, "o-", label=f"{name}, {lanes} lanes")
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
     axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
     axis.legend(fontsize="small", loc="lower left")

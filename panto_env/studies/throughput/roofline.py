@@ -8,14 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...backend import kernel
+from ...backend.vectors import row_access
 
 # Adds and multiplies of one step, counted in panto_env/plant/catenary/flexible/wires.py and links.py.
-FLOPS_PER_NODE = 12  # blend 2, differences 2, stencil 4, increment 3, displacement 1
+FLOPS_PER_NODE = 12  # lagging displacement 2, differences 2, stencil 4, increment 3, displacement 1
 FLOPS_PER_DROPPER = 60  # two differences 2 x 11, extension and tension 14, eight nodes moved 8 x 3
 # Numbers that the leapfrog moves to or from the nearest cache for each node: u and d read two nodes ahead and
 # at the node, and written.
 NUMBERS_PER_NODE = 6
 CHAIN = 32
+WIDE = 16
+"""Numbers of the vectors of the small loops: as many in single precision as the widest register has."""
+_load, _store = row_access(WIDE)
 
 
 @dataclass(frozen=True)
@@ -31,25 +35,35 @@ class Roofline:
 
 @kernel
 def multiply_add(sums, rounds):
-    """Multiply-adds, CHAIN to a number that is read and written once: 2 flops each."""
-    a = sums[0]
+    """Multiply-adds, CHAIN to a number that is read and written once, eight rows of WIDE at a time."""
+    factor = _load(sums, 0)
     for _ in range(rounds):
-        for i in range(sums.size):
-            x = sums[i]
+        for i in range(0, sums.shape[0], 8):
+            a, b, c, d = _load(sums, i), _load(sums, i + 1), _load(sums, i + 2), _load(sums, i + 3)
+            e, f, g, h = _load(sums, i + 4), _load(sums, i + 5), _load(sums, i + 6), _load(sums, i + 7)
             for _ in range(CHAIN):
-                x = x * a + a
-            sums[i] = x
+                a, b = a * factor + factor, b * factor + factor
+                c, d = c * factor + factor, d * factor + factor
+                e, f = e * factor + factor, f * factor + factor
+                g, h = g * factor + factor, h * factor + factor
+            _store(sums, i, a)
+            _store(sums, i + 1, b)
+            _store(sums, i + 2, c)
+            _store(sums, i + 3, d)
+            _store(sums, i + 4, e)
+            _store(sums, i + 5, f)
+            _store(sums, i + 6, g)
+            _store(sums, i + 7, h)
 
 
 @kernel
 def triad(a, b, c, rounds):
-    """C = b + s a, over arrays that stay in the nearest cache: three numbers per entry."""
-    s = a[0]
+    """C = b + s a, over rows that stay in the nearest cache: three numbers per entry."""
+    s = _load(a, 0)
     for _ in range(rounds):
-        for i in range(a.size):
-            c[i] = b[i] + s * a[i]
-        s = s + c[0]
-    return s
+        for i in range(a.shape[0]):
+            _store(c, i, _load(b, i) + s * _load(a, i))
+        s = s + _load(c, 0)
 
 
 def _fastest(run: object, repeats: int) -> float:
@@ -67,11 +81,11 @@ def measure(nodes: int, droppers: int, time_step: float, times_real_time: float,
     nodes: of both wires together. time_step: s.
     """
     real = np.float32 if single else np.float64
-    sums = np.full(512, 0.5, dtype=real)
+    sums = np.full((32, WIDE), 0.5, dtype=real)
     rounds = 20_000
     multiply_add(sums, 1)
     peak = 2 * CHAIN * sums.size * rounds / _fastest(lambda: multiply_add(sums, rounds), 5)
-    a, b, c = (np.full(2048, 0.5, dtype=real) for _ in range(3))
+    a, b, c = (np.full((128, WIDE), 0.5, dtype=real) for _ in range(3))
     triad(a, b, c, 1)
     rounds = 20_000
     cache = 3 * a.nbytes * rounds / _fastest(lambda: triad(a, b, c, rounds), 5)

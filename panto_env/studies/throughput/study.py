@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import platform
+import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from ...backend import WIDTH
-from ...base.machine import cores
+from ...base.errors import InputError
+from ...base.version import __version__
 from ...envs import IDS
 from . import roofline
 from .environments import by_cores, by_lanes
 from .plants import COUNTED, Report, cost_of_settings, in_single, plant_speed
+from .processor import describe
 
 
 def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
@@ -33,7 +36,8 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
     scaling = cost_of_settings(repeats, report)
     environments = by_lanes(repeats, report)
     return {
-        "machine": {"processor": _processor(), "cores": cores(), "python": platform.python_version()},
+        "version": __version__,
+        "machine": describe(),
         "repeats": repeats,
         "plants": plants,
         "roofline": asdict(limits),
@@ -42,10 +46,13 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
     }
 
 
-def _processor() -> str:
+def read(path: Path) -> dict[str, Any]:
+    """What ``run`` found on some machine, as it was stored. Raises InputError where a file holds none."""
     try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-        return f"{names[0]}, {len(names)} cores"
-    except (OSError, IndexError):
-        return platform.processor() or platform.machine()
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path} is no result of 'panto speed --json': {error}.") from error
+    parts = {"machine", "repeats", "plants", "roofline", "scaling", "environments"}
+    if not (isinstance(result, dict) and parts <= set(result)):
+        raise InputError(f"{path} is no result of 'panto speed --json'.")
+    return result

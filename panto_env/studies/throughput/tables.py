@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...base.table import Table
-from .environments import SHARED, SINGLE_YARDSTICK, VECTOR_YARDSTICK
 from .plants import COUNTED, LINE_SPANS, SPEED_KMH
 
 BEGIN, END = "<!-- panto speed --markdown -->", "<!-- end -->"
@@ -16,28 +15,48 @@ Row = dict[str, Any]
 
 def machine(result: Row) -> str:
     """Where and how it was measured."""
-    processor, python = result["machine"]["processor"], result["machine"]["python"]
-    return f"{processor}, Python {python}; medians of {result['repeats']}."
+    here = result["machine"]
+    return (
+        f"{here['processor']} ({here['family']}, vectors of {here['vector_bits']} bits), "
+        f"{_count(here['cores'], 'core')}, Python {here['python']}; medians of {result['repeats']}."
+    )
 
 
-def summary(result: Row) -> Table:
-    """Plants and environments, each beside its yardstick."""
-    rows = []
+def _numbers(results: Sequence[Row]) -> list[str]:
+    """What tells machines apart, empty of one alone."""
+    return [f"({k + 1})" for k in range(len(results))] if len(results) > 1 else [""]
+
+
+def machines(results: Sequence[Row]) -> list[str]:
+    """Where and how each was measured, numbered where they are several."""
+    numbered = zip(_numbers(results), results, strict=True)
+    return [f"{number} {machine(result)}".strip() for number, result in numbered]
+
+
+def summary(results: Sequence[Row]) -> Table:
+    """Plants, and environments over yardsticks, of one machine or several, side by side."""
+    columns = [_summary(result) for result in results]
+    headings = [f"{what} {number}".strip() for number in _numbers(results) for what in ("speed", "ratio")]
+    rows = [
+        (label, *(cell for column in columns for cell in column.get(label, ("–", "–"))))
+        for label in dict.fromkeys(label for column in columns for label in column)
+    ]
+    return Table("Beside yardsticks", ("", *headings), rows)
+
+
+def _summary(result: Row) -> dict[str, tuple[str, str]]:
+    rows: dict[str, tuple[str, str]] = {}
     for row in result["plants"]:
-        speed, cells = row["times_real_time"], ("–", "–")
+        speed, ratio, over = row["times_real_time"], "–", ""
         if row["id"] == COUNTED:
-            bound = result["roofline"]["bound"]
-            cells = (f"limit of the core: {bound:,.0f}", _ratio(speed, bound))
-        rows.append((f"plant of `{row['id']}`, one core", f"{speed:,.0f} × real time", *cells))
-    measured = {(row["id"], row["lanes"]): row for row in result["environments"]}
-    singles = [(row["id"], None) for row in result["plants"]]
-    for name, lanes in (*singles, *SHARED):
-        row, yardstick = measured[name, lanes], SINGLE_YARDSTICK if lanes is None else VECTOR_YARDSTICK
-        rate, reference = row["steps_per_second"], measured[yardstick, lanes]["steps_per_second"]
-        environment = _lanes(row) if lanes is None else f"{_lanes(row)}, {_count(row['cores'], 'core')}"
-        cells = (f"`{yardstick}`: {reference:,.0f}", _ratio(rate, reference))
-        rows.append((f"`{name}`, {environment}", f"{rate:,.0f} steps/s", *cells))
-    return Table("Beside yardsticks", ("", "speed", "yardstick", "ratio"), rows)
+            ratio, over = f"{speed / result['roofline']['bound']:.2g}", " over the core's limit"
+        rows[f"plant of `{row['id']}`, one core{over}"] = f"{speed:,.0f} × real time", ratio
+    singles = [row for row in result["environments"] if row["lanes"] is None]
+    for row in (*singles, *result["scaling"]["cores"]):
+        where = "" if row["lanes"] is None else f", {_count(row['cores'], 'core')}"
+        label = f"{_environment(row)}{where}, over `{row['yardstick']}`"
+        rows[label] = f"{row['steps_per_second']:,.0f} steps/s", f"{row['ratio']:.2g}"
+    return rows
 
 
 def details(result: Row) -> list[Table | str]:
@@ -55,8 +74,8 @@ def details(result: Row) -> list[Table | str]:
         )
         for row in scaling["discretisation"]
     ]
-    environments = [(f"{row['id']}, {_lanes(row)}", row) for row in result["environments"]]
-    cores = [(f"{row['id']}, {_lanes(row)}, {_count(row['cores'], 'core')}", row) for row in scaling["cores"]]
+    environments = [(_environment(row), row) for row in result["environments"]]
+    cores = [(f"{_environment(row)}, {_count(row['cores'], 'core')}", row) for row in scaling["cores"]]
     return [
         _plants(f"Plants, one core, {SPEED_KMH:g} km/h", "catenary", plants),
         _limits(result["roofline"]),
@@ -70,13 +89,14 @@ def details(result: Row) -> list[Table | str]:
     ]
 
 
-def markdown(result: Row) -> tuple[str, str]:
-    """The table of README.md and those of docs/speed.md, each between its markers."""
-    first = _marked([machine(result), summary(result).markdown])
+def markdown(results: Sequence[Row]) -> tuple[str, str]:
+    """The table of README.md and those of docs/speed.md, of the first machine, each between its markers."""
+    first = _marked(["  \n".join(machines(results)), summary(results).markdown])
     parts = [
-        part if isinstance(part, str) else f"**{part.title}**\n\n{part.markdown}" for part in details(result)
+        part if isinstance(part, str) else f"**{part.title}**\n\n{part.markdown}"
+        for part in details(results[0])
     ]
-    return first, _marked([machine(result), *parts])
+    return first, _marked([machine(results[0]), *parts])
 
 
 def _marked(parts: Sequence[str]) -> str:
@@ -105,17 +125,15 @@ def _environments(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
     cells = []
     for label, row in rows:
         rates = (f"{row[name]:,.0f}" for name in ("steps_per_second", "slowest", "fastest"))
-        cells.append((label, *rates))
-    return Table(title, ("environment", "steps/s", "slowest", "fastest"), cells)
+        reference = f"{row['yardstick_steps_per_second']:,.0f}"
+        cells.append((label, *rates, row["yardstick"], reference, f"{row['ratio']:.2g}"))
+    return Table(title, ("environment", "steps/s", "slowest", "fastest", "yardstick", "its", "ratio"), cells)
 
 
-def _lanes(row: Row) -> str:
-    return "single" if row["lanes"] is None else _count(row["lanes"], "lane")
+def _environment(row: Row) -> str:
+    lanes = "single" if row["lanes"] is None else _count(row["lanes"], "lane")
+    return f"`{row['id']}`{', ideal actuator and sensors' * row['ideal']}, {lanes}"
 
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
-
-
-def _ratio(speed: float, yardstick: float) -> str:
-    return f"{speed / yardstick:.2g}"

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....backend import LANES_ABREAST
+from ....backend import GROUPED
 from ....base.arrays import Array
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
@@ -26,7 +26,7 @@ class PeriodicLine(NamedTuple):
     spans_per_metre: float  # 1 / L (1/m)
 
 
-LANES_ABREAST[PeriodicLine] = 64
+GROUPED.add(PeriodicLine)
 
 
 class PeriodicWire(NamedTuple):

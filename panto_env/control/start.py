@@ -1,0 +1,59 @@
+"""What is drawn at the start of episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..plant.line_condition import DrawnLine, draw
+from ..plant.pantograph.build import with_scatter
+from ..plant.pantograph.schema import PantographData
+from .settings import RunSettings
+
+LaneGenerators = np.random.Generator | Callable[[int], np.random.Generator]
+"""The generator of all lanes, or that of each by its number."""
+
+
+_UNUSED = np.random.default_rng(0)
+
+
+class Starts(NamedTuple):
+    """What was drawn for some lanes."""
+
+    speed: Array  # (lanes,): m/s
+    line: Sequence[DrawnLine]  # of each lane
+    pantograph: Sequence[PantographData]  # likewise; empty where all are alike
+    way: Array  # (lanes,): that they run in (m)
+
+
+def draw_starts(
+    settings: RunSettings,
+    speeds: tuple[float, float],
+    droppers: int,
+    lanes: Any,
+    random: Callable[[int], np.random.Generator],
+) -> Starts:
+    """Draw the starts of lanes, (n,), each from its own generator, asked for only where something is random.
+
+    speeds: lowest and highest (m/s). droppers: of the line.
+    """
+    low, high = speeds
+    conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
+    lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
+    speed, way = np.full(len(lanes), low), np.zeros(len(lanes))
+    if not (low < high or lines_differ or scatter or run_in):
+        return Starts(speed, [draw(conditions, _UNUSED, droppers)] * len(lanes), [], way)
+    line, pantograph = [], []
+    for k, lane in enumerate(lanes.tolist()):
+        own = random(lane)
+        if low < high:
+            speed[k] = own.uniform(low, high)
+        line.append(draw(conditions, own, droppers))
+        if scatter:
+            pantograph.append(with_scatter(settings.pantograph, scatter, own))
+        if run_in > 0:
+            way[k] = own.uniform(0, run_in) * settings.catenary.span_length
+    return Starts(speed, line, pantograph, way)
