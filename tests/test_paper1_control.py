@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -309,6 +310,43 @@ def test_a_finer_grid_and_time_step_say_the_same_over_speed_gain_and_angle(outco
     assert best[:speeds] == best[speeds : 2 * speeds]
 
 
+HAMMERS = 10.0  # CL (%) above which a control hammers the wire, and rounding alone moves its figures
+MOVES = 0.05  # by how much of themselves, as the page says
+
+
+def same_row(title: str, headings: list[str], shown: list[str], printed: list[str]) -> bool:
+    """Whether a row of the page is this one, but for the last digit, which rounding may turn."""
+    losses = [k for k, heading in enumerate(headings) if k and ("CL" in title or "CL" in heading)]
+    hammers = any(number(row[k]) > HAMMERS for k in losses for row in (shown, printed))
+    for cell, other in zip(shown, printed, strict=True):
+        a, b = number(cell), number(other)
+        if math.isnan(a) or math.isnan(b):
+            if cell != other:
+                return False
+        elif abs(a - b) > 1.01 * 10.0 ** -len(cell.partition(".")[2]) + (MOVES * abs(a) if hammers else 0):
+            return False
+    return True
+
+
+def number(cell: str) -> float:
+    """A cell's number; nan where it is none."""
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def test_a_row_of_the_page_is_known_by_every_cell() -> None:
+    headings = ["control", "CL (%)", "σ (N)"]
+    same = partial(same_row, "Actuators", headings)
+    assert same(["a", "0.52", "16.1"], ["a", "0.53", "16.1"])
+    assert not same(["a", "0.52", "16.1"], ["b", "0.52", "16.1"])
+    assert not same(["a", "0.52", "16.1"], ["a", "0.54", "16.1"])
+    assert not same(["a", "9.52", "16.1"], ["a", "9.52", "16.3"])
+    assert same(["a", "31.49", "50.1"], ["a", "32.67", "51.0"])
+    assert not same(["a", "31.49", "50.1"], ["a", "31.49", "53.0"])
+
+
 @pytest.mark.slow
 def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     """Each table of the page with a title above it, cell by cell."""
@@ -335,10 +373,11 @@ def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     for title, block in shown:
         headings, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in block.splitlines())
         columns = [printed[title].headings.index(heading) for heading in headings]
-        cells = {tuple(row[column] for column in columns) for row in printed[title].cells}
-        assert {tuple(row) for row in rows} <= cells, title
+        found = [[row[column] for column in columns] for row in printed[title].cells]
+        for row in rows:
+            assert any(same_row(title, headings, row, other) for other in found), (title, row)
         if title == CLAIMS:
-            assert len(rows) == len(cells)
+            assert len(rows) == len(found)
 
 
 @pytest.mark.slow

@@ -165,7 +165,7 @@ def next_share(shares, role, taken, patience, first, last, size):
 
 @inlined
 def results_of(shares, role, own_0, own_1, own_2):
-    """The arrays for the results of a share: a thread's own; a helper has the leader's, of the same shapes."""
+    """The arrays for a share's results: a thread's own; a helper has the leader's, of the same shapes."""
     if role != HELPER:
         return own_0, own_1, own_2
     memory = shares.memory
