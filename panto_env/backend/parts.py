@@ -35,8 +35,9 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         state.library = library = _library(state)
 
         def optimise() -> None:
-            passes, builder = library._codegen._module_pass_manager()
-            passes.run(library._final_module, builder)
+            made = library._codegen._module_pass_manager()
+            passes, *builder = made if isinstance(made, tuple) else (made,)  # before Numba 0.62: no builder
+            passes.run(library._final_module, *builder)
 
         library._optimize_final_module = optimise
         done: bool = super().run_pass(state)
