@@ -26,8 +26,7 @@ from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise
-from ..plant.state import SAMPLE_ROWS, Row
-from ..plant.valid_range import Ending
+from ..plant.state import Row
 from .context import Context
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
@@ -35,10 +34,11 @@ from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
 from .observation import layout
 from .record import ending, refuse_divergence, trajectory
-from .running_figures import figures_so_far, no_figures, running_figures
+from .reset import reset
+from .running_figures import figures_so_far, running_figures
 from .settings import RunSettings, speed_range
-from .start import LaneGenerators, draw_starts
-from .state import Result, TaskRow
+from .start import LaneGenerators
+from .state import TaskRow
 from .step import control_steps, observe_start
 
 COASTED = 100
@@ -102,12 +102,12 @@ class Task:
         self.results = self.new_results()
         self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes, abreast)
         rms = settings.sensors.noise_rms
-        self._noise = None if rms is None else Noise(rms, lanes)
+        self.noise = None if rms is None else Noise(rms, lanes)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         slow = self.speed_range[0]
         longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
-        rows = int(self._steps(slow, longest)) + 1 if keep_samples else 1
+        rows = int(self.plant_steps(slow, longest)) + 1 if keep_samples else 1
         supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
         self.memory = record_size(lanes, rows - 1, supports, droppers)
         check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
@@ -151,7 +151,7 @@ class Task:
             self.plant.check_speed(speed)
         return low, high
 
-    def _steps(self, speed: Any, run_in: Any = 0) -> Any:
+    def plant_steps(self, speed: Any, run_in: Any = 0) -> Any:
         """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
 
         Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins.
@@ -164,7 +164,7 @@ class Task:
     @property
     def most_control_steps(self) -> int:
         """Control steps of an episode at the lowest speed: the longest that there are."""
-        return int(self._steps(self.speed_range[0])) // self.control_steps
+        return int(self.plant_steps(self.speed_range[0])) // self.control_steps
 
     def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
         """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.
@@ -173,62 +173,23 @@ class Task:
         far it runs in are drawn; it is not asked for where nothing is. Results go to ``results``, by default
         the task's own. Raises InputError where a run leaves the plant's valid range before its episode.
         """
-        lanes, results, plant = np.atleast_1d(lanes), results or self.results, self.plant
-        of_lane = random if callable(random) else lambda _: random
-        drawn = draw_starts(self.settings, self.speed_range, len(plant.model.droppers), lanes, of_lane)
-        plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, self._static_forces(drawn.speed))
-        run_in = np.round(drawn.way / (drawn.speed * self.control_interval))
-        end = self._steps(drawn.speed, run_in)
-        run_in = np.minimum(run_in, end // self.control_steps - 1).astype(np.int64)
-        self.speed[lanes] = drawn.speed
-        self._begin(lanes, end)
-        plant.clear(self.samples, lanes)
-        samples = of_lanes(plant.run.table[0], lanes)[:, :SAMPLE_ROWS]
-        self.sensors.reset(lanes, samples)
-        if self.keep_samples:
-            self.samples.rows[lanes, 0, 0] = samples
-        if self._noise is not None:
-            for lane in lanes.tolist():
-                self._noise.start(self.sensors, lane, of_lane(lane))
+        reset(self, np.atleast_1d(lanes), random, results or self.results)
+
+    def observe_start(self, lanes: Any, results: Results) -> None:
+        """Write into results what is observed of lanes, (n,), that stand at their start."""
         idle = self.episode.idle
         idle[:] = True
         idle[lanes] = False
         self._observe_start(*results[1:], int(lanes.min()), int(lanes.max()) + 1)
         idle[: self.lanes] = False
-        if run_in.any():
-            self._run_in(lanes[run_in > 0], run_in[run_in > 0], results)
 
-    def _begin(self, lanes: Any, end: Array) -> None:
-        """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
-        run, table = self.plant.run.table[0], self.episode.table
-        start = of_lanes(run, lanes)
-        rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
-        rows[:, TaskRow.END] = end
-        rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
-        set_lanes(table, lanes, rows)
-        self.running.peak[lanes] = -np.inf
-
-    def _run_in(self, lanes: Any, steps: Any, results: Results) -> None:
-        """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
-        left = np.zeros(self.lanes, dtype=np.int64)
-        left[lanes] = steps
-        self._coast(left, results)
-        for lane in lanes[self._ending(lanes) != Ending.NONE].tolist():
-            raise InputError(self.ending(lane))
-        self._begin(lanes, of_lanes(self.episode.table, lanes)[:, TaskRow.END])
-        results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
-
-    def _static_forces(self, speeds: Array) -> Array | None:
+    def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is to be met, else None."""
         if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
             self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
-
-    def _ending(self, lanes: Any) -> Array:
-        """Each lane's ``Ending``, (n,)."""
-        return of_lanes(self.episode.table, lanes)[:, TaskRow.ENDING]
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -265,8 +226,8 @@ class Task:
         action that is not finite.
         """
         self._action[...] = action
-        if self._noise is not None:
-            self._noise.prepare(self.sensors, skip)
+        if self.noise is not None:
+            self.noise.prepare(self.sensors, skip)
         if skip is None and results is None:
             return self._told(self._plain_step())  # the usual step, as short as it can be
         results = results or self.results
@@ -302,7 +263,7 @@ class Task:
         """Run all lanes, just reset, to their ends without actuators."""
         ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
         while not ended.all():
-            self._coast(np.where(ended, 0, at_once), self.results)
+            self.coast(np.where(ended, 0, at_once), self.results)
             ended = self.results.terminated | self.results.truncated
 
     @property
@@ -310,7 +271,7 @@ class Task:
         """Whether each lane can make control steps of its own, as many as its episode has at most."""
         return self.plant.lanes_abreast == 1
 
-    def _coast(self, steps: Any, results: Results) -> None:
+    def coast(self, steps: Any, results: Results) -> None:
         """Control steps without control, (lanes,) of them in each lane, whose episode must not end before.
 
         Where lanes go one by one a call makes all, none beyond an episode's end, and noise is drawn for the

@@ -1,0 +1,67 @@
+"""How episodes begin: lanes put at their start, run in, observed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..backend import of_lanes, set_lanes
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..plant.state import SAMPLE_ROWS, Row
+from ..plant.valid_range import Ending
+from .episode import Results
+from .running_figures import no_figures
+from .start import LaneGenerators, draw_starts
+from .state import Result, TaskRow
+
+if TYPE_CHECKING:
+    from .task import Task
+
+
+def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
+    """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
+    plant = task.plant
+    of_lane = random if callable(random) else lambda _: random
+    drawn = draw_starts(task.settings, task.speed_range, len(plant.model.droppers), lanes, of_lane)
+    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, task.static_forces(drawn.speed))
+    run_in = np.round(drawn.way / (drawn.speed * task.control_interval))
+    end = task.plant_steps(drawn.speed, run_in)
+    run_in = np.minimum(run_in, end // task.control_steps - 1).astype(np.int64)
+    task.speed[lanes] = drawn.speed
+    _begin(task, lanes, end)
+    plant.clear(task.samples, lanes)
+    samples = of_lanes(plant.run.table[0], lanes)[:, :SAMPLE_ROWS]
+    task.sensors.reset(lanes, samples)
+    if task.keep_samples:
+        task.samples.rows[lanes, 0, 0] = samples
+    if task.noise is not None:
+        for lane in lanes.tolist():
+            task.noise.start(task.sensors, lane, of_lane(lane))
+    task.observe_start(lanes, results)
+    if run_in.any():
+        _run_in(task, lanes[run_in > 0], run_in[run_in > 0], results)
+
+
+def _begin(task: Task, lanes: Any, end: Array) -> None:
+    """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
+    run, table = task.plant.run.table[0], task.episode.table
+    start = of_lanes(run, lanes)
+    rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
+    rows[:, TaskRow.END] = end
+    rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    set_lanes(table, lanes, rows)
+    task.running.peak[lanes] = -np.inf
+
+
+def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
+    """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
+    left = np.zeros(task.lanes, dtype=np.int64)
+    left[lanes] = steps
+    task.coast(left, results)
+    rows = of_lanes(task.episode.table, lanes)
+    for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
+        raise InputError(task.ending(lane))
+    _begin(task, lanes, rows[:, TaskRow.END])
+    results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
