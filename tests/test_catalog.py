@@ -14,8 +14,10 @@ from pydantic import BaseModel
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.three_span.schema import ThreeSpanData
 from panto_env.plant.pantograph.schema import PantographData
 
@@ -31,7 +33,10 @@ NOT_VALUES = {"kind", "name", "description", "sources"}
 
 def values(entry: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Key and value of every value that the file gives, the tables opened."""
-    for key in sorted(entry.model_fields_set - (NOT_VALUES if not prefix else set())):
+    given = entry.model_fields_set - (NOT_VALUES if not prefix else set())
+    if isinstance(entry, RigData):  # its line has sources of its own, and gives what every line has
+        given -= {"line", *CatenaryData.model_fields}
+    for key in sorted(given):
         item = getattr(entry, key)
         if isinstance(item, BaseModel):
             yield from values(item, f"{prefix}{key}.")

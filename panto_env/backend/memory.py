@@ -37,7 +37,7 @@ class _Parts(NamedTuple):
 
     kind: type
     blocks: list[tuple[NDArray[np.uint8], int]]  # memory that arrays share, and its place in a page (bytes)
-    fields: list[Any]  # a ``_View`` for each array; what is no array is as it was
+    fields: list[Any]  # a ``_View`` for each array, ``_Parts`` for each named tuple; the rest is as it was
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: the memory is copied when it is put together."""
@@ -71,6 +71,8 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
     number = {key: block for block, key in enumerate(used)}
 
     def field(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return _apart(value)[1][0]
         if not isinstance(value, np.ndarray):
             return value
         key = id(_owner(value))
@@ -87,6 +89,8 @@ def _together(parts: _Parts) -> Any:
         memory[-1][:] = content
 
     def value(field: Any) -> Any:
+        if isinstance(field, _Parts):
+            return _together(field)
         if not isinstance(field, _View):
             return field
         return np.ndarray(field.shape, field.kind, memory[field.block], field.offset, field.strides)

@@ -3,7 +3,7 @@
 To turn Python tuples of fifty arrays into what a kernel works on takes a microsecond in each call, as
 long as a step of the plant. ``pack`` does it once; the kernel is given where each tuple lies and reads the
 fields that it uses, as ``line.span``. The arrays must keep their memory, as those of tuples that are never
-rebuilt do.
+rebuilt do. A named tuple may have another one as a field.
 """
 
 from __future__ import annotations
@@ -41,14 +41,16 @@ class Packed:
     def __init__(self, arguments: tuple[Any, ...]) -> None:
         """Pack ``arguments``, which stay alive with this object."""
         self.arguments = arguments
-        self._memory = [np.concatenate([_words(field) for field in each]) for each in arguments]
+        self._memory = [_words(each) for each in arguments]
         self._table = np.array([memory.ctypes.data for memory in self._memory], dtype=np.intp)
         self.address = self._table.ctypes.data
         self.type = PackedType(tuple(type_of(argument) for argument in arguments))
 
 
 def _words(value: Any) -> NDArray[np.int64]:
-    """The compiled form of an array, a float or an int, in words of 8 bytes."""
+    """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
+    if isinstance(value, tuple):
+        return np.concatenate([_words(field) for field in value])
     if isinstance(value, np.ndarray):  # no owner, no parent
         return np.array([0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides])
     return np.array([float(value)]).view(np.int64) if isinstance(value, float) else np.array([int(value)])
@@ -59,13 +61,15 @@ _types: dict[Any, Any] = {}
 
 def type_of(value: Any) -> Any:
     """Numba's type of a value; looked up by what it depends on, since to find it anew takes longer."""
-    key = (type(value), *map(_kind, value)) if isinstance(value, tuple) else (_kind(value),)
+    key = _kind(value)
     if key not in _types:
         _types[key] = numba.typeof(value)
     return _types[key]
 
 
 def _kind(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return (type(value), *map(_kind, value))
     if not isinstance(value, np.ndarray):
         return type(value)
     flags = value.flags
@@ -148,13 +152,20 @@ class _PackedFields(AttributeTemplate):  # type: ignore[misc]
 
     def generic_resolve(self, packed: PackedTupleType, name: str) -> Any:
         form = packed.form
-        return form[form.fields.index(name)] if name in form.fields else None
+        if name not in form.fields:
+            return None
+        field = form[form.fields.index(name)]
+        return PackedTupleType(field) if isinstance(field, types.BaseNamedTuple) else field
 
 
 @lower_getattr_generic(PackedTupleType)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, packed: PackedTupleType, value: Any, name: str) -> Any:
     form = builder.bitcast(value, context.get_value_type(packed.form).as_pointer())
-    return _constant(builder, cgutils.gep_inbounds(builder, form, 0, packed.form.fields.index(name)))
+    number = packed.form.fields.index(name)
+    place = cgutils.gep_inbounds(builder, form, 0, number)
+    if isinstance(packed.form[number], types.BaseNamedTuple):
+        return builder.bitcast(place, cgutils.voidptr_t)
+    return _constant(builder, place)
 
 
 def pack(*arguments: Any) -> Any:

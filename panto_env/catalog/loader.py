@@ -82,6 +82,8 @@ def _read(family: str, path: Path, _modified: int) -> Any:
     try:
         table = {"name": path.stem, **_split(read_toml(path), "", sources), "sources": sources}
         schema = _schema(family, table)
+        if "line" in schema.model_fields and isinstance(table.get("line"), str):
+            table["line"] = load_catenary(table["line"])  # a rig may name the line that it computes
         return schema.model_validate(table)
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error

@@ -28,6 +28,8 @@ class Ending(IntEnum):
     STOP = 3  # the contact wire reached the steady arm's stop
     WIRES = 4  # contact wire and messenger wire touched
     DIVERGED = 5  # the computation did: there is no result
+    STROKE = 6  # a rig's cylinder came to the end of its stroke
+    LOAD_CELL = 7  # the force on a rig left the range of its load cell
 
 
 ENDING = constants(Ending)
@@ -43,4 +45,8 @@ def reason(ending: Ending, free_uplift: float) -> str:
         f"{1e3 * free_uplift:.0f} mm above its rest at a support",
         Ending.WIRES: "contact wire and messenger wire touched",
         Ending.DIVERGED: "the computation diverged",
+        Ending.STROKE: "the rig's cylinder came to the end of its stroke, as it does where the loop is "
+        "unstable",
+        Ending.LOAD_CELL: "the force left the range of the rig's load cell, as it does where the loop is "
+        "unstable",
     }[ending]

@@ -17,6 +17,7 @@ KINDS = [
     "flexible",
     "three_span",
     "periodic_stiffness",
+    "rig",
 ]
 """Words that a line's TOML file may have under ``kind``: the names of the modules."""
 CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}

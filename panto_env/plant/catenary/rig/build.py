@@ -1,0 +1,226 @@
+"""A rig for a number of lanes: the line that is computed, and the constants of all that stands about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import InputError
+from ...line_condition import DrawnLine
+from ...numerics import Numerics, Runs
+from ...pantograph.build import exponential
+from ..flexible import KIND as FLEXIBLE
+from ..protocol import CatenaryModel, StartPoint
+from ..three_span import KIND as THREE_SPAN
+from .arrays import TERMS, FitRow, RigLine, RigRow, RigWire
+from .schema import Computer, RigData
+
+LINES = {"flexible": FLEXIBLE, "three_span": THREE_SPAN}
+STEPS = 4
+"""Time steps between two samples at least, which the load cell's filter and the cylinder want."""
+NOISE_SAMPLES = 1 << 16
+ORDER = 3
+"""Of the polynomial of "prediction": the one that Horiuchi et al. take."""
+FIT_FREQUENCY, FIT_MEMORY = 25.0, 1.0
+"""Of "adaptive": corner (Hz) of the low-pass of both signals, and time (s) after which a sample counts
+exp(-1)."""
+FIT_AMPLITUDE, FIT_OMEGA = 5e-3, 2 * np.pi * 10
+"""Usual motion of the contact point, to scale its terms by (m, rad/s)."""
+FIT_DOUBT, FIT_ERROR = 0.1, 2e-5
+"""What is not known of a coefficient at the start, as its share, and rms error of a fitted command (m)."""
+FIT_BOUNDS = ((0.9, 0.4, 0.2), (1.1, 2.5, 5.0))
+"""Least and largest coefficients, as shares of those that are assumed."""
+
+
+class Rig:
+    """A pantograph on a cylinder that follows a line's computed contact point."""
+
+    massless = False
+    contact_gain = 0.0  # the cylinder does not give way within a step
+
+    def __init__(
+        self,
+        data: RigData,
+        *,
+        lanes: int,
+        spans: int,
+        numerics: Numerics,
+        runs: Runs,
+    ) -> None:
+        """Build the line that is computed, and what stands about it.
+
+        Raises InputError where the line cannot be computed so, or is to be uneven: irregularity is no part
+        of the motion that the cylinder follows.
+        """
+        if any(condition.waves for condition in runs.conditions):
+            raise InputError(
+                f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
+                "wire; take a line_condition without irregularity and wear, such as 'new'."
+            )
+        computer = data.computer
+        interval = runs.whole_part(computer.interval)
+        if abs(interval - computer.interval) > 1e-9:
+            raise InputError(
+                f"The control interval of {1e3 * runs.control_interval:g} ms must be a whole number of the "
+                f"rig's sampling intervals of {1e3 * computer.interval:g} ms."
+            )
+        own_runs = runs._replace(control_interval=computer.interval)
+        if numerics.time_step is None and data.line.kind == "three_span":
+            numerics = numerics.model_copy(update={"time_step": computer.interval / STEPS})
+        self.model: CatenaryModel = LINES[data.line.kind].model(
+            data.line, lanes=lanes, spans=spans, numerics=numerics, runs=own_runs
+        )
+        model = self.model
+        self.time_step = model.time_step
+        self.grid: Mapping[str, float] = model.grid
+        self.wave_speed, self.supports, self.droppers = model.wave_speed, model.supports, model.droppers
+        ahead = runs.speeds[1] * (computer.interval + self.time_step)  # the computer is so far ahead
+        self.length = model.length - ahead
+        self.usual_end = min(model.usual_end, self.length)
+        self.line = constants(data, model.line, self.time_step)
+        self.wire = at_rest(data, model.wire, lanes, self.time_step)
+        start = model.start_point
+        self.start_point = StartPoint(
+            start.height, start.wire_compliance, start.spring_compliance + self.line.yield_per_newton
+        )
+        self._assumed = assumed(data)
+
+    def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
+        """Put the computed line at rest under a force (N), and the cylinder where its contact point is."""
+        self.model.settle(lane, drawn, force)
+        start, wire = self.model.start_point, self.wire
+        for each in (wire.table, wire.late, wire.past, wire.fit, wire.fit_past, wire.covariance):
+            each[lane] = 0.0
+        wire.table[lane, RigRow.DATUM] = (
+            start.height + (start.wire_compliance + start.spring_compliance) * force
+        )
+        wire.table[lane, [RigRow.FORCE, RigRow.FILTERED, RigRow.READING]] = force
+        wire.coefficients[lane] = self._assumed
+        wire.covariance[lane] = np.diag((FIT_DOUBT * FIT_AMPLITUDE / FIT_ERROR * np.ones(TERMS)) ** 2)
+
+    def rest_tension(self, lane: int) -> Array:
+        """Tension (N), (droppers,), of the computed line's droppers at rest."""
+        return self.model.rest_tension(lane)
+
+
+def constants(data: RigData, line: Any, time_step: float) -> RigLine:
+    """Constants of a rig about a computed line, whose time step (s) is the rig's."""
+    cylinder, cell, computer = data.cylinder, data.load_cell, data.computer
+    omega = 2 * np.pi * cylinder.natural_frequency
+    corner, ratio = 2 * np.pi * cell.filter_frequency, math.sqrt(0.5)
+    random = np.random.default_rng(computer.seed)
+    noise = random.standard_normal((NOISE_SAMPLES, 2)) * [cell.noise, cylinder.displacement_noise]
+    whole = math.floor(computer.delay / time_step + 1e-9)
+    known = assumed(data)
+    memory = math.exp(-computer.interval / FIT_MEMORY)
+    return RigLine(
+        line=line,
+        cylinder=second_order(omega, cylinder.damping_ratio, time_step),
+        cylinder_half=second_order(omega, cylinder.damping_ratio, time_step / 2),
+        largest_move=cylinder.speed_limit * time_step,
+        largest_height=cylinder.stroke / 2,
+        yield_per_newton=1 / cylinder.stiffness,
+        time_step=time_step,
+        cell_filter=second_order(corner, ratio, time_step),
+        cell_mass=cell.mass,
+        cell_mass_known=cell.compensated_mass,
+        force_range=cell.force_range,
+        force_unit=2 * cell.force_range / 2**computer.input_bits,
+        height_unit=cylinder.stroke / 2**computer.output_bits,
+        noise=noise,
+        interval_steps=round(computer.interval / time_step),
+        force_age=force_age(data) / time_step,
+        late_share=max(computer.delay / time_step - whole, 0.0),
+        bank=bank(data),
+        lead=lead(data),
+        fit_filter=second_order(2 * np.pi * FIT_FREQUENCY, ratio, computer.interval),
+        fit_scale=FIT_AMPLITUDE * FIT_OMEGA ** np.arange(TERMS),
+        fit_bounds=np.array(FIT_BOUNDS) * known,
+        fit_doubt=TERMS * (FIT_DOUBT * FIT_AMPLITUDE / FIT_ERROR) ** 2,
+        fit_memory=memory if computer.compensation == "adaptive" else 0.0,
+    )
+
+
+def second_order(omega: float, ratio: float, time_step: float) -> Array:
+    """Exact step, (2, 3), of y'' + 2 ratio omega y' + omega^2 y = omega^2 u for an input u that is held."""
+    system = np.zeros((3, 3))
+    system[0, 1], system[1] = 1.0, (-(omega**2), -2 * ratio * omega, omega**2)
+    return exponential(system * time_step)[:2].copy()
+
+
+def other_delays(computer: Computer) -> float:
+    """Delays (s) between command and cylinder besides its own lag: the computer's, and the held output's."""
+    return computer.delay + computer.interval / 2
+
+
+def force_age(data: RigData) -> float:
+    """How late (s) a sample of the force is: by its filter, and by half an interval, as it is held."""
+    return math.sqrt(2) / (2 * np.pi * data.load_cell.filter_frequency) + data.computer.interval / 2
+
+
+def outer_lead(data: RigData) -> float:
+    """Lead (s) that is wanted besides that of the cylinder: the line is computed an interval ahead, but under
+    a force that is late.
+    """
+    return force_age(data) - data.computer.interval
+
+
+def assumed(data: RigData) -> Array:
+    """Coefficients, (terms,), of height, velocity (s) and acceleration (s^2) that lead to a command.
+
+    The inverse of the assumed transfer function and of the delay before it, up to the square of frequency.
+    """
+    computer, cylinder = data.computer, data.cylinder
+    omega = 2 * np.pi * (computer.assumed_frequency or cylinder.natural_frequency)
+    ratio = cylinder.damping_ratio if computer.assumed_damping is None else computer.assumed_damping
+    delay = other_delays(computer)
+    return np.array([1.0, 2 * ratio / omega + delay, 1 / omega**2 + 2 * ratio / omega * delay + delay**2 / 2])
+
+
+def lead(data: RigData) -> Array:
+    """Coefficients of a command from those of the cylinder, (terms used, terms)."""
+    if data.computer.compensation in ("none", "prediction"):
+        return np.array([[1.0, 0.0, 0.0]])
+    more = outer_lead(data)
+    return np.array([[1.0, 0.0, 0.0], [more, 1.0, 0.0], [more**2 / 2, more, 1.0]])
+
+
+def bank(data: RigData) -> Array:
+    """Each term of a command from the past heights of the contact point, an interval apart, (terms, past)."""
+    computer: Computer = data.computer
+    h = computer.interval
+    if computer.compensation in ("inverse", "adaptive"):
+        return np.array([[1, 0, 0, 0], np.array([3, -4, 1, 0]) / (2 * h), np.array([2, -5, 4, -1]) / h**2])
+    weights = np.zeros((TERMS, 1))
+    if computer.compensation == "prediction":
+        wanted = assumed(data)[1] + outer_lead(data)
+        apart = max(1, round(wanted / h))
+        weights = np.zeros((TERMS, ORDER * apart + 1))
+        nodes, at = -np.arange(ORDER + 1.0), wanted / (apart * h)
+        for k in range(ORDER + 1):
+            others = np.delete(nodes, k)
+            weights[0, k * apart] = np.prod((at - others) / (nodes[k] - others))
+        return weights
+    weights[0, 0] = 1.0
+    return weights
+
+
+def at_rest(data: RigData, wire: Any, lanes: int, time_step: float) -> RigWire:
+    """What moves, in all lanes, at rest."""
+    whole = math.floor(data.computer.delay / time_step + 1e-9)
+    past = bank(data).shape[1]
+    return RigWire(
+        line=wire,
+        table=np.zeros((lanes, len(RigRow))),
+        late=np.zeros((lanes, whole + 2)),
+        past=np.zeros((lanes, past)),
+        coefficients=np.zeros((lanes, TERMS)),
+        fit=np.zeros((lanes, len(FitRow))),
+        fit_past=np.zeros((lanes, past)),
+        covariance=np.zeros((lanes, TERMS, TERMS)),
+        scratch=np.zeros((lanes, 2, TERMS)),
+    )
