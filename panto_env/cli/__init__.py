@@ -40,7 +40,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands, those of installed packages too."""
-    from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
+    from . import catalogue, identify, reproduce, rig, simulate, speed, sweep, validate
 
     app = typer.Typer(
         name="panto",
@@ -58,6 +58,7 @@ def make_app() -> typer.Typer:
     app.command()(identify.identify)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
+    app.command()(rig.rig)
     for name, point in plugins.installed(plugins.COMMANDS).items():
         app.command(name)(plugins.load(point))
     return app

@@ -154,7 +154,8 @@ def second_order(omega: float, ratio: float, time_step: float) -> Array:
 
 def other_delays(computer: Computer) -> float:
     """Delays (s) between command and cylinder besides its own lag: the computer's, and the held output's."""
-    return computer.delay + computer.interval / 2
+    delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
+    return delay + computer.interval / 2
 
 
 def force_age(data: RigData) -> float:

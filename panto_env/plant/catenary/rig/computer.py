@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from ....backend import inlined
-from ..protocol import advance_wire, apply_force, end_step, look_at_contact, place_contact
+from ....backend import inlined, kernel, open_packed
+from ..protocol import (
+    advance_wire,
+    apply_force,
+    end_step,
+    ending_by_wire,
+    look_at_contact,
+    place_contact,
+)
 from .arrays import FIT_ROW, RIG_ROW, TERMS
 
 
@@ -107,3 +114,14 @@ def take_sample(rig, wire, lane, contact, force, measured):
     command = command_for(rig, wire, lane, own[RIG_ROW.TARGET])
     own[RIG_ROW.COMMAND] = min(max(command, -rig.largest_height), rig.largest_height)
     own[RIG_ROW.SAMPLES] += 1.0
+
+
+@kernel
+def sample(packed, force, measured):
+    """``take_sample`` by itself, of lane 0, for a computer that drives a real rig. packed: rig and wire."""
+    rig, wire = open_packed(packed)
+    take_sample(rig, wire, 0, 0, force, measured)
+    own = wire.table[0]
+    own[RIG_ROW.STEPS] += rig.interval_steps
+    own[RIG_ROW.STOPPED] = ending_by_wire(rig.line, wire.line, 0)
+    return own[RIG_ROW.COMMAND]

@@ -81,6 +81,9 @@ class Computer(Settings):
     assumed_damping: Annotated[float, Between(0.05, 5)] | None = Field(
         None, description="damping ratio that is compensated for (-), the cylinder's own by default"
     )
+    assumed_delay: Annotated[float, Between(0, 0.1, "s")] | None = Field(
+        None, description="delay of the computer that is compensated for (s), its own by default"
+    )
     seed: Annotated[int, Between(0, 1_000_000)] = Field(
         0, description="of the noise of load cell and displacement, which is the same in each run"
     )

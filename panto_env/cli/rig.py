@@ -1,0 +1,89 @@
+"""``panto rig``: a hardware-in-the-loop rig beside the line itself."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from ..analysis.options import Seed, Spans, parse_spans, with_settings
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+
+RIGS = ("rig", "rig-flexible")
+PANTOGRAPH, SPEED_KMH = "dsa350", 250.0
+REFERENCE = "en50318-2002"
+"""Line beside which a rig stands whose own line has no droppers: paper 2's finite elements were of it."""
+
+
+@with_settings(only=("pantograph", "speed_kmh", "actuator", "sensors"), defaults=False)
+def rig(
+    settings: dict[str, Any],
+    rigs: Annotated[
+        list[str] | None,
+        typer.Argument(help=f"Rigs, of the catalogue or as TOML files. [default: {' '.join(RIGS)}]"),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            help="Line that the rig is to be; by default the one that it computes, where that has droppers, "
+            f"else {REFERENCE}."
+        ),
+    ] = None,
+    policy: Annotated[str | None, typer.Option(help="Policy, on the rig and under the line.")] = None,
+    stability: Annotated[
+        bool, typer.Option("--stability", help="Find what delay and lag each loop bears; some 20 s a rig.")
+    ] = False,
+    clock: Annotated[
+        float,
+        typer.Option(min=0, max=3600, help="Run each rig's computer against the clock for so long (s)."),
+    ] = 0.0,
+    spans: Spans = None,
+    seed: Seed = 0,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Run a pantograph on a rig and under the line itself, and print what of the line the rig follows.
+
+    By default that is pantograph dsa350 at 250 km/h, as in paper 2.
+    """
+    from ..catalog import load_catenary, load_pantograph
+    from ..rig import report
+    from ..rig.comparison import compare
+    from ..rig.computer import load_rig
+
+    chosen, facts, tables, pairs = parse_spans(spans), [], [], []
+    pantograph = load_pantograph(settings.pop("pantograph", PANTOGRAPH))
+    speed_kmh = settings.pop("speed_kmh", SPEED_KMH)
+    loaded = [load_rig(name) for name in rigs or RIGS]
+    with progress_console.status("running") as status:
+        for data in loaded:
+            status.update(f"running {data.name}")
+            own = data.line if data.line.kind == "flexible" else REFERENCE
+            line = load_catenary(own if reference is None else reference)
+            pair = compare(data, line, pantograph, speed_kmh, chosen, policy=policy, seed=seed, **settings)
+            pairs.append(pair)
+            facts.append(report.pair_facts(pair))
+            tables.append(report.pair_table(pair))
+            if stability:
+                status.update(f"stability of {data.name}")
+                found = report.stability(data, pantograph, speed_kmh)
+                facts[-1]["stability"] = report.stability_facts(found)
+                tables.append(report.stability_table(data, found))
+            if clock:
+                status.update(f"{data.name} against the clock")
+                timing = report.clocked(data, pantograph, speed_kmh, clock)
+                facts[-1]["clock"] = report.timing_facts(timing)
+                tables.append(report.timing_table(data.name, timing))
+    if plot is not None:
+        from ..analysis.plots import save
+        from ..rig.plots import plot_pairs
+
+        save(plot_pairs(pairs), plot)
+    if json:
+        print_json(facts)
+        return
+    console.print(f"{pantograph.name} at {speed_kmh:g} km/h, policy {policy or 'passive'}")
+    for table in tables:
+        print_table(table)
+    for pair in pairs:
+        console.print(report.followed_sentence(pair), soft_wrap=True)

@@ -1,0 +1,60 @@
+"""Paper 2's Figs 5 to 8: displacements, contact force and its spectrum, on rigs beside the line itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..analysis.plots import mark_supports
+from ..metrics.low_pass import low_pass_in_place
+from .comparison import Pair, amplitudes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LINE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": "--"}
+SHOWN_SPANS = 3
+HIGHEST = 30.0  # Hz
+PANELS = (
+    ("head", 1e3, "collectors (mm)"),
+    ("frame", 1e3, "frame (mm)"),
+    ("contact_force", 1.0, "contact force to 20 Hz (N)"),
+)
+
+
+def plot_pairs(pairs: Sequence[Pair]) -> Figure:
+    """Dynamic part of the displacements and the force along some spans, and the force's spectrum below."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 11), layout="constrained")
+    axes = figure.subplots(4, 1)
+    first = pairs[0].reference
+    inside = first.inside(pairs[0].spans)
+    begin = first.position[inside][0]
+    end = begin + SHOWN_SPANS * first.span_length
+    drawn = {f"on {pair.rig.catenary}": pair.rig for pair in pairs}
+    drawn |= {f"under line {pair.reference.catenary}": pair.reference for pair in pairs}
+    for axis, (name, scale, label) in zip(axes, PANELS, strict=False):
+        for k, (who, run) in enumerate(drawn.items()):
+            values = getattr(run, name)
+            if name == "contact_force":
+                values = low_pass_in_place(values, run.time_step)
+            values = scale * (values - values[run.inside(pairs[0].spans)].mean())
+            shown = (run.position >= begin) & (run.position <= end)
+            style = LINE_STYLE if who.startswith("under") else {"color": f"C{k}"}
+            axis.plot(run.position[shown], values[shown], label=who, **style)
+        axis.set(ylabel=f"{label}, without mean", xlim=(begin, end))
+        axis.grid(color="0.92")
+        mark_supports(axis, first)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False)
+    axes[2].set_xlabel("position (m); grey lines: supports")
+    for k, (who, run) in enumerate(drawn.items()):
+        force = run.contact_force[run.inside(pairs[0].spans)]
+        frequency, amplitude = amplitudes(force, run.time_step)
+        shown = frequency <= HIGHEST
+        style = LINE_STYLE if who.startswith("under") else {"color": f"C{k}"}
+        axes[3].plot(frequency[shown], amplitude[shown], label=who, **style)
+    axes[3].set(xlabel="frequency (Hz)", ylabel="amplitude of the contact force (N)", xlim=(0, HIGHEST))
+    axes[3].grid(color="0.92")
+    figure.suptitle(f"{first.pantograph} at {first.speed_kmh:g} km/h, as Figs 5 to 8 of paper 2")
+    return figure

@@ -1,0 +1,146 @@
+"""What is found out about a rig, as plain data and as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.table import Table
+from ..plant.catenary.rig import RigData
+from ..plant.pantograph.schema import PantographData
+from . import growth
+from .comparison import FOLLOWED, Pair
+from .computer import RigComputer
+from .margins import SLOWEST, Loop, Margins
+from .real_time import Timing, against_the_clock
+
+QUANTITIES = (
+    ("contact force (N)", "contact_force", 1.0),
+    ("collectors (mm)", "head", 1e3),
+    ("frame (mm)", "frame", 1e3),
+)
+"""What is compared: words with the unit, attribute of ``Trajectory``, scale."""
+SEARCHED = 2.5
+"""How far the delay that a simulation bears is looked for, as a multiple of the linear loop's."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the loop of a rig bears: by its frequency response, and by simulation."""
+
+    linear: Margins
+    delay: float  # on top, not compensated for, that the simulation bears (s)
+    linear_cylinder: float  # slowest natural frequency of the cylinder, compensated for as it is (Hz)
+    cylinder: float  # likewise, in the simulation (Hz)
+
+
+def stability(rig: RigData, pantograph: PantographData, speed_kmh: float) -> Stability:
+    """Both looks at the stability of a rig."""
+    loop = Loop(rig, pantograph, speed_kmh)
+    linear = loop.margins()
+    return Stability(
+        linear,
+        growth.bearable_delay(rig, pantograph, speed_kmh, SEARCHED * linear.delay),
+        loop.slowest_cylinder(),
+        growth.slowest_cylinder(rig, pantograph, speed_kmh),
+    )
+
+
+def clocked(
+    rig: RigData,
+    pantograph: PantographData,
+    speed_kmh: float,
+    seconds: float,
+    report: Callable[[float], None] = lambda share: None,
+) -> Timing:
+    """The rig's computer against the wall clock, for so long (s)."""
+    computer = RigComputer(rig, speed_kmh, force=pantograph.nominal_force(speed_kmh / 3.6))
+    return against_the_clock(computer, seconds, report)
+
+
+def pair_facts(pair: Pair) -> dict[str, Any]:
+    """A rig beside the line itself, as plain data."""
+    return {
+        "rig": pair.rig.catenary,
+        "reference": pair.reference.catenary,
+        "followed_hz": pair.followed(),
+        "first_not_followed": vars(pair.first_lost()),
+        "bands": {name: [vars(band) for band in pair.bands(name)] for _, name, _ in QUANTITIES},
+    }
+
+
+def stability_facts(found: Stability) -> dict[str, Any]:
+    """The same of stability."""
+    return vars(found) | {"linear": vars(found.linear)}
+
+
+def timing_facts(timing: Timing) -> dict[str, Any]:
+    """The same of steps against the clock."""
+    return {
+        "interval": timing.interval,
+        "steps": len(timing.steps),
+        "median": timing.of_step(0.5),
+        "within_999_in_1000": timing.of_step(0.999),
+        "worst": float(timing.steps.max()),
+        "latest_begin": float(timing.late.max()),
+        "missed": timing.missed,
+        "headroom": timing.headroom,
+    }
+
+
+def pair_table(pair: Pair) -> Table:
+    """Rms by band of force and displacements, and of the difference."""
+    rows, ends = [], []
+    for words, name, scale in QUANTITIES:
+        for band in pair.bands(name):
+            sizes = (f"{scale * band.reference:.2f}", f"{scale * band.rig:.2f}", f"{100 * band.error:.1f}")
+            rows.append((words, f"{band.low:g}-{band.high:g}", *sizes))
+        ends.append(len(rows) - 1)
+    title = f"{pair.rig.catenary} beside {pair.reference.catenary}, rms by band of frequency"
+    return Table(title, ("", "Hz", "line itself", "rig", "difference (%)"), rows, 2, tuple(ends))
+
+
+def followed_sentence(pair: Pair) -> str:
+    """How far a rig follows the line, as a sentence."""
+    lost = pair.first_lost()
+    return (
+        f"{pair.rig.catenary} follows the force on {pair.reference.catenary} within {100 * FOLLOWED:g} % to "
+        f"{pair.followed():g} Hz; from {lost.low:g} to {lost.high:g} Hz the difference is "
+        f"{100 * lost.error:.0f} % of {lost.reference:.2g} N."
+    )
+
+
+def stability_table(rig: RigData, found: Stability) -> Table:
+    """What a rig's loop bears."""
+    lowest = SLOWEST * rig.cylinder.natural_frequency
+
+    def slowest(frequency: float) -> str:
+        return f"{frequency:.1f}" if frequency > lowest else f"below {lowest:.1f}"
+
+    linear = found.linear
+    rows = [
+        ("delay on top (ms)", f"{1e3 * linear.delay:.2f}", f"{1e3 * found.delay:.2f}"),
+        ("slowest cylinder (Hz)", slowest(found.linear_cylinder), slowest(found.cylinder)),
+        ("gain margin (-)", f"{linear.gain:.2f}", "–"),
+        ("phase margin (degrees)", f"{linear.phase:.0f}", "–"),
+        ("frequency at which delay makes it oscillate (Hz)", f"{linear.frequency:.1f}", "–"),
+    ]
+    return Table(f"What the loop of {rig.name} bears", ("", "linear loop", "simulation"), rows)
+
+
+def timing_table(name: str, timing: Timing) -> Table:
+    """Steps against the clock."""
+    late = np.mean(timing.late > 0.1 * timing.interval)
+    rows = [
+        ("median step (us)", f"{1e6 * timing.of_step(0.5):.1f}"),
+        ("99.9 % of the steps within (us)", f"{1e6 * timing.of_step(0.999):.1f}"),
+        ("longest step (us)", f"{1e6 * timing.steps.max():.1f}"),
+        ("latest begin (us)", f"{1e6 * timing.late.max():.1f}"),
+        (f"missed deadlines of {len(timing.steps):,}", f"{timing.missed:,}"),
+        ("steps begun late by a tenth of the interval (%)", f"{100 * late:.2f}"),
+        ("interval over median step (-)", f"{timing.headroom:.0f}"),
+    ]
+    return Table(f"Computer of {name} at {1 / timing.interval:g} Hz against the clock", ("", "found"), rows)
