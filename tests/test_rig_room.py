@@ -33,7 +33,7 @@ def step_often(computer, force, count):
 
 
 def test_the_computer_computes_what_the_simulated_rig_does():
-    """The readings of a simulated rig, given to the program by itself: the same heights of the contact point."""
+    """A simulated rig's readings, given to the program by itself: the same heights of the contact point."""
     data = load_catenary("rig-flexible")
     plant = Plant(data, PANTOGRAPH, runs=Runs((SPEED / 3.6, SPEED / 3.6), data.computer.interval))
     plant.start(0, SPEED / 3.6)
