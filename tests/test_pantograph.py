@@ -3,8 +3,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from panto_env.catalog import available, load_pantograph
+from panto_env import simulate
+from panto_env.backend import JIT, columns, kernel, new_columns
+from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.plant.numerics import Numerics
 from panto_env.plant.pantograph import build as pantograph
+from panto_env.plant.pantograph.step import move_freely
+from panto_env.plant.plant import Plant
+from panto_env.plant.state import ROW, Row
 
 pytestmark = pytest.mark.plain
 
@@ -71,3 +77,46 @@ def test_scatter_is_of_its_size_and_leaves_nothing_out():
         changes = np.log(np.array([getattr(each, name) for each in drawn]) / getattr(data, name))
         assert changes.std(axis=0) == pytest.approx([0.1] * 3, rel=0.2), name
         assert np.abs(np.corrcoef(changes.T) - np.eye(3)).max() < 0.25, name
+
+
+@kernel
+def swing(line, pantographs, run, heights):
+    """Free motion of a pantograph of one mass, from where it is."""
+    own, after = columns(line, run.table[0], 0), new_columns(line, 2)
+    for k in range(heights.size):
+        move_freely(pantographs, own, after, 0)
+        own[ROW.STATE] = after[0]
+        own[ROW.STATE + 1] = after[1]
+        heights[k] = own[ROW.STATE]
+
+
+def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
+    """A frame alone on its spring: the closed form of Coulomb friction."""
+    spring, friction = 4000.0, 6.0
+    changed = {"masses": (10.0,), "stiffnesses": (spring,), "dampings": (0.0,), "frame_friction": friction}
+    data = load_pantograph("dsa350").model_copy(update=changed | {"static_force": 0.0})
+    plant = Plant(load_catenary("en50318-2002"), data, numerics=Numerics(time_step=2e-4, window=3))
+    plant.start(0, 50.0)
+    line, _, pantographs, _, run = plant.arrays
+    run.table[0, 0, Row.STATE :, 0] = 0.02, 0.0
+    height = np.zeros(6000 if JIT else 1500)
+    swing(line, pantographs, run, height)
+    up = np.diff(height) > 0
+    turns = np.abs([0.02, *height[1:-1][up[1:] != up[:-1]]])
+    assert -np.diff(turns[:3]) == pytest.approx(2 * friction / spring, rel=0.02)
+    assert len(turns) < 0.02 / (2 * friction / spring) + 2
+    if JIT:
+        assert np.ptp(height[-500:]) == 0  # where the spring is weaker than the friction it stays
+        assert abs(height[-1]) < friction / spring
+
+
+@pytest.mark.skipif(not JIT, reason="a whole run takes minutes in plain Python")
+def test_friction_in_the_frame_dampens_its_motion_under_a_line():
+    """And one that is larger than all that pulls holds it where it is."""
+    smooth = load_pantograph("dsa350")
+    spreads = []
+    for friction in (0.0, 5.0, 100.0):
+        run = simulate("ohl-three-span", smooth.model_copy(update={"frame_friction": friction}), 250)
+        spreads.append(run.frame[run.inside()].std())
+    assert spreads[0] > 1.05 * spreads[1]
+    assert spreads[2] < 0.05 * spreads[0]

@@ -47,7 +47,8 @@ def parts(pantograph: PantographData, catenary: CatenaryModel) -> Array:
     bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
     share = 0.0 if bearable >= gain else 1.0 - bearable / gain
     damping = pantograph.contact_damping / time_step
-    return np.concatenate([[compliance, damping, share], inputs.T.ravel(), transition.ravel()])
+    scalars = [compliance, damping, share, pantograph.frame_friction]
+    return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 
 def pantographs(size: int, lanes: int, abreast: int) -> Pantographs:

@@ -48,6 +48,9 @@ class PantographData(Settings):
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
     contact_damping: Damper = Field(0.0, description="damper beside the contact spring (N s/m)")
+    frame_friction: Annotated[float, Between(0, 100, "N")] = Field(
+        0.0, description="dry friction on the lowest mass, either way (N)"
+    )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     @model_validator(mode="after")

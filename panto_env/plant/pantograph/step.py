@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ...backend import columns, constants, inlined, rows_from
+from ...backend import any_of, columns, constants, inlined, larger, rows_from, smaller
 from ..state import ROW
 
 
@@ -19,10 +19,20 @@ class Part(IntEnum):
     STRIP_COMPLIANCE = 0  # of the contact spring (m/N)
     STRIP_DAMPING = 1  # of the damper beside it, divided by the time step (N/m)
     IMPLICIT_SHARE = 2  # of the wire's height in the contact law, 0 explicit, 1 implicit
-    CONTACT_INPUT = 3  # n rows
+    FRAME_FRICTION = 3  # largest dry friction of the frame (N)
+    CONTACT_INPUT = 4  # n rows
 
 
 PART = constants(Part)
+
+
+@inlined
+def rub(frame_input, friction, free_state, size):
+    """Hold the frame by dry friction (N): at rest by as much as that takes, in motion by all of it."""
+    stopping = free_state[size - 1] / frame_input[size - 1]
+    force = -smaller(larger(stopping, -friction), friction)
+    for r in range(size):
+        free_state[r] = free_state[r] + frame_input[r] * force
 
 
 @inlined
@@ -42,6 +52,8 @@ def move_freely(pantographs, own, free_state, lane):
             other += second[j] * state[j]
         free_state[r] = total
         free_state[r + 1] = other
+    if any_of(parts[PART.FRAME_FRICTION] > 0.0):
+        rub(frame_input, parts[PART.FRAME_FRICTION], free_state, size)
 
 
 @inlined
