@@ -44,7 +44,7 @@ class LoadCell(Settings):
     )
     noise: Annotated[float, Between(0, 100, "N")] = Field(0.5, description="rms noise of a sample (N)")
     filter_frequency: Annotated[float, Between(5, 1e5, "Hz")] = Field(
-        200.0, description="corner of the second-order Butterworth filter before the converter (Hz)"
+        300.0, description="corner of the second-order Butterworth filter before the converter (Hz)"
     )
     mass: Annotated[float, Between(0, 50, "kg")] = Field(
         1.5, description="moving mass between load cell and strip: its inertia falsifies the force (kg)"
