@@ -1,4 +1,4 @@
-"""Condition of the line: irregularity of the contact wire's height, and defects of what holds it."""
+"""Condition of the line: irregularity of the contact wire's height, defects of the wires and their hold."""
 
 from __future__ import annotations
 
@@ -20,6 +20,13 @@ IRREGULARITY = ((12.0, 0.15e-3), (5.0, 0.08e-3), (1.5, 0.03e-3))
 Number = Annotated[int, Between(1, 1000)]
 # Beyond this a wire is no longer nearly level.
 Error = Annotated[float, Between(-0.2, 0.2, "m")]
+# From a span's first support; a line says itself how long its spans are.
+Offset = Annotated[float, Between(0, 200, "m")]
+Mass = Annotated[float, Between(0, 100, "kg")]
+Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
+Length = Annotated[float, Between(2, 2000, "m")]
+Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
+Lost = Annotated[float, Between(0, 0.5)]
 
 
 class LineCondition(Settings):
@@ -48,8 +55,24 @@ class LineCondition(Settings):
     dropper_scatter: Annotated[float, Between(0, 0.05, "m")] = Field(
         0.0, description="rms error of the length of every dropper, drawn at random (m)"
     )
+    hard_spots: tuple[tuple[Number, Offset, Mass, Stiffness], ...] = Field(
+        (),
+        description="what hangs on the contact wire or holds it, as a section insulator: (span, distance "
+        "from its first support (m), mass (kg), stiffness to the ground, unstressed at rest (N/m))",
+    )
+    worn_stretches: tuple[tuple[Number, Offset, Length, Worn], ...] = Field(
+        (),
+        description="stretches of worn contact wire, lighter and with a higher running surface: (span, "
+        "distance from its first support (m), length (m), share of the section that is gone)",
+    )
+    lost_contact_tension: Lost = Field(
+        0.0, description="share of the contact wire's tension that is lost, along the whole line (-)"
+    )
+    lost_messenger_tension: Lost = Field(
+        0.0, description="share of the messenger wire's tension that is lost, along the whole line (-)"
+    )
 
-    @field_validator("broken_droppers", "miscut_droppers", "raised_supports")
+    @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
     @classmethod
     def _each_once(cls, value: tuple[Any, ...], info: Any) -> tuple[Any, ...]:
         places = [row[:1] if info.field_name == "raised_supports" else row[:2] for row in value]
@@ -76,13 +99,26 @@ class LineCondition(Settings):
 
     @property
     def defective(self) -> bool:
-        """Whether droppers or supports are not as designed."""
+        """Whether wires, droppers or supports are not as designed."""
         named = self.broken_droppers or self.miscut_droppers or self.raised_supports
-        return bool(named) or self.dropper_scatter > 0
+        return bool(named) or self.dropper_scatter > 0 or self.of_wires != NEW.of_wires
+
+    @property
+    def of_wires(self) -> tuple[Any, ...]:
+        """What changes the wires themselves, which all lanes of a plant share."""
+        return (
+            self.hard_spots,
+            self.worn_stretches,
+            self.lost_contact_tension,
+            self.lost_messenger_tension,
+        )
+
+
+NEW = LineCondition()
 
 
 LINE_CONDITIONS = {
-    "new": LineCondition(),
+    "new": NEW,
     "fair": LineCondition(irregularity=1.0),
     # EN 50119 lets neighbouring droppers differ by 10 mm (recalled), taken as two standard deviations.
     "as-built": LineCondition(irregularity=1.0, dropper_scatter=5e-3),

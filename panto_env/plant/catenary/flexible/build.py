@@ -21,6 +21,7 @@ from .resolution import Resolution
 from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
 from .static_shape import StaticShape
+from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 STIFFEST = 1e8
@@ -52,11 +53,17 @@ class Links(NamedTuple):
 
 @remembered
 def constants(
-    data: FlexibleCatenaryData, shape: StaticShape, spans: int, numerics: Numerics, resolution: Resolution
+    data: FlexibleCatenaryData,
+    shape: StaticShape,
+    spans: int,
+    numerics: Numerics,
+    resolution: Resolution,
+    own: WireDefects = NO_DEFECTS,
 ) -> FlexibleLine:
-    """Constants of an intact line of ``spans`` spans, each of a static shape, at a stable resolution.
+    """Constants of a line of ``spans`` spans, each of a static shape, at a stable resolution.
 
-    Raises InputError where the nodes are too many.
+    own: defects of the contact wire itself, whose places count along the whole line: a window that travels
+    cannot have any. Raises InputError where the nodes are too many.
     """
     window = min(resolution.window or spans, spans)
     step, damping = resolution.time_step, data.damping
@@ -70,7 +77,8 @@ def constants(
         )
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
-    springs, links = _springs(data, masts, step), _droppers(data, shape, window)
+    x = dx * (np.arange(nodes) - PAD)
+    springs, links = _springs(data, masts, step, own.springs_of_nodes(x, dx)), _droppers(data, shape, window)
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
@@ -79,16 +87,17 @@ def constants(
     # or of negative mass, and waves grow there.
     right = (links.position / dx - (first + 1))[:, None]
     shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)
-    own = np.array([[wire.mass * dx] for wire in wires])
+    bare = np.array([[wire.mass * dx] for wire in wires])
     added = np.zeros((len(wires), nodes))
     for end in (LOWER, UPPER):
         np.add.at(added, (links.wires[:, end, None], four), shares * links.mass[:, end, None])
     np.add.at(added, (springs.wire, springs.node), springs.mass)
-    mass = own + added
+    added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
+    mass = bare + added
     settle = 1.0 + damping.alpha * step / 2
     mobility = step**2 / mass / settle
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
-    inertia = own / mass
+    inertia = bare / mass
 
     # What the wires yield too little on the grid, a link yields instead.
     ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
@@ -121,13 +130,13 @@ def constants(
         window=window,
         rows=rows,
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),
-        rise=np.zeros((1, 0, 4)),
+        rise=np.zeros((1, 0, 5)),
         rise_breaks=np.zeros(0),
         rise_decay=0.0,
         stencil=np.array(weights_by_wire, dtype=real),
         absorbing=(courant - 1) / (courant + 1),
         inertia=np.ascontiguousarray(
-            lay_out(inertia, rows, real)[:, PAD : -PAD if inertia.min() < 1 else PAD]
+            lay_out(inertia, rows, real)[:, PAD : -PAD if (inertia != 1).any() else PAD]
         ),
         mobility=lay_out(mobility, rows, float),
         mast_row=mast_row,
@@ -181,18 +190,23 @@ def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
 
 
-def _springs(data: FlexibleCatenaryData, masts: Index, step: float) -> Springs:
-    """At each mast the steady arm of the contact wire, then the support of the messenger."""
+def _springs(data: FlexibleCatenaryData, masts: Index, step: float, spots: Array) -> Springs:
+    """At each mast the steady arm of the contact wire, then the support of the messenger; last hard spots.
+
+    spots: stiffness by which they hold the nodes of the contact wire (N/m), (nodes,).
+    """
     arm, support = data.steady_arm, data.support
     levels = [
         spring_levels(arm.stiffness, 0.0, step),
         spring_levels(support.stiffness, support.damping, step),
     ]
+    hard = np.flatnonzero(spots)
+    held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
     return Springs(
-        wire=np.tile(np.array([CONTACT, MESSENGER], dtype=np.int64), len(masts)),
-        node=np.repeat(masts.astype(np.int64), 2),
-        levels=np.tile(levels, (len(masts), 1)),
-        mass=np.tile([arm.mass, 0.0], len(masts)),
+        wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(masts)), 0 * hard + CONTACT),
+        node=np.append(np.repeat(masts.astype(np.int64), 2), hard),
+        levels=np.concatenate([np.tile(levels, (len(masts), 1)), np.array(held).reshape(-1, 3)]),
+        mass=np.append(np.tile([arm.mass, 0.0], len(masts)), np.zeros(len(hard))),
     )
 
 

@@ -1,10 +1,11 @@
-"""Static state of a flexible line with defects: broken and mis-cut droppers, supports out of height.
+"""Static state of a flexible line with defects of its droppers, supports and wires.
 
 Droppers apart, the wires are linear, so only the change about the intact static shape is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
-and taut droppers. Between two nodes, which stand at the supports and the droppers, a beam without load
-is a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) with kappa = sqrt(T/EI), so that elements of that
-shape are exact. Their matrix is banded, and a line of any length costs a few times its nodes.
+and taut droppers. Between two nodes, which stand at the supports, the droppers and the wire's own defects, a
+beam under an even load is a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) + e s (l - s) with
+kappa = sqrt(T/EI) and e the load per length over 2 T, so that elements of that shape are exact. Their matrix
+is banded, and a line of any length costs a few times its nodes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from ...line_condition import LineCondition
 from ..schema import Wire
 from .line import CONTACT, MESSENGER, FlexibleLine
 from .schema import FlexibleCatenaryData
-from .static_shape import solve
+from .static_shape import GRAVITY, solve
+from .tension import misfit, shape_left, with_tension_left
+from .wire_defects import WireDefects, locate
 
 HELD = 1e18  # N/m, that holds a wire at the anchor
 SHARPEST = 0.01  # m over which a wire without bending stiffness rounds a kink, as elements need one
@@ -38,28 +41,30 @@ class StaticState:
 
     tension: Array  # (droppers,): N
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
-    rise: Array  # (pieces, 4): change of the contact wire's height: a, b, c, d between nodes
+    rise: Array  # (pieces, 5): change of the running surface's height: a, b, c, d, e between nodes
 
 
 class DefectiveLine:
     """A line with the defects of a condition, to be solved for any scatter of its droppers' lengths."""
 
     def __init__(self, data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> None:
-        """Raises InputError for a dropper or support that a line of so many spans has not."""
-        shape, each = solve(data), len(data.droppers.positions)
+        """data: the line as designed. Raises InputError for what a line of so many spans has not."""
+        left = with_tension_left(data, condition)
+        shape = solve(data) if left is data else shape_left(data, left)
         self._static = np.tile(shape.dropper_tension, spans)
         self._stiffness = np.tile(shape.dropper_stiffness, spans)
         self._broken, self._error, height = _locate(data, spans, condition)
+        own = locate(data, spans, condition)
 
-        self.breaks = np.array([0.0, *data.droppers.positions, data.span_length])
-        nodes = spans * (each + 1) + 1
-        number = np.arange(nodes)
-        at_mast = number % (each + 1) == 0
-        self._ends = UNKNOWNS * number[~at_mast][:, None] + [0, 2]  # of the droppers
-        masts = UNKNOWNS * number[at_mast][1:-1]
-        self._band = np.zeros((BAND, UNKNOWNS * nodes))
-        self._load = np.zeros(UNKNOWNS * nodes)
-        for w, wire in ((CONTACT, data.contact_wire), (MESSENGER, data.messenger_wire)):
+        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length])
+        pieces = len(self.breaks) - 1
+        number = np.arange(spans * pieces + 1)
+        hung = np.isin(number % pieces, np.searchsorted(self.breaks, data.droppers.positions))
+        self._ends = UNKNOWNS * number[hung][:, None] + [0, 2]  # of the droppers
+        masts = UNKNOWNS * number[number % pieces == 0][1:-1]
+        self._band = np.zeros((BAND, UNKNOWNS * len(number)))
+        self._load = np.zeros(UNKNOWNS * len(number))
+        for w, wire in ((CONTACT, left.contact_wire), (MESSENGER, left.messenger_wire)):
             elements = [_element(wire, length) for length in np.diff(self.breaks)]
             unknowns = UNKNOWNS * number[:-1, None] + 2 * w + [0, 1, 4, 5]
             _add(self._band, unknowns, np.tile([stiffness for _, stiffness in elements], (spans, 1, 1)))
@@ -71,6 +76,29 @@ class DefectiveLine:
         self._load[masts + 2] = data.support.stiffness * height
         self._band[0, [0, 2, -4, -2]] = HELD
         self.decay = _decay(data.contact_wire)
+        self._carry(data, left, own, spans)
+
+    def _carry(
+        self, data: FlexibleCatenaryData, left: FlexibleCatenaryData, own: WireDefects, spans: int
+    ) -> None:
+        """Load the wires with what their own defects, and the tension that they have lost, do to them."""
+        pieces, wire, span = len(self.breaks) - 1, left.contact_wire, data.span_length
+        ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
+        length = np.tile(np.diff(self.breaks), spans)
+        self._bulge = GRAVITY * wire.mass * own.lightening(ends + length / 2) / (2 * wire.tension)
+        for piece in np.flatnonzero(self._bulge).tolist():
+            self._load[self._unknowns[piece]] += self._bulge[piece] * _bulging(wire, length[piece])
+        for spot in own.spots:
+            self._load[UNKNOWNS * int(np.argmin(np.abs(ends - spot.position)))] -= GRAVITY * spot.mass
+        # Beside the shapes of bare elements: the running surface, and what the bulge slopes at their ends.
+        surface = own.surface(np.append(ends, spans * span))
+        self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
+        self._slopes = np.outer(self._bulge * length, [0, 1, 0, -1])
+        if left is not data:
+            fit = misfit(data, left)
+            self._error = self._error + np.tile(fit.too_long, spans)
+            self._load[self._ends] += np.tile(fit.lighter, spans)[:, None]
+            self._load[UNKNOWNS * pieces * np.arange(1, spans)] += fit.lift
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
         """The line with tables for ``rows`` defective ones, which ``write`` fills."""
@@ -78,7 +106,7 @@ class DefectiveLine:
         return line._replace(
             link_static=np.zeros((rows, droppers), dtype=real),
             link_gap=np.zeros((rows, droppers), dtype=real),
-            rise=np.zeros((rows, len(self._unknowns), 4)),
+            rise=np.zeros((rows, len(self._unknowns), 5)),
             rise_breaks=self.breaks,
             rise_decay=self.decay,
         )
@@ -107,7 +135,8 @@ class DefectiveLine:
             turned = wrong if rounds <= ROUNDS else wrong[-1:]
             taut[turned] = ~taut[turned]
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
-        rise = np.einsum("eij,ej->ei", self._shapes, change[self._unknowns])
+        bare = np.einsum("eij,ej->ei", self._shapes, change[self._unknowns] - self._slopes)
+        rise = np.concatenate([bare[:, :2] + self._surface, bare[:, 2:], self._bulge[:, None]], axis=1)
         return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
 
     def _solve_linear(self, taut: Any, error: Array) -> Array:
@@ -170,6 +199,14 @@ def _element(wire: Wire, length: float) -> tuple[Array, Array]:
     shapes = np.linalg.inv(np.array(ends))
     held = wire.tension * np.array([[0, -1, 0, 0], [0, 0, -1, -far], [0, 1, 0, 0], [0, 0, far, 1]])
     return shapes, held @ shapes
+
+
+def _bulging(wire: Wire, length: float) -> Array:
+    """Load on height and slope of the two ends of a beam (m), (4,), which an even load of 2 T bulges."""
+    _, stiffness = _element(wire, length)
+    bending = 2 * wire.tension / _decay(wire) ** 2
+    held = [-wire.tension * length, bending, -wire.tension * length, -bending]
+    return np.asarray(stiffness @ [0, length, 0, -length] - held)
 
 
 def _add(band: Array, unknowns: Any, stiffness: Array) -> None:

@@ -16,32 +16,35 @@ def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
     return WIDTH * int(np.ceil(data.span_length / spacing / WIDTH - 1e-9))
 
 
-def stable(data: FlexibleCatenaryData, dx: float, step: float) -> bool:
-    """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4."""
+def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> bool:
+    """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4.
+
+    lightest: mass of the contact wire where it is most worn, as a share of that when new.
+    """
     angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
-    for wire in (data.contact_wire, data.messenger_wire):
-        squared = _response(stencil_weights(wire, dx, step), angle)
+    for wire, share in ((data.contact_wire, lightest), (data.messenger_wire, 1.0)):
+        squared = _response(stencil_weights(wire, dx, step), angle) / share
         if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
             return False
     return True
 
 
-def contact_gain(data: FlexibleCatenaryData, dx: float, step: float) -> float:
+def contact_gain(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> float:
     """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
 
     With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W': the
     larger of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1 there, an integral over
-    the waves of the grid. Waves at the grid's own limit make it infinite.
+    the waves of the grid. Waves at the grid's own limit make it infinite. lightest: as ``stable`` takes it.
     """
     angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
-    squared = _response(stencil_weights(data.contact_wire, dx, step), angle)
+    squared = _response(stencil_weights(data.contact_wire, dx, step), angle) / lightest
     room = 4 - squared * (1 + 2 * data.damping.beta / step)
     if room.min() <= 0:
         return float(np.inf)
     _, weights = stencil(dx * np.linspace(0.0, 0.95, 20), dx)
     seen = _seen(weights, angle)
     largest = float(np.trapezoid(seen / room, angle, axis=1).max()) / np.pi
-    return step**2 / (data.contact_wire.mass * dx) * largest
+    return step**2 / (lightest * data.contact_wire.mass * dx) * largest
 
 
 def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:

@@ -35,7 +35,7 @@ class FlexibleLine(NamedTuple):
     window: int  # spans that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # static height of the contact wire over one span, every span/(n - 1) m (m)
-    rise: Array  # (rows, pieces, 4): what defects add to it: a, b, c, d of each piece of the line
+    rise: Array  # (rows, pieces, 5): what defects add to it: a, b, c, d, e of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
     rise_decay: float  # kappa: of exponentials along a piece (1/m)
     stencil: Array  # (wires, 5): weights of neighbours and of theirs; b; lag; quieting step (m)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
@@ -16,6 +17,8 @@ from .grid import contact_gain
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
 from .static_shape import hang
+from .tension import shape_left, with_tension_left
+from .wire_defects import locate
 
 
 class FlexibleCatenary:
@@ -37,13 +40,18 @@ class FlexibleCatenary:
         Raises InputError where the line can't hang so, grid and time step are not stable together, or the
         line has not what a condition says is defective.
         """
-        shape = hang(data)
+        designed, condition = data, of_wires(runs.conditions)
+        data = with_tension_left(designed, condition)
+        shape, own = (
+            hang(data) if data is designed else shape_left(designed, data),
+            locate(data, spans, condition),
+        )
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         check_speeds(data.name, self.wave_speed, runs.speeds)
         chosen = resolution(data, numerics, runs)
         self.time_step = chosen.time_step
-        self.line = constants(data, shape, spans, numerics, chosen)
-        self.contact_gain = contact_gain(data, self.line.spacing, self.time_step)
+        self.line = constants(data, shape, spans, numerics, chosen, own)
+        self.contact_gain = contact_gain(data, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
@@ -53,7 +61,7 @@ class FlexibleCatenary:
         self._defective: dict[LineCondition, DefectiveLine] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
-            self._make_defective(data, spans, runs.conditions, lanes)
+            self._make_defective(designed, spans, runs.conditions, lanes)
         self.wire = at_rest(self.line, lanes)
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0]), 0.0, 0.0)
@@ -84,3 +92,13 @@ class FlexibleCatenary:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
         tension: Array = self._tension[min(lane, len(self._tension) - 1)]
         return tension
+
+
+def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
+    """A condition that has the wires of them all. Raises InputError where they differ."""
+    if len({condition.of_wires for condition in conditions}) > 1:
+        raise InputError(
+            "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
+            "worn_stretches, lost_contact_tension or lost_messenger_tension; take one run for each."
+        )
+    return conditions[0]

@@ -144,28 +144,47 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
         spacing = min(spacing, FAST_GRIDS[-1][1])
     spacing = min(spacing, 2 * _by_clamps(data)[0])
     grid = data.span_length / nodes_per_span(data, spacing)
-    step = longer if stable(data, grid, longer) else shorter
+    step = longer if stable(data, grid, longer, _lightest(runs)) else shorter
     return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW["fast"])
+
+
+def _window(numerics: Numerics, runs: Runs, usual: int) -> int:
+    """Spans computed about the train. Raises InputError for a window where the wire itself has defects."""
+    whole = any(condition.hard_spots or condition.worn_stretches for condition in runs.conditions)
+    if whole and numerics.window:
+        raise InputError(
+            "A line with hard_spots or worn_stretches is computed whole, not in a window that travels along "
+            f"an even wire: leave out window={numerics.window}, or give 0."
+        )
+    if numerics.window is not None:
+        return numerics.window
+    return 0 if whole else usual
+
+
+def _lightest(runs: Runs) -> float:
+    """Mass of the contact wire where it is most worn, as a share of that when new."""
+    worn = [share for condition in runs.conditions for *_, share in condition.worn_stretches]
+    return 1 - max(worn, default=0.0)
 
 
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: Resolution) -> Resolution:
     """Nodes evenly over a span, and a step of which the control interval is a whole number."""
     span, given = data.span_length, numerics.spacing
-    window = wanted.window if numerics.window is None else numerics.window
+    window, lightest = _window(numerics, runs, wanted.window), _lightest(runs)
     finest = nodes_per_span(data, given or wanted.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(wanted.time_step)
-        while not stable(data, span / finest, step):
+        while not stable(data, span / finest, step, lightest):
             step = runs.whole_part(0.95 * step)
         return Resolution(span / finest, step, window)
     step = numerics.time_step or runs.whole_part(wanted.time_step)
-    if given is not None and not stable(data, span / finest, step):
+    if given is not None and not stable(data, span / finest, step, lightest):
         raise InputError(
             f"A time step of {1e3 * step:g} ms is unstable on a grid of {span / finest:g} m "
             f"for line '{data.name}'; take a shorter step or a coarser grid."
         )
     for count in range(finest, 2 * WIDTH - 1, -WIDTH):
-        if stable(data, span / count, step):
+        if stable(data, span / count, step, lightest):
             return Resolution(span / count, step, window)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 

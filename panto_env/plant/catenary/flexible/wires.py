@@ -21,7 +21,10 @@ def static_height(shape, span, x):
 
 @inlined
 def rise_by_defects(pieces, breaks, decay, x):
-    """Static change (m) of the contact wire's height at x (m): a + b s + c e^(-ks) + d e^(-k(l - s))."""
+    """Static change (m) of the running surface's height at x (m).
+
+    Along a piece of length l it is a + b s + c e^(-ks) + d e^(-k(l - s)) + e s (l - s).
+    """
     per_span, span = breaks.size - 1, breaks[-1]
     number = min(int(x / span), pieces.shape[0] // per_span - 1)
     local = x - number * span
@@ -30,7 +33,7 @@ def rise_by_defects(pieces, breaks, decay, x):
         k += 1
     piece, left, right = pieces[number * per_span + k], local - breaks[k], breaks[k + 1] - local
     bend = piece[2] * math.exp(-decay * left) + piece[3] * math.exp(-decay * right)
-    return piece[0] + piece[1] * left + bend
+    return piece[0] + piece[1] * left + bend + piece[4] * left * right
 
 
 @inlined

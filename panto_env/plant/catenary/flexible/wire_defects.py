@@ -1,0 +1,153 @@
+"""Defects of the contact wire at places of their own, in metres along the line: hard spots, worn stretches.
+
+A hard spot is a mass on the wire, a spring to the ground that is at rest where the wire rests, or both. Worn
+wire is lighter, and its running surface is higher by what has been worn off. It keeps tension and bending
+stiffness: bending counts for a tenth of a metre only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import InputError
+from ...line_condition import LineCondition
+from ..schema import Wire
+from .schema import FlexibleCatenaryData
+
+RAMP = 1.0
+"""Over which the running surface rises at either end of a worn stretch (m), own choice."""
+COPPER = 8900.0
+"""Density of a contact wire (kg/m^3), by which its mass gives its diameter."""
+NEAREST = 0.02
+"""Between two places of one span (m): nearer ones are one place."""
+
+
+class Spot(NamedTuple):
+    """A hard spot."""
+
+    position: float  # m
+    mass: float  # kg
+    stiffness: float  # N/m
+
+
+class Stretch(NamedTuple):
+    """A worn stretch."""
+
+    begin: float  # m
+    end: float  # m
+    share: float  # of the section that is gone
+    depth: float  # of what is worn off (m)
+
+
+class WireDefects(NamedTuple):
+    """Those of a line."""
+
+    spots: tuple[Spot, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.spots or self.stretches)
+
+    @property
+    def lightest(self) -> float:
+        """Mass of the most worn wire as a share of a new one's."""
+        return 1 - max((stretch.share for stretch in self.stretches), default=0.0)
+
+    def breaks(self, span: float, own: Sequence[float]) -> Array:
+        """Where pieces of a span begin and end (m): at its own places, and where any span has a defect."""
+        wanted = [spot.position for spot in self.spots]
+        for begin, end, _, _ in self.stretches:
+            wanted += [begin, begin + RAMP, end - RAMP, end]
+        breaks = list(own)
+        for place in wanted:
+            if min(abs(place % span - each) for each in breaks) > NEAREST:
+                breaks.append(place % span)
+        return np.array(sorted(breaks))
+
+    def mass_of_nodes(self, x: Array, spacing: float, wire: Wire) -> Array:
+        """Mass (kg) that the nodes of a grid at x (m), (n,), have more than those of a new wire.
+
+        A spot hangs on the two nearest nodes.
+        """
+        mass = np.zeros(len(x))
+        for stretch in self.stretches:
+            covered = np.minimum(x + spacing / 2, stretch.end) - np.maximum(x - spacing / 2, stretch.begin)
+            mass -= stretch.share * wire.mass * np.maximum(covered, 0.0)
+        for spot in self.spots:
+            mass += spot.mass * _shares(x, spacing, spot.position)
+        return mass
+
+    def springs_of_nodes(self, x: Array, spacing: float) -> Array:
+        """Stiffness (N/m), (n,), by which spots hold the nodes of a grid at x (m)."""
+        stiffness = np.zeros(len(x))
+        for spot in self.spots:
+            stiffness += spot.stiffness * _shares(x, spacing, spot.position)
+        return stiffness
+
+    def lightening(self, x: Array) -> Array:
+        """Share of the wire's weight that is gone at places x (m), (n,)."""
+        gone = np.zeros(len(x))
+        for stretch in self.stretches:
+            gone += stretch.share * ((x > stretch.begin) & (x < stretch.end))
+        return gone
+
+    def surface(self, x: Array) -> Array:
+        """How much higher the running surface is at places x (m), (n,), where the wire's axis is (m)."""
+        height = np.zeros(len(x))
+        for begin, end, _, depth in self.stretches:
+            height += np.interp(x, [begin, begin + RAMP, end - RAMP, end], [0.0, depth, depth, 0.0])
+        return height
+
+
+NO_DEFECTS = WireDefects()
+
+
+def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> WireDefects:
+    """Those of a condition. Raises InputError for a place that a line of so many spans has not."""
+
+    def position(span: int, offset: float) -> float:
+        if span > spans or offset > data.span_length:
+            raise InputError(
+                f"Line '{data.name}' has no place {offset:g} m from the first support of span {span}: it has "
+                f"{spans} spans of {data.span_length:g} m."
+            )
+        return (span - 1) * data.span_length + offset
+
+    spots = tuple(
+        Spot(position(span, offset), mass, stiffness)
+        for span, offset, mass, stiffness in condition.hard_spots
+    )
+    stretches: list[Stretch] = []
+    for span, offset, length, share in sorted(condition.worn_stretches):
+        begin = position(span, offset)
+        if stretches and begin < stretches[-1].end:
+            raise InputError(
+                f"Worn stretches must not overlap, as those do that begin at {stretches[-1].begin:g} and "
+                f"{begin:g} m along the line."
+            )
+        stretches.append(Stretch(begin, begin + length, share, worn_depth(data.contact_wire, share)))
+    whole = spans * data.span_length
+    for spot in spots:
+        if not 0 < spot.position < whole:
+            raise InputError(f"A hard spot must lie between the line's anchors, at 0 and {whole:g} m.")
+    if stretches and stretches[-1].end > whole:
+        raise InputError(f"A worn stretch ends at {stretches[-1].end:g} m, but the line at {whole:g} m.")
+    return WireDefects(spots, tuple(stretches))
+
+
+def worn_depth(wire: Wire, share: float) -> float:
+    """Height (m) of the segment of a round wire that is a share of its section."""
+    angle = np.linspace(0.0, 2 * math.pi, 20_001)
+    radius = math.sqrt(wire.mass / COPPER / math.pi)
+    heights = radius * (1 - np.cos(angle / 2))
+    return float(np.interp(share, (angle - np.sin(angle)) / (2 * math.pi), heights))
+
+
+def _shares(x: Array, spacing: float, position: float) -> Array:
+    """What the two nodes nearest to a position (m) have of what hangs there, (n,)."""
+    return np.asarray(np.maximum(1 - np.abs(x - position) / spacing, 0.0))
