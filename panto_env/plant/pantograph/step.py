@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from ...backend import columns, constants, inlined, rows_from
-from ..state import ROW
+from ..state import PLACE, ROW
 
 
 class Part(IntEnum):
@@ -23,6 +23,43 @@ class Part(IntEnum):
 
 
 PART = constants(Part)
+
+
+@inlined
+def free_value(pantographs, own, parts, r, on_frame, on_head):
+    """Entry ``r`` of the state of a group after a step, the contact force as in the step before."""
+    size, state = pantographs.size, rows_from(own, ROW.STATE)
+    row = rows_from(parts, PART.CONTACT_INPUT + 3 * size + r * size)
+    total = parts[PART.CONTACT_INPUT + r] * own[ROW.CONTACT_FORCE]
+    total += parts[PART.CONTACT_INPUT + size + r] * on_frame
+    total += parts[PART.CONTACT_INPUT + 2 * size + r] * on_head
+    for j in range(size):
+        total += row[j] * state[j]
+    return total
+
+
+@inlined
+def move_apart(pantographs, own, place, first, lane):
+    """How the ends that an actuator at ``place`` stands between move apart over a step without its force.
+
+    first: 0 for the way between them (m), or half the entries of the state for its speed (m/s). Returns it at
+    the step's start; at its end, the contact force as in the step before; and what 1 N of the actuator, held
+    over the step, adds to it at the end.
+    """
+    size, parts = pantographs.size, columns(own, pantographs.table, lane)
+    on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+    upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
+    if place == PLACE.FRAME:
+        on_frame = own[ROW.NOMINAL_FORCE]
+    else:
+        upper, inputs, on_head = first, PART.CONTACT_INPUT + 2 * size, 0.0 * on_head
+    now, free = own[ROW.STATE + upper], free_value(pantographs, own, parts, upper, on_frame, on_head)
+    gain = parts[inputs + upper]
+    if place == PLACE.HEAD and size > 2:
+        now = now - own[ROW.STATE + upper + 1]
+        free = free - free_value(pantographs, own, parts, upper + 1, on_frame, on_head)
+        gain = gain - parts[inputs + upper + 1]
+    return now, free, gain
 
 
 @inlined
