@@ -68,9 +68,7 @@ def pantographs(size: int, lanes: int, abreast: int) -> Pantographs:
     return Pantographs(size, lane_table(Part.CONTACT_INPUT + 3 * size + size**2, lanes, abreast))
 
 
-def matrices(
-    pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED
-) -> tuple[Array, Array]:
+def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:
     """State matrix A, (2n, 2n), and inputs [contact, frame, head pair], (2n, 3), of x' = Ax + Bf."""
     n = len(pantograph.masses)
     stiffness, damping = _chain(pantograph.stiffnesses), _chain(pantograph.dampings)

@@ -1,15 +1,16 @@
 """The armature and its current loop over one step, in closed form.
 
-L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by a PI law whose zero cancels the
-armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i), a being
-the bandwidth. Where that needs more than the largest voltage, the drive gives this; the reference i* is never beyond
-what this voltage can hold at the present speed, so that the integrator does not wind up. In force e = K i (N),
-with D the damping of shorted motors, w the speed at mid-step, U the stall force and T = L / R:
+L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by a PI law whose zero cancels
+the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i),
+a being the bandwidth. Where that needs more than the largest voltage, the drive gives this; the reference i*
+is never beyond what this voltage can hold at the present speed, so that the integrator does not wind up. In
+force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the stall force and T = L
+/ R:
 
     at the largest voltage  T de/dt = b - e,  b = +-U - D w        below it  de/dt = a (e* - e)
 
-A change of the reference begins at the largest voltage, if at all, and ends below it: b is the bound on the side of
-the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
+A change of the reference begins at the largest voltage, if at all, and ends below it: b is the bound on the
+side of the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
 """
 
 from __future__ import annotations

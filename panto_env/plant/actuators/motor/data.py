@@ -12,16 +12,16 @@ from ..base import ActuatorSettings
 from .step import MotorArrays, motor_arrays
 
 LEAST_LEAD = 1.05
-"""A current loop's bandwidth over the winding's own, at least: with a lead of 1 its first voltage is its last."""
+"""Bandwidth of a current loop over the armature's own, at least: at 1 it has nothing to hasten."""
 
 
 class MotorActuator(ActuatorSettings):
     """DC servomotors in force mode, with gearboxes, on arms.
 
-    The motor is a maxon RE 40, 150 W, 24 V (148867), the gearbox a maxon GP 42 C, 26:1, two stages
-    (203119): of brushed servomotors with ironless rotor, which have the small time constants that paper 2 names,
-    one that fits into a joint (40 mm, 0.84 kg with its gearbox). *seen*: in public copies of the data sheets
-    (the motor's current edition; older ones have 0.317 ohm and 138 g cm^2). *recalled*: from memory of the data
+    The motor is a maxon RE 40, 150 W, 24 V (148867), the gearbox a maxon GP 42 C, 26:1, two stages (203119):
+    of brushed servomotors with ironless rotor, which have the small time constants that paper 2 names, one
+    that fits into a joint (40 mm, 0.84 kg with its gearbox). *seen*: in public copies of the data sheets (the
+    motor's current edition; older ones have 0.317 ohm and 138 g cm^2). *recalled*: from memory of the data
     sheet. Paper 2 prints no constants.
     """
 
@@ -44,13 +44,18 @@ class MotorActuator(ActuatorSettings):
     rotor_inertia: Annotated[float, Between(1e-9, 1, "kg m^2")] = Field(  # seen
         142e-7, description="moment of inertia of a motor's rotor (kg m^2)"
     )
-    friction_torque: Annotated[float, Between(0, 10, "N m")] = Field(  # torque of the no-load current, 137 mA: seen
-        4.1e-3, description="dry friction of a motor's shaft, at any load (N m)"
+    friction_torque: Annotated[float, Between(0, 10, "N m")] = (
+        Field(  # torque of the no-load current, 137 mA: seen
+            4.1e-3, description="dry friction of a motor's shaft, at any load (N m)"
+        )
     )
-    continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = Field(  # of the nominal current, 6 A: seen
-        0.181, description="largest rms torque of a motor for as long as one likes (N m)"
+    continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = (
+        Field(  # of the nominal current, 6 A: seen
+            0.181, description="largest rms torque of a motor for as long as one likes (N m)"
+        )
     )
-    # What the gearbox bears for a moment, 11.3 N m (recalled), through ratio and efficiency; the motor bears more.
+    # What the gearbox bears for a moment, 11.3 N m (recalled), through ratio and efficiency; the motor bears
+    # more.
     peak_torque: Annotated[float, Between(1e-4, 100, "N m")] = Field(
         0.53, description="largest torque of a motor (N m)"
     )
@@ -72,12 +77,16 @@ class MotorActuator(ActuatorSettings):
     gear_inertia: Annotated[float, Between(0, 1, "kg m^2")] = Field(  # recalled
         9.1e-7, description="moment of inertia of a gearbox, at the motor's shaft (kg m^2)"
     )
-    # The data sheet has 0.8 degrees, 0.014 rad (recalled): 2.8 mm at the head. Own choice: none, as of a tensed gear.
+    # The data sheet has 0.8 degrees, 0.014 rad (recalled): 2.8 mm at the head. Own choice: none, as of a
+    # tensed gear.
     backlash: Annotated[float, Between(0, 0.2, "rad")] = Field(
         0.0, description="angle by which a gearbox's output is loose, from flank to flank (rad)"
     )
-    gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = Field(  # own choice: of the size of such gears
-        3000.0, description="stiffness of a gearbox, at its output; counts where there is backlash (N m/rad)"
+    gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = (
+        Field(  # own choice: of the size of such gears
+            3000.0,
+            description="stiffness of a gearbox, at its output; counts where there is backlash (N m/rad)",
+        )
     )
     gear_damping: Annotated[float, Between(0, 1e5, "N m s/rad")] = Field(  # own choice: a tenth of critical
         1.1, description="damping of a gearbox, at its output; counts where there is backlash (N m s/rad)"
@@ -97,7 +106,7 @@ class MotorActuator(ActuatorSettings):
         if self.force_limit > self.peak_force * (1 + 1e-9):
             raise ValueError(
                 f"force_limit must not exceed {self.peak_force:.4g} N, which the motors have at their "
-                f"peak_torque: it is {self.force_limit:g} N; take a smaller one, or other motors, gears or arms"
+                f"peak_torque: it is {self.force_limit:g} N; take a smaller one, or other motors or gears"
             )
         least = LEAST_LEAD * self.resistance / (2 * math.pi * self.inductance)
         if self.bandwidth < least:
@@ -149,7 +158,7 @@ class MotorActuator(ActuatorSettings):
 
     @property
     def reflected_masses(self) -> tuple[float, float]:
-        """Mass (kg) that the actuator adds between the ends of each ``Place``; none where rotors can be loose."""
+        """Mass (kg) that turns with each ``Place``; none where rotors can be loose."""
         fixed = 0.0 if self.backlash > 0 else self.reflected_mass
         return tuple(fixed if place in self.places else 0.0 for place in (0, 1))  # type: ignore[return-value]
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from .data import MotorActuator
 
 SPEED_TAPER, HEAT_TAPER = 0.05, 0.1
-"""Own choice: shares of the largest speed, and of the square of the continuous force, before these limits in which
-the drive goes back from all to none of what they limit: without them it would switch in each step."""
+"""Own choice: shares of the largest speed, and of the square of the continuous force, over which the drive
+goes back from all to none of what these limit, before they are reached: else it would switch in each step."""
 
 
 class MotorRow(IntEnum):
@@ -111,21 +111,25 @@ def _halvings(value: float, largest: float) -> int:
 
 
 @inlined
-def reference(motors, rows, asked, speed):
-    """Force that the current loop is to follow (N): what is asked for within the limits but that of voltage."""
+def reference(motors, rows, asked, free, gain):
+    """Force that the current loop is to follow (N): what is asked for within the limits but that of voltage.
+
+    free: speed at the step's end without it (m/s), to which 1 N adds ``gain`` (m/s/N): near the largest speed
+    the force falls with the speed that it leads to, which is stable at any time step.
+    """
     asked = clip(asked, -motors.command_limit, motors.command_limit)
     steady, peak = motors.continuous_force * motors.continuous_force, motors.peak_force * motors.peak_force
     room = clip((steady - rows[MOTOR_ROW.HEAT]) * (1.0 / (HEAT_TAPER * steady)), 0.0, 1.0)
     limit = root(steady + (peak - steady) * room)
-    turning = speed * (1.0 / motors.largest_speed)
-    up = clip((1.0 - turning) * (1.0 / SPEED_TAPER), 0.0, 1.0)
-    down = clip((1.0 + turning) * (1.0 / SPEED_TAPER), 0.0, 1.0)
-    return clip(asked, -limit * down, limit * up)
+    slope = limit / (SPEED_TAPER * motors.largest_speed + limit * gain)  # N s/m
+    up = clip((motors.largest_speed - free) * slope, 0.0, limit)
+    down = clip((motors.largest_speed + free) * slope, 0.0, limit)
+    return clip(asked, -down, up)
 
 
 @inlined
 def book(motors, rows, end, mean, square, speed):
-    """Keep the force at the step's end, and what the step took from the supply at a speed (m/s) of mid-step."""
+    """Keep the force at the step's end, and what the step took at this speed of mid-step (m/s)."""
     start, conductance = rows[MOTOR_ROW.FORCE], 1.0 / motors.shorted_damping
     stored = 0.5 * motors.armature_time * conductance * (end * end - start * start)
     copper = motors.time_step * conductance * square
@@ -140,9 +144,8 @@ def press(motors, pantographs, own, rows, asked, place, lane):
     """Mean force over a step (N) of motors whose rotors turn with what they press on."""
     now, free, gain = move_apart(pantographs, own, place, pantographs.size // 2, lane)
     speed = 0.5 * (now + free + gain * own[ROW.FRAME_FORCE + place])
-    end, mean, square = follow(
-        motors, rows[MOTOR_ROW.FORCE], reference(motors, rows, asked, speed), speed
-    )
+    wanted = reference(motors, rows, asked, free, gain)
+    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, speed)
     moved = free + gain * mean  # speed at the end without friction
     load = mean - motors.mass * (moved - now) * (1.0 / motors.time_step)
     force = mean - friction(motors, load, moved * (1.0 / gain))
@@ -156,9 +159,8 @@ def press_loosely(motors, pantographs, own, rows, asked, place, lane):
     step, before, turning = motors.time_step, own[ROW.FRAME_FORCE + place], rows[MOTOR_ROW.SPEED]
     per_force = step * (1.0 / motors.mass)  # change of the rotors' speed (m/s/N)
     speed = turning + 0.5 * per_force * (rows[MOTOR_ROW.FORCE] - before)
-    end, mean, square = follow(
-        motors, rows[MOTOR_ROW.FORCE], reference(motors, rows, asked, speed), speed
-    )
+    wanted = reference(motors, rows, asked, turning - per_force * before, per_force)
+    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, speed)
     push = mean - friction(motors, before, turning * (1.0 / per_force) + mean - before)
     now, free, gain = move_apart(pantographs, own, place, 0, lane)
     way = step * (turning + 0.5 * per_force * push) - (free - now)
