@@ -72,7 +72,7 @@ def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLE
     """State matrix A, (2n, 2n), and inputs [contact, frame, head pair], (2n, 3), of x' = Ax + Bf."""
     n = len(pantograph.masses)
     stiffness, damping = _chain(pantograph.stiffnesses), _chain(pantograph.dampings)
-    inverse_mass = np.diag(1 / np.array(pantograph.masses))
+    inverse_mass: Array = np.diag(1 / np.array(pantograph.masses))
     if any(reflected):
         inverse_mass = np.linalg.inv(np.diag(pantograph.masses) + _between_ends(n, reflected))
     forces = np.zeros((n, 3))

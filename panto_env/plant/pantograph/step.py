@@ -47,12 +47,13 @@ def move_apart(pantographs, own, place, first, lane):
     over the step, adds to it at the end.
     """
     size, parts = pantographs.size, columns(own, pantographs.table, lane)
-    on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
-    upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
+    on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0 * own[ROW.HEAD_FORCE]
+    upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
-        on_frame = own[ROW.NOMINAL_FORCE]
+        upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
+        on_head += own[ROW.HEAD_FORCE]
     else:
-        upper, inputs, on_head = first, PART.CONTACT_INPUT + 2 * size, 0.0 * on_head
+        on_frame += own[ROW.FRAME_FORCE]
     now, free = own[ROW.STATE + upper], free_value(pantographs, own, parts, upper, on_frame, on_head)
     gain = parts[inputs + upper]
     if place == PLACE.HEAD and size > 2:
