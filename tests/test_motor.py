@@ -118,11 +118,14 @@ def test_the_force_is_the_mean_over_the_step_of_the_continuous_one():
     """In a step of eight time constants of the loop, and where the voltage is at its limit."""
     for changes in ({}, {"voltage": 3.0, "inductance": 2e-3, "bandwidth": 60.0}):
         motor = MotorActuator(**SMOOTH, **changes)
-        coarse = Bench(motor, **LOCKED, step=1.25e-3).run([90.0, -60.0], 10e-3)[:, 3]
+        bench = Bench(motor, **LOCKED, step=1.25e-3)
+        coarse = bench.run([90.0, -60.0], 10e-3)[:, 3]
         fine = Bench(motor, **LOCKED, step=1.25e-5)
         current = np.concatenate([[0.0], fine.reference([90.0, -60.0], 10e-3)[:, 2]])
         means = (0.5 * (current[1:] + current[:-1])).reshape(16, 100).mean(axis=1)
         np.testing.assert_allclose(coarse, motor.force_per_ampere * means, atol=0.02)  # N
+        heat = motor.motors * motor.resistance * 1.25e-5 * np.sum(current**2)  # J
+        assert bench.plant.actuators.energy(0)[1, 1] == pytest.approx(heat, rel=2e-3)
 
 
 @pytest.mark.parametrize(
