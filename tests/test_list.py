@@ -55,6 +55,10 @@ def test_every_entry_is_shown_with_its_whole_description(panto):
             "realistic",
             ["actuator realistic", "2500.0", "(N/s)", "sensors realistic", "velocity_noise", "0.005"],
         ),
+        (
+            "head-motor",
+            ["actuator head-motor", "maxon RE 40", "torque_constant", "0.0302", "seen", "recalled", "(ohm)"],
+        ),
         ("benchmark-2015", ["catenary benchmark-2015", "pantograph benchmark-2015", "0.117", "recalled"]),
     ],
 )
@@ -62,6 +66,12 @@ def test_a_name_is_answered_with_parameters_defaults_and_presets(panto, name, pa
     shown = panto("list", name)
     for part in parts:
         assert part in shown
+
+
+def test_a_preset_of_another_kind_says_so(panto):
+    shown = words(panto("list"))
+    assert "headmotorkindmotor" in shown
+    assert "idealnone" in shown
 
 
 def test_the_same_for_machines(panto):

@@ -26,6 +26,8 @@ CASES = {
         "PantographStiffness-v0",
         {"observation": "full", "actuator": {"place": "both", "delay": 0.01}, "sensors": {"delay": 0.02}},
     ),
+    "motors": ("PantographStiffness-v0", {"actuator": {"kind": "motor", "place": "both"}}),
+    "loose motors": ("PantographStiffness-v0", {"actuator": "head-motor:backlash=0.014"}),
     "defects": ("Pantograph-v0", {"precision": "double", "window": 3, "line_condition": DEFECTS}),
     "clamps": (
         "Pantograph-v0",

@@ -139,14 +139,16 @@ def alone():
         for schema in schemas:
             for keys, annotation, place in numbers(schema):
                 name = ".".join((family, schema.__name__, *keys, *map(str, place)))
-                yield pytest.param(read, keys, annotation, place, id=name)
+                kind = schema.model_fields.get("kind")
+                table = {} if kind is None else {"kind": kind.default}
+                yield pytest.param(read, table, keys, annotation, place, id=name)
 
 
-@pytest.mark.parametrize(("read", "keys", "annotation", "place"), list(alone()))
-def test_an_absurd_number_of_a_table_is_refused(read, keys, annotation, place):
+@pytest.mark.parametrize(("read", "kind", "keys", "annotation", "place"), list(alone()))
+def test_an_absurd_number_of_a_table_is_refused(read, kind, keys, annotation, place):
     for absurd in ABSURD:
         with pytest.raises(InputError, match=r"must be a (whole )?number from") as caught:
-            read(put({}, keys, with_absurd(annotation, place, absurd)))
+            read(put(kind, keys, with_absurd(annotation, place, absurd)))
         one_sentence(str(caught.value), ".".join(map(str, (*keys, *place))))
 
 

@@ -52,6 +52,9 @@ def list_entries(
         table = _table(family, "name", "values")
         for each in families[family]:
             changed = [f"{key}={value}" for key, value, usual, _ in each.rows if value != usual]
+            kind = each.data.get("kind")
+            if kind != families[family][0].data.get("kind"):
+                changed.insert(0, f"kind={kind}")
             table.add_row(each.name, escape(", ".join(changed)) or "none")
         console.print(table)
     console.print("All of one: panto list NAME. With values of your own: NAME:key=value,...", markup=False)

@@ -122,6 +122,7 @@ def _preset(family: str, name: str) -> Description:
     option = f"--{family.replace('_', '-')}"
     first = next(key for key, value in usual if isinstance(value, float))
     text = f"A preset of {option}; presets are {others}. With values of your own: {option} {name}:{first}=..."
+    text += f"\n\n{inspect.getdoc(type(preset))}"
     return Description(
         family, name, text, ("key", "value", "usually", "meaning"), rows, preset.model_dump(mode="json")
     )

@@ -116,7 +116,8 @@ class RunSettings(Numerics):
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='actuator: "ideal", "realistic", one with values as "realistic:delay=0.01", or a table',
+        description='actuator: "ideal", "realistic", "head-motor", one with values as '
+        '"realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",

@@ -68,8 +68,11 @@ class Plant:
         size = 2 * len(pantograph.masses)
         self.lanes_abreast = abreast = lanes_abreast(self.model.line)
         self.pantographs = pantographs(size, lanes if varied else 1, abreast)
-        self.pantographs.set_lanes(np.arange(lanes if varied else abreast), pantograph, self.model)
-        self.actuators = (actuator or actuator_settings("ideal")).arrays(self.time_step, lanes, abreast)
+        actuator = actuator or actuator_settings("ideal")
+        self._reflected = actuator.reflected_masses
+        all_lanes = np.arange(lanes if varied else abreast)
+        self.pantographs.set_lanes(all_lanes, pantograph, self.model, self._reflected)
+        self.actuators = actuator.arrays(self.time_step, lanes, abreast)
         waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
             table=lane_table(Row.STATE + size, lanes, abreast, CONTACTS),
@@ -125,7 +128,7 @@ class Plant:
         check_speeds(self.catenary.name, self.model.wave_speed, (speeds.min(), speeds.max()))
         drawn = drawn or [DrawnLine(self.runs.conditions[0])] * len(lanes)
         for lane, own in zip(lanes, pantographs, strict=False):
-            self.pantographs.set_lanes(lane, own, self.model)
+            self.pantographs.set_lanes(lane, own, self.model, self._reflected)
         waves = np.zeros((len(lanes), run.waves.shape[1]))
         for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
             own_waves[: line.waves.size] = line.waves.ravel()

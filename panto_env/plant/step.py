@@ -57,7 +57,7 @@ def irregularity(run, own, x, lane):
 @inlined
 def approach(line, wire, pantographs, actuators, run, contact, own, scratch, free_state, lane):
     """Begin the step of one contact's pantographs: all but the contact force."""
-    drive(actuators, contact, own, rows_from(scratch, SCRATCH.COMMAND), lane)
+    drive(actuators, pantographs, contact, own, rows_from(scratch, SCRATCH.COMMAND), lane)
     move_freely(pantographs, own, free_state, lane)
     x = own[ROW.STRIDE] * (own[ROW.STEP] + 0.5)
     scratch[SCRATCH.IRREGULARITY] = irregularity(run, own, x, lane)

@@ -33,7 +33,7 @@ class IntegratingArrays(NamedTuple):
 
 
 @implements(drive, IntegratingArrays)
-def _drive(actuators, contact, own, command, lane):
+def _drive(actuators, pantographs, contact, own, command, lane):
     turned = columns(own, actuators.table[contact], lane)
     for place in range(actuators.table.shape[2]):
         turned[place] += actuators.share * command[place]

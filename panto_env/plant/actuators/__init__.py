@@ -12,6 +12,7 @@ from typing import Any
 from ...base.settings import parse_kind
 from .base import ActuatorArrays, ActuatorSettings, drive
 from .lagged import LaggedActuator
+from .motor import MotorActuator
 
 __all__ = [
     "ACTUATORS",
@@ -25,6 +26,7 @@ __all__ = [
 
 KINDS = [
     "lagged",
+    "motor",
 ]
 """Words that a table of an actuator may have under ``kind``: the names of the modules. Where a table
 has none, the first is meant."""
@@ -37,6 +39,8 @@ ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": LaggedActuator(),
     # Published active pantographs: delay 4-5 ms, lag 15-40 ms, about 2500 N/s, +-80 to +-100 N.
     "realistic": LaggedActuator(delay=0.005, lag=0.015, rate_limit=2500.0),
+    # Paper 2's, in the joints of the collector head: values and their sources stand in ``motor/data.py``.
+    "head-motor": MotorActuator(),
 }
 
 

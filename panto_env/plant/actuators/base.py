@@ -35,15 +35,25 @@ class ActuatorSettings(Settings, ABC):
         """Where each entry of an action acts."""
         return {"frame": (Place.FRAME,), "head": (Place.HEAD,), "both": (Place.FRAME, Place.HEAD)}[self.place]
 
+    @property
+    def reflected_masses(self) -> tuple[float, float]:
+        """Mass (kg) of what moves inside the actuator, as a mass of the pantograph, by ``Place``.
+
+        On the frame it goes with the lowest mass; on the head it resists that the head moves apart from the
+        mass below it.
+        """
+        return 0.0, 0.0
+
     @abstractmethod
     def arrays(self, time_step: float, lanes: int, abreast: int) -> ActuatorArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
 
 
 @operation
-def drive(actuators: Any, contact: int, own: Any, command: Any, lane: int) -> None:
+def drive(actuators: Any, pantographs: Any, contact: int, own: Any, command: Any, lane: int) -> None:
     """Move the forces on one contact's pantographs by a step towards their commands.
 
     Of the group of lanes that begins at ``lane``: own: its rows of ``Row``, of which FRAME_FORCE and
-    HEAD_FORCE are to be the means over the step. command: (places,) (N).
+    HEAD_FORCE are to be the means over the step. command: (places,) (N). pantographs: for actuators that
+    are moved by what they press on (``move_apart`` of ``pantograph.step``).
     """

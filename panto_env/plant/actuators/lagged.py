@@ -89,7 +89,7 @@ def arriving(actuators, pending, command, place):
 
 
 @implements(drive, LaggedArrays)
-def _drive(actuators, contact, own, command, lane):
+def _drive(actuators, pantographs, contact, own, command, lane):
     reached = columns(own, actuators.table[contact], lane)
     for place in actuators.places:
         asked = command[place]

@@ -23,6 +23,11 @@ STABILITY_MARGIN = 0.3
 """Share of the stiffest contact that an explicit contact law could bear, which is used."""
 
 
+ReflectedMasses = tuple[float, float]
+"""Masses of actuators that move with a pantograph (kg), by ``Place``; see ``ActuatorSettings``."""
+NONE_REFLECTED: ReflectedMasses = (0.0, 0.0)
+
+
 class Pantographs(NamedTuple):
     """What the pantographs of all lanes are made of: all alike, or each its own.
 
@@ -32,15 +37,23 @@ class Pantographs(NamedTuple):
     size: int  # 2n: entries of the state
     table: Array  # (groups, rows of ``Part``, lanes abreast); one group for all lanes where they are alike
 
-    def set_lanes(self, lanes: Lanes, pantograph: PantographData, catenary: CatenaryModel) -> None:
+    def set_lanes(
+        self,
+        lanes: Lanes,
+        pantograph: PantographData,
+        catenary: CatenaryModel,
+        reflected: ReflectedMasses = NONE_REFLECTED,
+    ) -> None:
         """Make those of some lanes, of the only group where all are alike, this one."""
-        set_lanes(self.table, lanes, parts(pantograph, catenary))
+        set_lanes(self.table, lanes, parts(pantograph, catenary, reflected))
 
 
-def parts(pantograph: PantographData, catenary: CatenaryModel) -> Array:
+def parts(
+    pantograph: PantographData, catenary: CatenaryModel, reflected: ReflectedMasses = NONE_REFLECTED
+) -> Array:
     """What a pantograph is made of, as rows of ``Part``; under a massless wire a strip can be rigid."""
     time_step = catenary.time_step
-    transition, inputs = discretise(pantograph, time_step)
+    transition, inputs = discretise(pantograph, time_step, reflected)
     rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
     stiffness = pantograph.contact_stiffness
     compliance = rigid if stiffness == "rigid" else 1 / stiffness
@@ -56,11 +69,13 @@ def pantographs(size: int, lanes: int, abreast: int) -> Pantographs:
     return Pantographs(size, lane_table(Part.CONTACT_INPUT + 3 * size + size**2, lanes, abreast))
 
 
-def matrices(pantograph: PantographData) -> tuple[Array, Array]:
+def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:
     """State matrix A, (2n, 2n), and inputs [contact, frame, head pair], (2n, 3), of x' = Ax + Bf."""
     n = len(pantograph.masses)
     stiffness, damping = _chain(pantograph.stiffnesses), _chain(pantograph.dampings)
-    inverse_mass = np.diag(1 / np.array(pantograph.masses))
+    inverse_mass: Array = np.diag(1 / np.array(pantograph.masses))
+    if any(reflected):
+        inverse_mass = np.linalg.inv(np.diag(pantograph.masses) + _between_ends(n, reflected))
     forces = np.zeros((n, 3))
     forces[0, 0] = -1.0
     forces[-1, 1] = 1.0
@@ -81,9 +96,21 @@ def _chain(values: tuple[float, ...]) -> Array:
     return matrix
 
 
-def discretise(pantograph: PantographData, time_step: float) -> tuple[Array, Array]:
+def _between_ends(n: int, reflected: ReflectedMasses) -> Array:
+    """Mass matrix, (n, n), of what resists that the ends of each ``Place`` move apart."""
+    frame, head = np.zeros(n), np.zeros(n)
+    frame[-1] = head[0] = 1.0
+    if n > 1:
+        head[1] = -1.0
+    matrix: Array = reflected[0] * np.outer(frame, frame) + reflected[1] * np.outer(head, head)
+    return matrix
+
+
+def discretise(
+    pantograph: PantographData, time_step: float, reflected: ReflectedMasses = NONE_REFLECTED
+) -> tuple[Array, Array]:
     """Exact transition, (2n, 2n), and inputs, (2n, 3), for forces held over ``time_step`` (s)."""
-    a, b = matrices(pantograph)
+    a, b = matrices(pantograph, reflected)
     n, m = b.shape
     augmented = np.zeros((n + m, n + m))
     augmented[:n, :n], augmented[:n, n:] = a * time_step, b * time_step

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from ...backend import any_of, columns, constants, inlined, larger, rows_from, smaller
-from ..state import ROW
+from ..state import PLACE, ROW
 
 
 class Part(IntEnum):
@@ -33,6 +33,44 @@ def rub(frame_input, friction, free_state, size):
     force = -smaller(larger(stopping, -friction), friction)
     for r in range(size):
         free_state[r] = free_state[r] + frame_input[r] * force
+
+
+@inlined
+def free_value(pantographs, own, parts, r, on_frame, on_head):
+    """Entry ``r`` of the state of a group after a step, the contact force as in the step before."""
+    size, state = pantographs.size, rows_from(own, ROW.STATE)
+    row = rows_from(parts, PART.CONTACT_INPUT + 3 * size + r * size)
+    total = parts[PART.CONTACT_INPUT + r] * own[ROW.CONTACT_FORCE]
+    total += parts[PART.CONTACT_INPUT + size + r] * on_frame
+    total += parts[PART.CONTACT_INPUT + 2 * size + r] * on_head
+    for j in range(size):
+        total += row[j] * state[j]
+    return total
+
+
+@inlined
+def move_apart(pantographs, own, place, first, lane):
+    """How the ends that an actuator at ``place`` stands between move apart over a step without its force.
+
+    first: 0 for the way between them (m), or half the entries of the state for its speed (m/s). Returns it at
+    the step's start; at its end, the contact force as in the step before; and what 1 N of the actuator, held
+    over the step, adds to it at the end.
+    """
+    size, parts = pantographs.size, columns(own, pantographs.table, lane)
+    on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0 * own[ROW.HEAD_FORCE]
+    upper, inputs = first, PART.CONTACT_INPUT + 2 * size
+    if place == PLACE.FRAME:
+        upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
+        on_head += own[ROW.HEAD_FORCE]
+    else:
+        on_frame += own[ROW.FRAME_FORCE]
+    now, free = own[ROW.STATE + upper], free_value(pantographs, own, parts, upper, on_frame, on_head)
+    gain = parts[inputs + upper]
+    if place == PLACE.HEAD and size > 2:
+        now = now - own[ROW.STATE + upper + 1]
+        free = free - free_value(pantographs, own, parts, upper + 1, on_frame, on_head)
+        gain = gain - parts[inputs + upper + 1]
+    return now, free, gain
 
 
 @inlined

@@ -1,0 +1,84 @@
+"""The armature and its current loop over one step, in closed form.
+
+L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by a PI law whose zero cancels
+the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i),
+a being the bandwidth. Where that needs more than the largest voltage, the drive gives this; the reference i*
+is never beyond what this voltage can hold at the present speed, so that the integrator does not wind up. In
+force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the stall force and T = L
+/ R:
+
+    at the largest voltage  T de/dt = b - e,  b = +-U - D w        below it  de/dt = a (e* - e)
+
+A change of the reference begins at the largest voltage, if at all, and ends below it: b is the bound on the
+side of the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
+"""
+
+from __future__ import annotations
+
+from ....backend import choose, inlined, larger, magnitude, root, smaller
+
+SMALL = 1e-9
+"""Force (N) below which a difference from the bound is none."""
+
+
+@inlined
+def decay(x, halvings):
+    """Exp(-x) of x of 0 or more: Pade's approximant at x over 2^halvings, up to 1/4, squared so often."""
+    y = x * 0.5**halvings
+    half, twelfth = 0.5 * y, y * y * (1.0 / 12.0)
+    result = (1.0 - half + twelfth) / (1.0 + half + twelfth)
+    for _ in range(halvings):
+        result = result * result
+    return result
+
+
+@inlined
+def age(left, halvings):
+    """-log(left) of a share left, above 0: the series of atanh at its 2^halvings-th root."""
+    y = left
+    for _ in range(halvings):
+        y = root(y)
+    z = (1.0 - y) / (1.0 + y)
+    square = z * z
+    series = 1.0 + square * (1 / 3 + square * (1 / 5 + square * (1 / 7 + square * (1 / 9))))
+    return 2.0 * 2.0**halvings * z * series
+
+
+@inlined
+def clip(x, lowest, highest):
+    """The value within two bounds."""
+    return smaller(larger(x, lowest), highest)
+
+
+@inlined
+def follow(motors, force, wanted, speed):
+    """Force of the motors (N) under a reference, from ``force`` at the step's start; speed (m/s) at mid-step.
+
+    Returns it at the step's end, its mean, and the mean of its square (N^2).
+    """
+    step, lag, rate, lead = motors.time_step, motors.armature_time, motors.bandwidth, motors.lead
+    drop = motors.shorted_damping * speed
+    highest, lowest = motors.stall_force - drop, -motors.stall_force - drop
+    target = clip(wanted, lowest, highest)
+    bound = choose(target >= force, highest, lowest)
+    turn = (lead * target - bound) * (1.0 / (lead - 1.0))
+    turn = choose(target >= force, larger(turn, force), smaller(turn, force))
+    # At the largest voltage, towards the bound, until the turn or the end of the step.
+    away = force - bound
+    there = magnitude(away) < SMALL
+    left = choose(there, 1.0, (turn - bound) / choose(there, 1.0, away))
+    whole = left <= motors.armature_left
+    left = choose(whole, motors.armature_left, left)
+    saturated = choose(whole, step, lag * age(left, motors.age_halvings))
+    reached = bound + left * away
+    gone = lag * (1.0 - left)
+    impulse = bound * saturated + gone * away
+    square = bound * bound * saturated + gone * away * (2.0 * bound + 0.5 * away * (1.0 + left))
+    # Then below it, towards the reference.
+    rest = larger(step - saturated, 0.0)
+    last = decay(rate * rest, motors.decay_halvings)
+    away = reached - target
+    gone = (1.0 - last) * (1.0 / rate)
+    impulse += target * rest + gone * away
+    square += target * target * rest + gone * away * (2.0 * target + 0.5 * away * (1.0 + last))
+    return target + last * away, impulse * (1.0 / step), square * (1.0 / step)

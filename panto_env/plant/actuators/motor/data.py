@@ -1,0 +1,167 @@
+"""What a drive of motors, gearboxes and arms is made of, and what it does where it presses."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ....base.ranges import Between
+from ..base import ActuatorSettings
+from .step import MotorArrays, motor_arrays
+
+LEAST_LEAD = 1.05
+"""Bandwidth of a current loop over the armature's own, at least: at 1 it has nothing to hasten."""
+
+
+class MotorActuator(ActuatorSettings):
+    """DC servomotors in force mode, with gearboxes, on arms.
+
+    The motor is a maxon RE 40, 150 W, 24 V (148867), the gearbox a maxon GP 42 C, 26:1, two stages (203119):
+    of brushed servomotors with ironless rotor, which have the small time constants that paper 2 names, one
+    that fits into a joint (40 mm, 0.84 kg with its gearbox). *seen*: in public copies of the data sheets (the
+    motor's current edition; older ones have 0.317 ohm and 138 g cm^2). *recalled*: from memory of the data
+    sheet. Paper 2 prints no constants.
+    """
+
+    kind: Literal["motor"] = "motor"
+    place: Literal["frame", "head", "both"] = Field("head", description="where the force acts")
+    # Own choice: one in each arm of the collector head, as paper 2's Fig. 13 has it.
+    motors: Annotated[int, Between(1, 8)] = Field(2, description="motors that press together at one place")
+    voltage: Annotated[float, Between(1, 1000, "V")] = Field(  # seen
+        24.0, description="largest voltage of the drive either way (V)"
+    )
+    resistance: Annotated[float, Between(1e-3, 1e3, "ohm")] = Field(  # seen
+        0.299, description="resistance R of a motor's armature (ohm)"
+    )
+    inductance: Annotated[float, Between(1e-7, 1, "H")] = Field(  # seen
+        0.0823e-3, description="inductance L of a motor's armature (H)"
+    )
+    torque_constant: Annotated[float, Between(1e-4, 10, "N m/A")] = Field(  # seen
+        30.2e-3, description="torque constant of a motor, which is its back-EMF constant too (N m/A)"
+    )
+    rotor_inertia: Annotated[float, Between(1e-9, 1, "kg m^2")] = Field(  # seen
+        142e-7, description="moment of inertia of a motor's rotor (kg m^2)"
+    )
+    friction_torque: Annotated[float, Between(0, 10, "N m")] = (
+        Field(  # torque of the no-load current, 137 mA: seen
+            4.1e-3, description="dry friction of a motor's shaft, at any load (N m)"
+        )
+    )
+    continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = (
+        Field(  # of the nominal current, 6 A: seen
+            0.181, description="largest rms torque of a motor for as long as one likes (N m)"
+        )
+    )
+    # What the gearbox bears for a moment, 11.3 N m (recalled), through ratio and efficiency; the motor bears
+    # more.
+    peak_torque: Annotated[float, Between(1e-4, 100, "N m")] = Field(
+        0.53, description="largest torque of a motor (N m)"
+    )
+    thermal_time: Annotated[float, Between(0.1, 1e5, "s")] = Field(  # seen
+        42.8, description="thermal time constant of a motor's winding, over which the rms counts (s)"
+    )
+    largest_speed: Annotated[float, Between(1, 1e5, "rad/s")] = Field(  # of the gearbox, 8000 rpm: seen
+        838.0, description="speed of a motor's shaft up to which the drive pushes on (rad/s)"
+    )
+    bandwidth: Annotated[float, Between(1, 1e5, "Hz")] = Field(  # own choice: of the size of servo drives'
+        1000.0, description="bandwidth of the current loop (Hz)"
+    )
+    gear_ratio: Annotated[float, Between(1, 1000)] = Field(  # seen
+        26.0, description="turns of a motor's shaft for one of the arm (-)"
+    )
+    gear_efficiency: Annotated[float, Between(0.3, 1)] = Field(  # seen, of two stages
+        0.81, description="share of a motor's torque that goes through its gearbox (-)"
+    )
+    gear_inertia: Annotated[float, Between(0, 1, "kg m^2")] = Field(  # recalled
+        9.1e-7, description="moment of inertia of a gearbox, at the motor's shaft (kg m^2)"
+    )
+    # The data sheet has 0.8 degrees, 0.014 rad (recalled): 2.8 mm at the head. Own choice: none, as of a
+    # tensed gear.
+    backlash: Annotated[float, Between(0, 0.2, "rad")] = Field(
+        0.0, description="angle by which a gearbox's output is loose, from flank to flank (rad)"
+    )
+    gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = (
+        Field(  # own choice: of the size of such gears
+            3000.0,
+            description="stiffness of a gearbox, at its output; counts where there is backlash (N m/rad)",
+        )
+    )
+    gear_damping: Annotated[float, Between(0, 1e5, "N m s/rad")] = Field(  # own choice: a tenth of critical
+        1.1, description="damping of a gearbox, at its output; counts where there is backlash (N m s/rad)"
+    )
+    # Own choice: with it two motors press by as much, 100 N, as published actuators do.
+    arm_length: Annotated[float, Between(0.01, 5, "m")] = Field(
+        0.2, description="length of the arm that a gearbox turns (m)"
+    )
+
+    @model_validator(mode="after")
+    def _within_its_own_limits(self) -> Self:
+        if self.continuous_torque > self.peak_torque:
+            raise ValueError(
+                f"continuous_torque must not exceed peak_torque, {self.peak_torque:g} N m: "
+                f"it is {self.continuous_torque:g} N m"
+            )
+        if self.force_limit > self.peak_force * (1 + 1e-9):
+            raise ValueError(
+                f"force_limit must not exceed {self.peak_force:.4g} N, which the motors have at their "
+                f"peak_torque: it is {self.force_limit:g} N; take a smaller one, or other motors or gears"
+            )
+        least = LEAST_LEAD * self.resistance / (2 * math.pi * self.inductance)
+        if self.bandwidth < least:
+            raise ValueError(
+                f"bandwidth must be {least:.4g} Hz at least, a little more than the armature has by itself, "
+                f"R / (2 pi L): it is {self.bandwidth:g} Hz"
+            )
+        return self
+
+    @property
+    def shaft_per_metre(self) -> float:
+        """Angle of a motor's shaft by the way that the ends move apart (rad/m)."""
+        return self.gear_ratio / self.arm_length
+
+    @property
+    def force_per_ampere(self) -> float:
+        """K: force of all motors by the current of each, before friction (N/A)."""
+        return self.motors * self.shaft_per_metre * self.torque_constant
+
+    @property
+    def shorted_damping(self) -> float:
+        """K^2 / (motors R): force by speed of motors whose armatures are shorted (N s/m)."""
+        return self.force_per_ampere**2 / (self.motors * self.resistance)
+
+    @property
+    def stall_force(self) -> float:
+        """Force at standstill under the largest voltage, before friction (N)."""
+        return self.force_per_ampere * self.voltage / self.resistance
+
+    @property
+    def peak_force(self) -> float:
+        """Force at the largest torque, before friction (N)."""
+        return self.motors * self.shaft_per_metre * self.peak_torque
+
+    @property
+    def continuous_force(self) -> float:
+        """Force at the continuous torque, before friction (N)."""
+        return self.motors * self.shaft_per_metre * self.continuous_torque
+
+    @property
+    def dry_friction(self) -> float:
+        """Friction of all motors at no load (N)."""
+        return self.motors * self.shaft_per_metre * self.friction_torque
+
+    @property
+    def reflected_mass(self) -> float:
+        """Mass that rotors and gearboxes are where they press (kg)."""
+        return self.motors * self.shaft_per_metre**2 * (self.rotor_inertia + self.gear_inertia)
+
+    @property
+    def reflected_masses(self) -> tuple[float, float]:
+        """Mass (kg) that turns with each ``Place``; none where rotors can be loose."""
+        fixed = 0.0 if self.backlash > 0 else self.reflected_mass
+        return tuple(fixed if place in self.places else 0.0 for place in (0, 1))  # type: ignore[return-value]
+
+    def arrays(self, time_step: float, lanes: int, abreast: int) -> MotorArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
+        return motor_arrays(self, time_step, lanes, abreast)

@@ -1,0 +1,152 @@
+"""What motors on frame and head buy (paper 2, section 4.3), and one collector on a bench (Figs 14, 15)."""
+
+import numpy as np
+import pytest
+
+from panto_env import InputError
+from panto_env.plant.state import Place
+from panto_env.studies.paper2 import motor_bench, motors
+
+SPEED = 250.0
+
+
+@pytest.fixture(scope="module")
+def passive():
+    return motors.without_motors(SPEED)
+
+
+@pytest.fixture(scope="module")
+def at_15_watts():
+    return {place: motors.at_power(SPEED, place, 15.0) for place in motors.PLACES}
+
+
+def changes(one, passive):
+    return np.array(one.bands) / np.array(passive.bands) - 1
+
+
+def test_bands_hold_all_of_the_force_below_20_hz():
+    time = 1e-3 * np.arange(20000)
+    force = 50 + 3 * np.sin(2 * np.pi * 1.5 * time) + 4 * np.cos(2 * np.pi * 12 * time)
+    np.testing.assert_allclose(motors.band_rms(force, 1e-3), np.array([3, 0, 0, 4]) / np.sqrt(2), atol=1e-9)
+    frequency, amplitude = motors.spectrum(force, 1e-3)
+    assert frequency[np.argsort(amplitude)[-2:]] == pytest.approx([1.5, 12.0])
+    assert np.sort(amplitude)[-2:] == pytest.approx([3.0, 4.0])
+
+
+def test_the_frame_is_for_low_frequencies_and_the_head_for_medium_ones(passive, at_15_watts):
+    """The paper's words, at equal electrical power."""
+    frame, head, both = (changes(at_15_watts[place], passive) for place in motors.PLACES)
+    assert [one.power for one in at_15_watts.values()] == pytest.approx([15.0] * 3, rel=0.01)
+    assert frame[0] < -0.3
+    assert head[0] > -0.05  # a pair of forces within the pantograph lifts nothing for long
+    assert (head[1:] < frame[1:] - 0.15).all()
+    assert (head[2:] < -0.2).all()
+    assert (np.abs(frame[2:]) < 0.1).all()
+    assert both[0] < -0.3
+    assert both[1] < -0.45
+    sigma = {place: one.figures.std for place, one in at_15_watts.items()}
+    assert sigma["both"] < sigma["head"] < sigma["frame"] < passive.figures.std
+    # No smaller sigma by a smaller mean.
+    for one in at_15_watts.values():
+        assert one.figures.mean == pytest.approx(passive.figures.mean, rel=0.01)
+
+
+def test_so_they_are_at_an_equal_limit_of_force(passive):
+    best = {place: motors.at_force_limit(SPEED, place, 50.0, (1.0, 4.0)) for place in motors.PLACES}
+    assert all(one.largest_force < 50.0 * 1.25 for one in best.values())  # a driven gearbox adds friction
+    frame, head, both = (changes(best[place], passive) for place in motors.PLACES)
+    assert frame[0] < head[0] - 0.3
+    assert (head[1:] < frame[1:] - 0.15).all()
+    assert best["both"].figures.std < best["head"].figures.std < best["frame"].figures.std
+    assert (both < 0.02).all()
+
+
+def test_motors_that_are_off_hardly_change_the_force(passive):
+    """Rotors, half a kilogram, and friction of a newton."""
+    off = motors.motor_pass(SPEED, "head", 0.0, passive.figures.mean)
+    assert off.figures.std == pytest.approx(passive.figures.std, rel=0.03)
+    assert 0.3 < off.figures.effort < 3.0
+    assert off.copper == 0.0
+    assert abs(off.power) < 1e-9
+
+
+def test_power_that_a_record_tells_is_what_the_plant_books(at_15_watts):
+    for place, row in (("frame", Place.FRAME), ("head", Place.HEAD)):
+        one = at_15_watts[place]
+        inside = one.record.inside(motors.SPANS)
+        told = motors.recorded_power(one, row)
+        assert told.electrical[inside].mean() == pytest.approx(one.power, rel=0.05)
+        assert told.copper[inside].mean() == pytest.approx(one.copper, rel=0.05)
+
+
+def test_heat_is_that_of_the_current_over_the_nominal_one(at_15_watts):
+    """Of two motors at 6 A: 21.5 W."""
+    head = at_15_watts["head"]
+    assert head.heat == pytest.approx(head.copper / (2 * 0.299 * (0.181 / 30.2e-3) ** 2))
+    both = at_15_watts["both"]
+    assert both.heat < 0.7 * head.heat
+
+
+def test_a_power_that_no_gain_takes_is_refused():
+    with pytest.raises(InputError, match=r"Motors on the head take .* W with gains from .* never 5000 W"):
+        motors.at_power(SPEED, "head", 5000.0)
+
+
+def test_tables_name_what_a_pass_took(passive, at_15_watts):
+    table = motors.places_table("at 15 W", passive, list(at_15_watts.values()))
+    assert table.rows[0][0] == "none"
+    assert [row[0] for row in table.rows[1:]] == list(motors.PLACES)
+    assert all(len(row) == len(table.headings) for row in table.rows)
+    frame = at_15_watts["frame"]
+    assert table.rows[1][2] == f"{frame.power:.1f}"
+    assert table.rows[1][7] == f"{100 * (frame.bands[0] / passive.bands[0] - 1):+.0f}"
+
+
+# --- the bench --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def bench_runs():
+    record = motor_bench.line_pass(SPEED)
+    return {gain: motor_bench.bench_run(record, gain) for gain in (None, 0.0, 1.0, 2.0)}
+
+
+def test_the_bench_moves_as_the_line_does(passive, bench_runs):
+    """The motion's harmonics carry most of what the contact wire does, and the collector feels them alone."""
+    record, waves = passive.record, motor_bench.motion_of_line(passive.record)
+    height = record.wire[record.inside(motors.SPANS)]
+    assert (waves[:, 0] ** 2).sum() / 2 == pytest.approx(height.var(), rel=0.1)
+    frequency, amplitude = bench_runs[None].spectrum
+    carried = waves[:, 1] * SPEED / 3.6
+    near = np.abs(frequency[:, None] - carried).min(axis=1) < 0.2
+    assert (amplitude[near] ** 2).sum() > 0.97 * (amplitude**2).sum()
+
+
+def test_without_control_the_bench_is_linear(bench_runs):
+    """Mass, suspension and pad: each harmonic of the force follows from that of the motion."""
+    run, waves = bench_runs[None], motor_bench.motion_of_line(motor_bench.line_pass(SPEED))
+    mass, spring, damper = 4.25, 3750.0, 10.0
+    for amplitude, turns in zip(waves[:, 0], waves[:, 1] * SPEED / 3.6, strict=True):
+        s = 2j * np.pi * turns
+        pad, collector = (
+            motor_bench.PAD_STIFFNESS + motor_bench.PAD_DAMPING * s,
+            mass * s * s + damper * s + spring,
+        )
+        expected = abs(pad * collector / (pad + collector)) * amplitude
+        wave = np.exp(-1j * 2 * np.pi * turns * run.time)
+        assert 2 * abs(np.mean((run.force - run.force.mean()) * wave)) == pytest.approx(
+            expected, rel=0.03, abs=0.1
+        )
+
+
+def test_proportional_control_reduces_the_force_of_the_collector_at_each_frequency(bench_runs):
+    """Figs 14 and 15."""
+    off, on = bench_runs[0.0], bench_runs[2.0]
+    assert on.std < 0.45 * off.std
+    assert bench_runs[1.0].std < 0.6 * off.std
+    for k in (0, 3):  # Hz: 0-2 and 10-20, where the motion has most
+        assert on.bands[k] < 0.5 * off.bands[k]
+    assert on.force.mean() == pytest.approx(off.force.mean(), rel=0.01)
+    assert np.abs(on.motor_force).max() < 50.0
+    assert 2.0 < on.power < 30.0
+    assert bench_runs[None].power == 0.0
