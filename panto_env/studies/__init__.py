@@ -11,7 +11,7 @@ from .study import Comparison, Outcome, Report, Study, write
 
 __all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
 
-STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper3-parameters")
+STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper2", "paper3-parameters")
 """Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""
 
 

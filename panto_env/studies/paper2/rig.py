@@ -14,10 +14,13 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.table import Table
+from ...catalog import load_pantograph
 from ...rig.comparison import Pair, amplitudes, compare, rms
 from ...rig.computer import load_rig
 from ...rig.growth import with_values
-from ..study import Comparison
+from ...rig.plots import plot_pairs
+from ...rig.report import Stability, pair_facts, stability, stability_facts, stability_table
+from ..study import Comparison, Outcome, Report
 
 PANTOGRAPH, LINE, SPEED_KMH = "dsa350", "en50318-2002", 250.0
 RIGS = ("rig", "rig-flexible")
@@ -191,3 +194,50 @@ def _correlation(pair: Pair, name: str) -> float:
 def _difference(pair: Pair, name: str) -> float:
     true, ours = pair.signals(name)
     return rms(ours - true) / rms(true)
+
+
+def outcome(report: Report) -> Outcome:
+    """Figs 5 to 8, and what limits the rig."""
+    report("the rig beside the line", 0.0)
+    pairs = pairs_at()
+    report("the rig over speed", 0.1)
+    by_speed = {speed: pairs if speed == SPEED_KMH else pairs_at(speed) for speed in SPEEDS_KMH}
+    report("what limits the rig", 0.3)
+    limits = variants_table()
+    report("stability of the rig", 0.5)
+    pantograph = load_pantograph(PANTOGRAPH)
+    found = {name: stability(load_rig(name), pantograph, SPEED_KMH) for name in RIGS}
+    return Outcome(
+        title="Paper 2, section 3: the rig beside the line itself",
+        comparisons=(*statements(pairs), *margin_statements(found)),
+        tables=(
+            harmonics_table(pairs),
+            speeds_table(by_speed),
+            limits,
+            *(stability_table(load_rig(name), each) for name, each in found.items()),
+        ),
+        plots={"fig05-08-rig": plot_pairs(list(pairs.values()))},
+        numbers={
+            "rig": {
+                f"{speed:g} km/h": [pair_facts(pair) for pair in each.values()]
+                for speed, each in by_speed.items()
+            },
+            "stability": {name: stability_facts(each) for name, each in found.items()},
+        },
+    )
+
+
+def margin_statements(found: Mapping[str, Stability]) -> tuple[Comparison, ...]:
+    """The delay that the loop bears by its frequency response over that which the simulation bears."""
+    return tuple(
+        Comparison(
+            f"delay that {name} bears, linear loop over simulation",
+            "",
+            each.linear.delay / each.delay,
+            "no statement: the two must agree",
+            0.9,
+            1.1,
+            f"{1e3 * each.delay:.2f} ms on top of its own, in the simulation",
+        )
+        for name, each in found.items()
+    )
