@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from panto_env import simulate
-from panto_env.rig.comparison import in_band
+from panto_env.metrics.spectrum import in_band
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -13,6 +13,7 @@ import pytest
 from panto_env import simulate
 from panto_env.control.settings import run_settings
 from panto_env.control.task import Task
+from panto_env.metrics.spectrum import band_rms
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
 from panto_env.studies.paper1_control.angles import wrap
@@ -40,7 +41,7 @@ from panto_env.studies.paper1_control.cases import (
     sampled,
 )
 from panto_env.studies.paper1_control.linear import amplification
-from panto_env.studies.paper1_control.passes import band_rms, longest, passive_at_mean, records, run
+from panto_env.studies.paper1_control.passes import longest, passive_at_mean, records, run
 
 PAGE = Path(__file__).parents[1] / "docs" / "paper1-control.md"
 CLAIMS = "The paper's claims beside ours"

@@ -12,6 +12,7 @@ from scipy.signal import butter, lsim
 from panto_env import InputError, simulate
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.metrics.spectrum import in_band
 from panto_env.plant.catenary.protocol import (
     advance_wire,
     apply_force,
@@ -46,14 +47,6 @@ def rig(name="rig-flexible", **tables):
 
 def merged(first, second):
     return {key: {**first.get(key, {}), **second.get(key, {})} for key in EXACT}
-
-
-def in_band(force, time_step, low, high):
-    """The part of a force in a band of frequency (Hz)."""
-    spectrum = np.fft.rfft(force - force.mean())
-    frequency = np.fft.rfftfreq(len(force), time_step)
-    spectrum[(frequency < low) | (frequency >= high)] = 0
-    return np.fft.irfft(spectrum, len(force))
 
 
 def error(data, time_step, reference, low=0.0, high=20.0, **settings):

@@ -13,7 +13,7 @@ from panto_env.plant.catenary.rig.arrays import RigRow
 from panto_env.plant.numerics import Runs
 from panto_env.plant.plant import Plant
 from panto_env.rig import RigComputer, growth
-from panto_env.rig.comparison import amplitudes, compare, in_band
+from panto_env.rig.comparison import compare
 from panto_env.rig.margins import Loop, analog_response, dynamic_stiffness, is_stable, margins_of, threshold
 from panto_env.rig.real_time import Timing, against_the_clock
 
@@ -171,15 +171,6 @@ def test_frequency_response_and_simulation_agree_on_the_slowest_cylinder():
 
 
 # --- beside the line -----------------------------------------------------------------------------
-
-
-def test_bands_add_up_and_a_harmonic_has_its_amplitude():
-    dt = 1e-3
-    time = dt * np.arange(4000)
-    signal = 3 * np.sin(2 * np.pi * 4 * time) + 2 * np.sin(2 * np.pi * 15 * time)
-    assert in_band(signal, dt, 0, 10) == pytest.approx(3 * np.sin(2 * np.pi * 4 * time), abs=1e-9)
-    frequency, amplitude = amplitudes(signal, dt)
-    assert amplitude[frequency == 15] == pytest.approx(2, rel=1e-3)
 
 
 def test_the_flexible_line_on_a_rig_is_followed_and_three_spans_without_droppers_are_not():

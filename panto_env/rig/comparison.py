@@ -12,6 +12,7 @@ from ..analysis.simulation import simulate
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.spans import SpanChoice
+from ..metrics.spectrum import in_band
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.rig import RigData
 
@@ -90,20 +91,6 @@ def compare(
         if run.terminated:
             raise InputError(f"'{run.pantograph}' on '{run.catenary}' has nothing to compare: {run.ending}")
     return Pair(runs[0], runs[1], spans)
-
-
-def in_band(signal: Array, time_step: float, low: float, high: float) -> Array:
-    """The part of a signal from ``low`` to below ``high`` (Hz)."""
-    spectrum, frequency = np.fft.rfft(signal), np.fft.rfftfreq(len(signal), time_step)
-    spectrum[(frequency < low) | (frequency >= high)] = 0.0
-    return np.asarray(np.fft.irfft(spectrum, len(signal)))
-
-
-def amplitudes(signal: Array, time_step: float) -> tuple[Array, Array]:
-    """Frequencies (Hz) and amplitudes of a signal's harmonics, in its unit, with a Hann window."""
-    window = np.hanning(len(signal))
-    spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) * 2 / window.sum()
-    return np.fft.rfftfreq(len(signal), time_step), spectrum
 
 
 def rms(signal: Array) -> float:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import mark_supports
 from ..metrics.low_pass import low_pass_in_place
-from .comparison import Pair, amplitudes
+from ..metrics.spectrum import amplitudes
+from .comparison import Pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

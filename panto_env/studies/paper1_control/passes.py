@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.pool import Progress, in_processes
-from ...base.arrays import Array
 from ...base.errors import InputError
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
 from ...control.settings import RunSettings, run_settings
 from ...metrics.figures import Figures
+from ...metrics.spectrum import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData
 from ...policies import find_policy
@@ -119,13 +119,6 @@ def result_of(case: Case, record: Trajectory) -> Result:
         complex(2 * np.mean(force * np.exp(-2j * np.pi * turns))),
         tuple(band_rms(force, record.time_step, *band) for band in BANDS),
     )
-
-
-def band_rms(force: Array, time_step: float, lowest: float, highest: float) -> float:
-    """Rms (N) of what lies above ``lowest`` and up to ``highest`` (Hz)."""
-    parts = np.abs(np.fft.rfft(force)) / len(force)
-    frequencies = np.fft.rfftfreq(len(force), time_step)
-    return float(np.sqrt(2 * np.sum(parts[(frequencies > lowest) & (frequencies <= highest)] ** 2)))
 
 
 def longest(lost: NDArray[np.bool_]) -> int:

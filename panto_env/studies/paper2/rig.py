@@ -15,7 +15,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.table import Table
 from ...catalog import load_pantograph
-from ...rig.comparison import Pair, amplitudes, compare, rms
+from ...metrics.spectrum import amplitudes
+from ...rig.comparison import Pair, compare, rms
 from ...rig.computer import load_rig
 from ...rig.growth import with_values
 from ...rig.plots import plot_pairs
