@@ -222,6 +222,29 @@ def test_rotors_slow_a_mass_and_take_no_energy(ratio):
     np.testing.assert_allclose(height[:, 0], expected, atol=0.02 * start)
 
 
+@pytest.mark.parametrize("backlash", [0.0, 0.03])
+@pytest.mark.parametrize("inductance", [1e-5, 1e-2])
+def test_light_rotors_with_a_strong_back_emf_are_stable(backlash, inductance):
+    """Their mechanical time constant, R J / k_t^2, is a ten-thousandth of the time step."""
+    motor = MotorActuator(
+        torque_constant=6.0,
+        resistance=0.02,
+        inductance=inductance,
+        rotor_inertia=6e-4,
+        gear_inertia=0.0,
+        bandwidth=2000.0,
+        voltage=6.0,
+        peak_torque=0.5,
+        force_limit=30.0,
+        gear_ratio=12.0,
+        backlash=backlash,
+    )
+    bench = Bench(motor, amplitude=0.02, frequency=3.0, step=5e-3)
+    rows = bench.run(np.random.default_rng(2).uniform(-30, 30, 200), 0.01)
+    assert np.abs(rows[:, 0]).max() < 0.03  # m; the wire moves by 0.02
+    assert motor.motors * 0.5 * inductance * rows[-1, 2] ** 2 < 10.0  # J
+
+
 def test_efficiency_is_what_a_motor_passes_on_and_a_load_has_to_overcome_more():
     """Lifted and lowered at a steady speed by a slow wave of the wire, the motors press 60 N."""
     motor = MotorActuator(gear_efficiency=0.8)

@@ -61,6 +61,11 @@ def test_so_they_are_at_an_equal_limit_of_force(passive):
     assert (both < 0.02).all()
 
 
+def test_a_gain_that_moves_the_mean_does_not_count():
+    with pytest.raises(InputError, match=r"move the mean force by more than 1.5 %"):
+        motors.at_force_limit(SPEED, "both", 100.0, (8.0,))
+
+
 def test_motors_that_are_off_hardly_change_the_force(passive):
     """Rotors, half a kilogram, and friction of a newton."""
     off = motors.motor_pass(SPEED, "head", 0.0, passive.figures.mean)

@@ -41,6 +41,8 @@ GAINS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Gains (N/N) among which that of the least sigma is taken under a limit of force."""
 GAIN_RANGE = (0.05, 8.0)
 """Gains (N/N) among which one of a given power is looked for."""
+MEAN_SHIFT = 0.015
+"""Own choice, of the mean force: beyond it a smaller sigma is that of another mean."""
 SPANS = (10, 19)
 """Those of the figures: the start has died out."""
 
@@ -184,10 +186,19 @@ def at_power(speed_kmh: float, place: str, watts: float, motor: str = MOTOR) -> 
 
 
 def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence[float] = GAINS) -> MotorPass:
-    """The pass of the least sigma among gains, of motors that press by so much at most at each place (N)."""
+    """The pass of the least sigma among gains, of motors that press by so much at most at each place (N).
+
+    Raises InputError where every gain moves the mean force by more than ``MEAN_SHIFT``.
+    """
     mean = without_motors(speed_kmh).figures.mean
-    passes = (motor_pass(speed_kmh, place, gain, mean, f"{MOTOR}:force_limit={newtons:g}") for gain in gains)
-    return min(passes, key=lambda one: one.figures.std)
+    passes = [motor_pass(speed_kmh, place, gain, mean, f"{MOTOR}:force_limit={newtons:g}") for gain in gains]
+    kept = [one for one in passes if abs(one.figures.mean / mean - 1) <= MEAN_SHIFT]
+    if not kept:
+        raise InputError(
+            f"Motors on the {place} of {newtons:g} N move the mean force by more than {100 * MEAN_SHIFT:g} % "
+            f"with every gain among {', '.join(f'{gain:g}' for gain in gains)}; take smaller ones."
+        )
+    return min(kept, key=lambda one: one.figures.std)
 
 
 def recorded_power(one: MotorPass, place: Place) -> MotorPower:

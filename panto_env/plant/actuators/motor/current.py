@@ -4,8 +4,8 @@ L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by 
 the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i),
 a being the bandwidth. Where that needs more than the largest voltage, the drive gives this; the reference i*
 is never beyond what this voltage can hold at the present speed, so that the integrator does not wind up. In
-force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the stall force and T = L
-/ R:
+force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the stall force and T =
+L / R:
 
     at the largest voltage  T de/dt = b - e,  b = +-U - D w        below it  de/dt = a (e* - e)
 
@@ -51,14 +51,19 @@ def clip(x, lowest, highest):
 
 
 @inlined
-def follow(motors, force, wanted, speed):
-    """Force of the motors (N) under a reference, from ``force`` at the step's start; speed (m/s) at mid-step.
+def follow(motors, force, wanted, coasting, gain):
+    """Force of the motors (N) under a reference, from ``force`` at the step's start.
 
-    Returns it at the step's end, its mean, and the mean of its square (N^2).
+    coasting: speed at mid-step if they did not press (m/s), to which a steady 1 N adds ``gain`` (m/s/N).
+    Each bound holds at the speed that a step at its voltage leads to, so that light rotors with a strong
+    back-EMF are stable at any time step. Returns the force at the step's end, its mean, and the mean of its
+    square (N^2).
     """
     step, lag, rate, lead = motors.time_step, motors.armature_time, motors.bandwidth, motors.lead
-    drop = motors.shorted_damping * speed
-    highest, lowest = motors.stall_force - drop, -motors.stall_force - drop
+    damping, old = motors.shorted_damping * gain, motors.armature_mean
+    drop, yielding = motors.shorted_damping * coasting, 1.0 / (1.0 + damping * (1.0 - old))
+    drop = drop + damping * old * force
+    highest, lowest = (motors.stall_force - drop) * yielding, (-motors.stall_force - drop) * yielding
     target = clip(wanted, lowest, highest)
     bound = choose(target >= force, highest, lowest)
     turn = (lead * target - bound) * (1.0 / (lead - 1.0))

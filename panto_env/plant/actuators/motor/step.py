@@ -54,6 +54,7 @@ class MotorArrays(NamedTuple):
     shorted_damping: float  # N s/m
     armature_time: float  # L / R (s)
     armature_left: float  # share of a change left after a step at the same voltage
+    armature_mean: float  # share of it left in the mean over the step
     bandwidth: float  # of the current loop (1/s)
     lead: float  # bandwidth * armature_time
     decay_halvings: int
@@ -92,6 +93,7 @@ def motor_arrays(motor: MotorActuator, time_step: float, lanes: int, abreast: in
         shorted_damping=motor.shorted_damping,
         armature_time=armature,
         armature_left=math.exp(-time_step / armature),
+        armature_mean=-armature / time_step * math.expm1(-time_step / armature),
         bandwidth=bandwidth,
         lead=bandwidth * armature,
         decay_halvings=_halvings(bandwidth * time_step, 0.25),
@@ -143,9 +145,8 @@ def book(motors, rows, end, mean, square, speed):
 def press(motors, pantographs, own, rows, asked, place, lane):
     """Mean force over a step (N) of motors whose rotors turn with what they press on."""
     now, free, gain = move_apart(pantographs, own, place, pantographs.size // 2, lane)
-    speed = 0.5 * (now + free + gain * own[ROW.FRAME_FORCE + place])
     wanted = reference(motors, rows, asked, free, gain)
-    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, speed)
+    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, 0.5 * (now + free), 0.5 * gain)
     moved = free + gain * mean  # speed at the end without friction
     load = mean - motors.mass * (moved - now) * (1.0 / motors.time_step)
     force = mean - friction(motors, load, moved * (1.0 / gain))
@@ -158,10 +159,11 @@ def press_loosely(motors, pantographs, own, rows, asked, place, lane):
     """Mean force over a step (N) of motors whose rotors have a motion of their own, within the play."""
     step, before, turning = motors.time_step, own[ROW.FRAME_FORCE + place], rows[MOTOR_ROW.SPEED]
     per_force = step * (1.0 / motors.mass)  # change of the rotors' speed (m/s/N)
-    speed = turning + 0.5 * per_force * (rows[MOTOR_ROW.FORCE] - before)
-    wanted = reference(motors, rows, asked, turning - per_force * before, per_force)
-    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, speed)
-    push = mean - friction(motors, before, turning * (1.0 / per_force) + mean - before)
+    slowed = turning - per_force * before  # speed at the end if only the teeth press, as before
+    wanted = reference(motors, rows, asked, slowed, per_force)
+    middle = 0.5 * (turning + slowed)
+    end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, middle, 0.5 * per_force)
+    push = mean - friction(motors, before, slowed * (1.0 / per_force) + mean)
     now, free, gain = move_apart(pantographs, own, place, 0, lane)
     way = step * (turning + 0.5 * per_force * push) - (free - now)
     yielding = 0.5 * step * per_force + gain
