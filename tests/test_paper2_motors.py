@@ -27,7 +27,9 @@ def changes(one, passive):
 def test_bands_hold_all_of_the_force_below_20_hz():
     time = 1e-3 * np.arange(20000)
     force = 50 + 3 * np.sin(2 * np.pi * 1.5 * time) + 4 * np.cos(2 * np.pi * 12 * time)
-    np.testing.assert_allclose(motors.band_rms(force, 1e-3), np.array([3, 0, 0, 4]) / np.sqrt(2), atol=1e-9)
+    np.testing.assert_allclose(
+        motors.rms_by_band(force, 1e-3), np.array([3, 0, 0, 4]) / np.sqrt(2), atol=1e-9
+    )
     frequency, amplitude = motors.spectrum(force, 1e-3)
     assert frequency[np.argsort(amplitude)[-2:]] == pytest.approx([1.5, 12.0])
     assert np.sort(amplitude)[-2:] == pytest.approx([3.0, 4.0])

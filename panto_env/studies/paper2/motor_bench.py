@@ -22,7 +22,7 @@ from ...plant.line_condition import DrawnLine, LineCondition
 from ...plant.numerics import Numerics, Runs
 from ...plant.plant import Plant
 from ...plant.state import Place, Row
-from .motors import CATENARY, CONTROL_INTERVAL, MOTOR, PANTOGRAPH, SPANS, band_rms, spectrum
+from .motors import CATENARY, CONTROL_INTERVAL, MOTOR, PANTOGRAPH, SPANS, rms_by_band, spectrum
 
 HARMONICS = 4
 """Of the span, in the motion: as many cosines as a line can have."""
@@ -100,7 +100,7 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
         motion=np.cos(2 * np.pi * turns) @ waves[:, 0],
         force=rows[:, Row.CONTACT_FORCE],
         motor_force=rows[:, Row.HEAD_FORCE],
-        bands=band_rms(rows[:, Row.CONTACT_FORCE], TIME_STEP),
+        bands=rms_by_band(rows[:, Row.CONTACT_FORCE], TIME_STEP),
         power=float(supplied) / (TIME_STEP * steps * controls),
     )
 

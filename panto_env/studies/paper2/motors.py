@@ -24,6 +24,7 @@ from ...control.context import Context
 from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
 from ...metrics.spans import limits
+from ...metrics.spectrum import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
 from ...plant.actuators.motor import MotorActuator
@@ -87,11 +88,9 @@ class MotorPass:
         return float(max(np.abs(force).max() for force in forces))
 
 
-def band_rms(force: Array, time_step: float) -> tuple[float, ...]:
+def rms_by_band(force: Array, time_step: float) -> tuple[float, ...]:
     """Rms (N) of a force in each of ``BANDS``."""
-    frequency, amplitude = spectrum(force, time_step)
-    square = 0.5 * amplitude**2
-    return tuple(float(np.sqrt(square[(frequency > low) & (frequency <= high)].sum())) for low, high in BANDS)
+    return tuple(band_rms(force, time_step, *band) for band in BANDS)
 
 
 def spectrum(force: Array, time_step: float) -> tuple[Array, Array]:
@@ -149,7 +148,7 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
 
 def _kept(record: Trajectory, place: str, gain: float, power: float, copper: float, heat: float) -> MotorPass:
     bands, figures = (
-        band_rms(record.contact_force[record.inside(SPANS)], record.time_step),
+        rms_by_band(record.contact_force[record.inside(SPANS)], record.time_step),
         record.summary(SPANS),
     )
     watts = float(power), float(copper)

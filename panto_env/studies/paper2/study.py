@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from ..study import Outcome, Report
-from . import rig
+from . import head_motors, rig
 
-PARTS = (rig,)
+PARTS = (rig, head_motors)
 
 
 def run(report: Report) -> Outcome:
