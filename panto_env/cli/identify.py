@@ -75,10 +75,10 @@ def identify(
     from .. import identification
 
     full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
-    known = {name: _value(name, text) for name, text in _pairs([*(measured or []), *(more or [])]).items()}
+    known = {name: _value(name, text) for name, text in pairs([*(measured or []), *(more or [])]).items()}
     if plot is not None:
         from ..analysis.plots import save
-    record = identification.read_record(file, _pairs(unit or []))
+    record = identification.read_record(file, pairs(unit or []))
     with progress_console.status("identifying"):
         identified = identification.identify(record, known, band=band, free_offset=free_offset)
     chosen = identified.fits.get(full_name)
@@ -111,7 +111,7 @@ def identify(
     _print(identified, matches, full_name)
 
 
-def _pairs(texts: list[str]) -> dict[str, str]:
+def pairs(texts: list[str]) -> dict[str, str]:
     """Values by name from "a=1", "a=1 b=2" or "a=1,b=2"."""
     pairs: dict[str, str] = {}
     for part in re.split(r"[\s,]+", " ".join(texts).strip()):

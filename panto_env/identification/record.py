@@ -7,13 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
 
 SHORTEST = 20
 """Samples that a record must have at least; a method that needs more raises its own error."""
-
-JITTER = 0.05
-"""How far a time stamp may lie from equal steps, as a share of the step: more is no rounding of digits."""
 
 
 @dataclass(frozen=True)
@@ -31,25 +27,3 @@ class Record:
     def time(self) -> Array:
         """(n,): s."""
         return self.start + self.time_step * np.arange(len(self.plate))
-
-
-def equal_step(time: Array) -> float:
-    """Time step (s) of time stamps (s). Raises InputError where they do not increase in equal steps."""
-    if len(time) < SHORTEST:
-        raise InputError(
-            f"The record has {len(time)} samples, too few to identify anything; give {SHORTEST} or more."
-        )
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        place = int(np.argmax(steps <= 0)) + 2
-        raise InputError(
-            f"Time does not increase at sample {place}; sort the record and drop doubled samples."
-        )
-    step = float((time[-1] - time[0]) / (len(time) - 1))
-    away = np.abs(time - (time[0] + step * np.arange(len(time))))
-    if away.max() > JITTER * step:
-        raise InputError(
-            f"Time steps are not equal (they run from {steps.min():.6g} to {steps.max():.6g} s); "
-            "resample the record to equal steps, or write the time with more digits."
-        )
-    return step

@@ -1,0 +1,152 @@
+"""Columns of numbers from a CSV file, with units in its header or given, and equal steps of time."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .arrays import Array
+from .errors import InputError
+from .names import suggest
+
+JITTER = 0.05
+"""How far a time stamp may lie from equal steps, as a share of the step: more is no rounding of digits."""
+_HEADING = re.compile(r"^(?P<name>[^(\[]*?)\s*(?:[(\[]\s*(?P<unit>[^)\]]*?)\s*[)\]])?\s*$")
+
+
+@dataclass(frozen=True)
+class Column:
+    """How a column may be written, and in which units; case, spaces, '_' and '-' in names don't matter."""
+
+    spellings: tuple[str, ...]
+    units: Mapping[str, float]  # scale to SI by unit
+    example: str  # unit that messages show
+    required: bool = True
+
+
+LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}
+TIME = Column(("time", "t"), {"s": 1.0, "ms": 1e-3}, "s")
+
+
+def read_columns(
+    path: str | Path, columns: Mapping[str, Column], units: Mapping[str, str] | None = None
+) -> dict[str, Array]:
+    """Columns by name, (n,) each, in SI units.
+
+    Units stand in the header, as ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which wins.
+    Other columns are ignored, and so are lines that are empty or begin with #. The separator is a comma,
+    semicolon or tab. Raises InputError, naming the line and the column, for anything missing or not a number.
+    """
+    lines = _lines(path)
+    header, body = lines[0][1], lines[1:]
+    places = _places(path, header, columns, dict(units or {}))
+    values: dict[str, Array] = {name: np.empty(len(body)) for name in places}
+    for row, (number, cells) in enumerate(body):
+        for name, (place, scale) in places.items():
+            text = cells[place].strip() if place < len(cells) else ""
+            values[name][row] = scale * _number(text, path, number, name)
+    return values
+
+
+def equal_step(time: Array, least: int, purpose: str) -> float:
+    """Time step (s) of time stamps (s).
+
+    least: samples that there must be; purpose: what fewer are too few for, as "to identify anything".
+    Raises InputError where they are fewer, or do not increase in equal steps.
+    """
+    if len(time) < least:
+        raise InputError(f"The record has {len(time)} samples, too few {purpose}; give {least} or more.")
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        place = int(np.argmax(steps <= 0)) + 2
+        raise InputError(
+            f"Time does not increase at sample {place}; sort the record and drop doubled samples."
+        )
+    step = float((time[-1] - time[0]) / (len(time) - 1))
+    away = np.abs(time - (time[0] + step * np.arange(len(time))))
+    if away.max() > JITTER * step:
+        raise InputError(
+            f"Time steps are not equal (they run from {steps.min():.6g} to {steps.max():.6g} s); "
+            "resample the record to equal steps, or write the time with more digits."
+        )
+    return step
+
+
+def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
+    """Numbered lines as cells, the header first."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise InputError(
+            f"The record {path} could not be read: {reason}; give a CSV file in UTF-8."
+        ) from error
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not kept:
+        raise InputError(f"The record {path} is empty; give a CSV file with a header.")
+    separator = max(",;\t", key=kept[0][1].count)
+    cells = csv.reader((line for _, line in kept), delimiter=separator)
+    return [(number, row) for (number, _), row in zip(kept, cells, strict=True)]
+
+
+def _places(
+    path: str | Path, header: list[str], columns: Mapping[str, Column], units: dict[str, str]
+) -> dict[str, tuple[int, float]]:
+    """Place and scale to SI of each column."""
+    unknown = [name for name in units if name not in columns]
+    if unknown:
+        raise InputError(f"Unit of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")
+    places: dict[str, tuple[int, float]] = {}
+    for place, heading in enumerate(header):
+        match = _HEADING.match(heading.strip())
+        plain = re.sub(r"[\s_-]", "", match["name"]).lower() if match else ""
+        name = next((name for name, column in columns.items() if plain in column.spellings), None)
+        if name is None or match is None:
+            continue
+        if name in places:
+            raise InputError(f"{path} has column {name} twice; keep one.")
+        places[name] = (place, _scale(path, name, columns[name], units.get(name) or match["unit"]))
+    missing = [name for name, column in columns.items() if column.required and name not in places]
+    if missing:
+        wanted = ", ".join(f"{name} ({column.example})" for name, column in columns.items())
+        raise InputError(
+            f"{path} has no column {', '.join(missing)} (its header: {', '.join(header)}); "
+            f"name the columns {wanted}."
+        )
+    return places
+
+
+def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> float:
+    if not unit:
+        raise InputError(
+            f"Column {name} of {path} has no unit; write it in the header, as "
+            f"'{name} ({column.example})', or give --unit."
+        )
+    if unit not in column.units:
+        raise InputError(
+            f"Column {name} of {path} is in '{unit}'; known units are {', '.join(column.units)}."
+        )
+    return column.units[unit]
+
+
+def _number(text: str, path: str | Path, line: int, name: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        shown = f"holds '{text}'" if text else "is empty"
+        raise InputError(
+            f"Line {line} of {path}: column {name} {shown}, which is not a finite number; "
+            "mend or drop such lines (a decimal point is wanted, not a comma)."
+        )
+    return value

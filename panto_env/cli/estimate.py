@@ -1,0 +1,237 @@
+"""``panto estimate``: the contact force from a record of a pantograph's motion."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..base.errors import InputError
+from ..base.files import TABLES, write_rows
+from ..base.table import Table
+from ..terminal import Json, Plot, console, number, print_json, print_table, progress_console, writable
+from .identify import pairs
+
+if TYPE_CHECKING:
+    from ..estimation.estimate import Estimate
+    from ..estimation.motion import Motion
+    from ..estimation.score import Score
+    from ..estimation.settings import EstimatorSettings
+    from ..plant.pantograph.schema import PantographData
+
+TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
+
+
+def estimate(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV: time, head, frame, and where measured head_velocity, frame_velocity, frame_force, "
+            "head_force; contact_force is compared with."
+        ),
+    ],
+    pantograph: Annotated[
+        str, typer.Option(help="Name in the catalogue, or a TOML file, as `panto identify` writes it.")
+    ],
+    speed: Annotated[
+        float | None, typer.Option(help="Of the train (km/h); needed for an aerodynamic uplift.", min=0)
+    ] = None,
+    span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1)] = None,
+    lift: Annotated[
+        float | None,
+        typer.Option(help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0),
+    ] = None,
+    displacements: Annotated[
+        bool, typer.Option("--displacements", help="Leave out velocities, though they were measured.")
+    ] = False,
+    force_model: Annotated[
+        str, typer.Option(help="random-walk, shaped or periodic, with values as 'shaped:wavelength=5'.")
+    ] = "random-walk",
+    displacement_noise: Annotated[
+        float | None, typer.Option(help="White noise of a sample, rms (m).", show_default="2e-5")
+    ] = None,
+    velocity_noise: Annotated[
+        float | None, typer.Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
+    ] = None,
+    lag: Annotated[float, typer.Option(help="How long the estimate may wait for later samples (s).")] = 0.0,
+    free_zero: Annotated[
+        bool,
+        typer.Option("--free-zero", help="The zero of heights is not known: the lift is the mean."),
+    ] = False,
+    tune: Annotated[
+        bool,
+        typer.Option("--tune", help="Find noise intensities by maximum likelihood on this record first."),
+    ] = False,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of a column whose header has none, as head=mm; may be repeated."),
+    ] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Write the estimate to this .csv or .parquet file.", callback=writable(TABLES)),
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Estimate the contact force from the motion of collector head and articulated frame (paper 2).
+
+    Heights count up (m or mm, as the header says) from where the pantograph's springs carry nothing. A record
+    that can't be a pantograph's is refused with the likely mistake. The mean force rests on the lift, and the
+    inertia of the head on its mass: no test shows if these are wrong.
+    """
+    from ..base.settings import parse
+    from ..catalog import load_pantograph
+    from ..estimation.estimate import estimate as run
+    from ..estimation.motion_file import read_motion
+    from ..estimation.plausibility import rezeroed
+    from ..estimation.settings import EstimatorSettings
+
+    known = load_pantograph(pantograph)
+    metres = None if speed is None else speed / 3.6
+    motion = read_motion(file, 0.0, speed=metres, span_length=span, units=pairs(unit or []))
+    motion = dataclasses.replace(motion, lift=_lift(known, metres, lift, motion))
+    if free_zero:
+        motion = rezeroed(motion, known)
+    only = displacements or motion.head_velocity is None or motion.frame_velocity is None
+    given: dict[str, Any] = {
+        "observation": "displacements" if only else "displacements and velocities",
+        "force_model": force_model,
+        "displacement_noise": displacement_noise,
+        "velocity_noise": velocity_noise,
+        "lag": lag,
+    }
+    given = {key: value for key, value in given.items() if value is not None}
+    settings = parse(EstimatorSettings, given, "settings")
+    if tune:
+        from ..estimation.tuning import tune as find
+
+        names = TUNED if only else (*TUNED, "velocity_noise")
+        with progress_console.status("tuning"):
+            settings = find([motion], known, settings, names).settings
+    found = run(motion, known, settings)
+    scores = _scores(motion, found)
+    if output is not None:
+        write_rows(_rows(found), output)
+    if plot is not None:
+        from ..analysis.plots import save
+        from ..estimation.plots import plot_estimate
+
+        title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
+        save(plot_estimate(found, title, motion.contact_force), plot)
+    if json:
+        print_json(_plain(found, motion, settings, scores))
+        return
+    _print(found, motion, settings, scores, file.name)
+
+
+def _lift(pantograph: PantographData, speed: float | None, lift: float | None, motion: Motion) -> float:
+    """What lifts the pantograph (N), where it is not given."""
+    if lift is not None:
+        return lift
+    if speed is None and pantograph.aerodynamic_coefficient > 0:
+        raise InputError(
+            f"Pantograph '{pantograph.name}' has an aerodynamic uplift; give the speed of the train, "
+            "--speed, or what lifts it in all, --lift."
+        )
+    nominal = float(pantograph.nominal_force(speed or 0.0))
+    if pantograph.force == "mean":  # it states the contact force: the lowest spring is lifted besides
+        nominal += pantograph.stiffnesses[-1] * float(motion.frame.mean())
+    return nominal
+
+
+def _rows(found: Estimate) -> list[dict[str, Any]]:
+    from ..estimation.innovations import nis
+
+    normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
+    columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
+    names = list(columns)
+    return [
+        dict(zip(names, row, strict=True))
+        for row in zip(*(each.tolist() for each in columns.values()), strict=True)
+    ]
+
+
+def _figures(found: Estimate) -> dict[str, float]:
+    """Of the estimate low-passed as EN 50317 does, once the start has been forgotten (N)."""
+    from ..metrics.low_pass import low_pass
+
+    step = float(found.time[1] - found.time[0])
+    force = low_pass(found.force, step)[found.first :]
+    return {
+        "mean": float(force.mean()),
+        "std": float(force.std()),
+        "max": float(force.max()),
+        "min": float(force.min()),
+    }
+
+
+def _scores(motion: Motion, found: Estimate) -> list[Score]:
+    """Against the contact force of the record, where it has one, in bands that it is long enough for."""
+    from ..estimation.score import BANDS, score
+
+    if motion.contact_force is None:
+        return []
+    kept, scores = slice(found.first, None), []
+    for band in BANDS:
+        try:
+            scores.append(score(motion.contact_force[kept], found.force[kept], motion.time_step, band))
+        except InputError as error:
+            progress_console.print(f"[bold red]Warning:[/] no comparison in 0 to {band:g} Hz: {error}")
+    return scores
+
+
+def _plain(
+    found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score]
+) -> dict[str, Any]:
+    tested = found.consistency
+    return {
+        **_figures(found),
+        "deviation": found.deviation,
+        "lift": motion.lift,
+        "nis": tested.nis,
+        "nis_bounds": tested.nis_bounds,
+        "largest_autocorrelation": tested.whiteness.largest,
+        "believe": found.verdict.believe,
+        "reasons": found.verdict.reasons,
+        "settings": settings.model_dump(),
+        "scores": [vars(each) for each in scores],
+    }
+
+
+def _print(
+    found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
+) -> None:
+    from ..metrics.labels import LABELS
+
+    tested, (low, high) = found.consistency, found.consistency.nis_bounds
+    rows: list[tuple[str, str]] = [
+        (LABELS[key].heading, number(value)) for key, value in _figures(found).items()
+    ]
+    rows += [
+        ("lift, which the mean rests on (N)", number(motion.lift)),
+        ("rms error by the model, all frequencies (N)", number(found.deviation)),
+        (f"innovations, squared (1; a true model's {low:.3f} to {high:.3f})", f"{tested.nis:.3f}"),
+        (
+            f"their autocorrelation (0; a true model's to {tested.whiteness.bound:.3f})",
+            f"{tested.whiteness.largest:+.3f}",
+        ),
+        ("to be believed", "yes" if found.verdict.believe else "[bold red]no[/]"),
+    ]
+    model = f"{settings.observation}, {settings.force_model.kind}"
+    print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", ""), rows))
+    for reason in found.verdict.reasons:
+        console.print(f"[bold red]Warning:[/] {reason}.")
+    if scores:
+        print_table(_scores_table(scores))
+
+
+def _scores_table(scores: list[Score]) -> Table:
+    rows = []
+    for each in scores:
+        forces = number(each.bias, 2), number(each.rms, 2)
+        likeness = number(each.correlation, 4), number(1e3 * each.delay, 2)
+        rows.append((f"0 to {each.band:g} Hz", *forces, *likeness))
+    headings = ("band", "bias (N)", "rms error (N)", "correlation", "late by (ms)")
+    return Table("Against the recorded contact force", headings, rows)

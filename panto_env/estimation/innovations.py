@@ -1,0 +1,102 @@
+"""Whether a filter's innovations are what its model says: white, and as large as their covariance.
+
+Where they are not, the model, its noise or the record is wrong, and so may be the estimate. The converse does
+not hold: what no measured motion shows, above all a wrong mass of the collector head, they cannot show
+either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..base.arrays import Array
+from .kalman import Filtered
+
+LEVEL = 0.99
+"""Of the bounds within which a correct model's figures lie so often."""
+LAGS = 20
+"""Samples over which innovations must not resemble each other."""
+WINDOW = 0.5
+"""Time (s) over which the size of innovations is judged piece by piece, about a span at 430 km/h."""
+
+
+class Whiteness(NamedTuple):
+    """Autocorrelation of innovations, of the quantity where it is largest."""
+
+    largest: float  # -1..1: of the largest size, over lags 1 to ``LAGS``
+    bound: float  # that a correct model stays below in LEVEL of all records
+    probability: float  # that a correct model's Ljung and Box's sum is as large
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Innovations of n samples of m quantities against the model.
+
+    The normalised innovation squared (NIS) of a sample, over m, is 1 in the mean for a correct model.
+    """
+
+    nis: float
+    nis_bounds: tuple[float, float]  # of a correct model, at LEVEL
+    window_nis: Array  # (windows,): mean of each piece
+    window_time: Array  # (windows,): middle of each (s)
+    whiteness: Whiteness
+
+
+def normalise(filtered: Filtered) -> Array:
+    """Innovations, (n, m), that a correct model leaves independent with variance 1."""
+    innovations = filtered.innovations
+    covariance = filtered.gains.of(np.arange(len(innovations))).innovation
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(covariance), innovations[:, :, None])[:, :, 0])
+
+
+def nis(filtered: Filtered) -> Array:
+    """Normalised innovation squared of each sample, (n,): chi-squared with m degrees for a correct model."""
+    return np.asarray((normalise(filtered) ** 2).sum(axis=1))
+
+
+def log_likelihood(filtered: Filtered, first: int = 0) -> float:
+    """Logarithm of the density of the samples from number ``first`` on, given those before."""
+    innovations = filtered.innovations[first:]
+    covariance = filtered.gains.of(np.arange(first, first + len(innovations))).innovation
+    _, logarithm = np.linalg.slogdet(2 * np.pi * covariance)
+    return float(-0.5 * (nis(filtered)[first:].sum() + logarithm.sum()))
+
+
+def whiteness(normalised: Array) -> Whiteness:
+    """Test normalised innovations, (n, m), by their autocorrelations.
+
+    The probability is that of G. M. Ljung and G. E. P. Box, Biometrika 65:297, 1978 (recalled), the least of
+    the quantities', times their number.
+    """
+    n, m = normalised.shape
+    centred = normalised - normalised.mean(axis=0)
+    power = (centred**2).sum(axis=0)
+    lags = np.arange(1, LAGS + 1)
+    correlations = np.array([(centred[lag:] * centred[:-lag]).sum(axis=0) / power for lag in lags])
+    sums = n * (n + 2) * (correlations**2 / (n - lags)[:, None]).sum(axis=0)
+    largest = correlations.ravel()[np.abs(correlations).argmax()]
+    # The largest of m LAGS independent numbers: each within, so that all are at LEVEL.
+    each = LEVEL ** (1 / (m * LAGS))
+    bound = np.sqrt(chi2.ppf(each, 1) / n)
+    return Whiteness(float(largest), float(bound), float(min(1.0, m * chi2.sf(sums.max(), LAGS))))
+
+
+def consistency(filtered: Filtered, time: Array, first: int = 0) -> Consistency:
+    """Judge the innovations from sample ``first`` on; time: of all samples, (n,) (s)."""
+    normalised = normalise(filtered)[first:]
+    n, m = normalised.shape
+    each = (normalised**2).sum(axis=1) / m
+    tails = chi2.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], n * m) / (n * m)
+    step = float(time[1] - time[0])
+    pieces = np.array_split(np.arange(n), max(1, round(n * step / WINDOW)))
+    return Consistency(
+        nis=float(each.mean()),
+        nis_bounds=(float(tails[0]), float(tails[1])),
+        window_nis=np.array([each[piece].mean() for piece in pieces]),
+        window_time=np.array([time[first:][piece].mean() for piece in pieces]),
+        whiteness=whiteness(normalised),
+    )

@@ -1,0 +1,95 @@
+"""What an estimator is given: the motion of a pantograph on a train or a rig, at equal time steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..metrics.trajectory import Trajectory
+
+RATE = 1000.0
+"""Samples per second of a measurement. Own choice."""
+DISPLACEMENT_NOISE, VELOCITY_NOISE = 2e-5, 5e-3
+"""White noise, rms (m, m/s): those of the sensors' preset "realistic"."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """n samples. Heights count up from where the pantograph's springs carry nothing, as in ``Trajectory``."""
+
+    time_step: float  # s
+    head: Array  # (n,): height of the collector head (m)
+    frame: Array  # (n,): height of the articulated frame, the lowest mass (m)
+    head_velocity: Array | None  # (n,): m/s; None: not measured
+    frame_velocity: Array | None  # (n,): m/s; None: not measured
+    frame_force: Array  # (n,): of an actuator on the frame, from this sample to the next (N)
+    head_force: Array  # (n,): of an actuator between head and the mass below it, as above (N)
+    lift: float  # static force and aerodynamic uplift on the lowest mass (N)
+    speed: float | None = None  # of the train (m/s); None: not known
+    span_length: float | None = None  # m; None: not known
+    start: float = 0.0  # time of the first sample (s)
+    contact_force: Array | None = None  # (n,): the true one (N), where known; no estimator looks at it
+
+    @property
+    def time(self) -> Array:
+        """(n,): s."""
+        return self.start + self.time_step * np.arange(len(self.head))
+
+    def measured(self, quantities: int) -> Array:
+        """The first 2 or 4 of heights of head and frame (m) and their velocities (m/s), (n, quantities)."""
+        series = (self.head, self.frame, self.head_velocity, self.frame_velocity)[:quantities]
+        return np.column_stack([each for each in series if each is not None])
+
+    @property
+    def inputs(self) -> Array:
+        """Known forces on the frame and between head and the mass below, (n, 2) (N)."""
+        return np.column_stack([self.lift + self.frame_force, self.head_force])
+
+
+def measure(
+    run: Trajectory,
+    *,
+    rate: float = RATE,
+    displacement_noise: float = DISPLACEMENT_NOISE,
+    velocity_noise: float = VELOCITY_NOISE,
+    seed: int = 0,
+) -> Motion:
+    """What sensors see of a simulated run: sampled at ``rate`` (1/s), with white noise (rms, m and m/s).
+
+    The motion is taken from a cubic spline through the run's samples; forces are means over the sampling
+    interval: those of actuators from a sample to the next, as a filter holds them, and the true contact force
+    about the sample. seed: of the noise.
+    """
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    step = 1 / rate
+    first, last = run.time[0] + step, run.time[-1] - step
+    time = first + step * np.arange(int((last - first) * rate) + 1)
+    random = np.random.default_rng(seed)
+
+    def seen(values: Array, noise: float) -> Array:
+        clean = CubicSpline(run.time, values)(time)
+        return np.asarray(clean + noise * random.standard_normal(len(time)))
+
+    edges = run.time_step * np.arange(len(run.time) + 1)
+
+    def mean(values: Array, begin: Array, end: Array) -> Array:
+        integral = np.concatenate([[0.0], np.cumsum(values) * run.time_step])
+        return np.asarray((np.interp(end, edges, integral) - np.interp(begin, edges, integral)) / step)
+
+    return Motion(
+        time_step=step,
+        head=seen(run.head, displacement_noise),
+        frame=seen(run.frame, displacement_noise),
+        head_velocity=seen(run.head_velocity, velocity_noise),
+        frame_velocity=seen(run.frame_velocity, velocity_noise),
+        frame_force=mean(run.frame_force, time, time + step),
+        head_force=mean(run.head_force, time, time + step),
+        lift=run.nominal_force,
+        speed=run.speed_kmh / 3.6,
+        span_length=run.span_length,
+        start=float(time[0]),
+        contact_force=mean(run.contact_force, time - step / 2, time + step / 2),
+    )

@@ -1,0 +1,205 @@
+"""Extended Kalman filter: the contact force and parameters of the pantograph together (paper 2, section 4.1).
+
+The state is z with the logarithms of parameters over their known values. Since the contact force is itself
+unknown, the collector head's mass cannot be seen: whatever it is wrong by, the force takes up. The frame
+carries no unknown force, so that its mass, springs and dampers can be seen, but only if the lift is known:
+were it not, all of them and the lift could be scaled alike. ``information`` measures both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.names import suggest
+from ..plant.pantograph.schema import PantographData
+from .estimate import SETTLING, filter_motion, model_of
+from .innovations import normalise
+from .kalman import steady_gains
+from .model import Model
+from .motion import Motion
+from .plausibility import check_motion
+from .settings import PAPER2, EstimatorSettings
+
+HEAD_MASS = "masses.0"
+LIFT = "lift"
+PRIOR = 0.1
+"""How far a parameter may be from its known value, rms, relative. Own choice."""
+STEP = 1e-4
+"""Relative change of a parameter with which derivatives are taken."""
+MOVED = 0.01
+"""Change of a parameter, relative, after which the model is built anew about it."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What was found with the force. p parameters."""
+
+    names: tuple[str, ...]
+    values: Array  # (p,): at the end of the record, SI units
+    deviation: Array  # (p,): standard deviation by the filter, relative
+    history: Array  # (n, p): values over the record
+    force: Array  # (n,): contact force (N)
+    pantograph: PantographData  # with these values
+
+    @property
+    def told(self) -> Array:
+        """How much of what was unknown of each parameter the record told, (p,): 0 nothing, 1 all."""
+        return 1 - self.deviation / PRIOR
+
+
+def parameter_names(pantograph: PantographData) -> tuple[str, ...]:
+    """All of the chain, as "masses.0" for the head's mass, without those that are 0."""
+    keys = ("masses", "stiffnesses", "dampings")
+    return tuple(f"{key}.{k}" for key in keys for k, value in enumerate(getattr(pantograph, key)) if value)
+
+
+def frame_parameters(pantograph: PantographData) -> tuple[str, ...]:
+    """Those that can be seen: all but the head's mass."""
+    return tuple(name for name in parameter_names(pantograph) if name != HEAD_MASS)
+
+
+def estimate_parameters(
+    motion: Motion,
+    pantograph: PantographData,
+    settings: EstimatorSettings | None = None,
+    names: Sequence[str] | None = None,
+) -> Parameters:
+    """Contact force and parameters of a motion; names: of parameters, by default those that can be seen.
+
+    Raises InputError for a motion that can't be a pantograph's, or names that are not its parameters.
+    """
+    settings = EstimatorSettings() if settings is None else settings
+    # A suspension whose error wanders takes up what the lift tells: all parameters then drift together.
+    settings = settings.model_copy(update=PAPER2)
+    check_motion(motion, pantograph)
+    names = frame_parameters(pantograph) if names is None else tuple(names)
+    _check(names, pantograph)
+    linear = _Linearised(motion, pantograph, settings, names)
+    model, p = linear.model, len(names)
+    measured, inputs = motion.measured(len(model.observed)), motion.inputs
+    size = len(model.force)
+    observed = np.hstack([model.observed, np.zeros((len(model.observed), p))])
+    state = np.concatenate([model.start(measured[0], motion.lift), np.zeros(p)])
+    covariance = block_diag(model.start_covariance, PRIOR**2 * np.eye(p))
+    noise = block_diag(model.process_noise, np.zeros((p, p)))
+    history, force = np.empty((len(measured), p)), np.empty(len(measured))
+    for k, sample in enumerate(measured):
+        seen = observed @ covariance
+        innovation = seen @ observed.T + model.measurement_noise
+        gain = np.linalg.solve(innovation, seen).T
+        state = state + gain @ (sample - observed @ state)
+        after = np.eye(size + p) - gain @ observed
+        covariance = after @ covariance @ after.T + gain @ model.measurement_noise @ gain.T
+        history[k], force[k] = state[size:], model.force @ state[:size]
+        moved, slope = linear.move(state[:size], state[size:], inputs[k])
+        jacobian = np.eye(size + p)
+        jacobian[:size] = slope
+        state[:size] = moved
+        covariance = jacobian @ covariance @ jacobian.T + noise
+    known = np.array([_get(pantograph, name) for name in names])
+    values = known * np.exp(history)
+    return Parameters(
+        names=names,
+        values=values[-1],
+        deviation=np.sqrt(np.diag(covariance)[size:]),
+        history=values,
+        force=force,
+        pantograph=changed(pantograph, dict(zip(names, values[-1], strict=True))),
+    )
+
+
+def information(
+    motion: Motion, pantograph: PantographData, settings: EstimatorSettings, names: Sequence[str]
+) -> Array:
+    """Fisher information, (p, p), on logarithms of parameters, "lift" among them, in a motion's innovations.
+
+    The inverse bounds the covariance of any unbiased estimate of them (Cramér and Rao). A parameter without
+    information cannot be seen; a direction without any, no combination of its parameters.
+    """
+    check_motion(motion, pantograph)
+    _check([name for name in names if name != LIFT], pantograph)
+    first = math.ceil(SETTLING / motion.time_step)
+
+    def innovations(name: str, factor: float) -> Array:
+        moved, other = motion, pantograph
+        if name == LIFT:
+            moved = replace(motion, lift=factor * motion.lift)
+        else:
+            other = changed(pantograph, {name: factor * _get(pantograph, name)})
+        model = model_of(moved, other, settings)
+        return normalise(filter_motion(model, steady_gains(model), moved))[first:].ravel()
+
+    columns = [(innovations(name, 1 + STEP) - innovations(name, 1 - STEP)) / (2 * STEP) for name in names]
+    slopes = np.array(columns)
+    return np.asarray(slopes @ slopes.T)
+
+
+def changed(pantograph: PantographData, values: dict[str, float]) -> PantographData:
+    """A pantograph with other values of some parameters, by name."""
+    update: dict[str, tuple[float, ...]] = {}
+    for name, value in values.items():
+        key, _, place = name.partition(".")
+        chain = list(update.get(key, getattr(pantograph, key)))
+        chain[int(place)] = float(value)
+        update[key] = tuple(chain)
+    return pantograph.model_copy(update=update)
+
+
+class _Linearised:
+    """One step of the state, to first order in the parameters about those at which it was last built."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        pantograph: PantographData,
+        settings: EstimatorSettings,
+        names: Sequence[str],
+    ) -> None:
+        self._motion, self._pantograph, self._settings, self._names = motion, pantograph, settings, names
+        self._known = np.array([_get(pantograph, name) for name in names])
+        self._build(np.zeros(len(names)))
+
+    def move(self, state: Array, logarithms: Array, inputs: Array) -> tuple[Array, Array]:
+        """The state a step later, (N,), and its slope over state and logarithms, (N, N + p)."""
+        if np.abs(logarithms - self._about).max(initial=0.0) > MOVED:
+            self._build(logarithms)
+        transition = self.model.transition + np.tensordot(logarithms - self._about, self._transitions, 1)
+        pushed = self.model.inputs + np.tensordot(logarithms - self._about, self._inputs, 1)
+        slope = (self._transitions @ state + self._inputs @ inputs).T
+        return transition @ state + pushed @ inputs, np.hstack([transition, slope])
+
+    def _build(self, about: Array) -> None:
+        self._about = about.copy()
+        self.model = self._model(about)
+        sides = [[self._model(about + sign * STEP * row) for sign in (1, -1)] for row in np.eye(len(about))]
+        self._transitions = np.array([(a.transition - b.transition) / (2 * STEP) for a, b in sides])
+        self._inputs = np.array([(a.inputs - b.inputs) / (2 * STEP) for a, b in sides])
+
+    def _model(self, logarithms: Array) -> Model:
+        values = dict(zip(self._names, self._known * np.exp(logarithms), strict=True))
+        return model_of(self._motion, changed(self._pantograph, values), self._settings)
+
+
+def _check(names: Sequence[str], pantograph: PantographData) -> None:
+    known = parameter_names(pantograph)
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"'{name}' is no parameter of '{pantograph.name}' that can be estimated: "
+                f"{suggest(name, list(known))}."
+            )
+    if not names:
+        raise InputError("Name one parameter at least.")
+
+
+def _get(pantograph: PantographData, name: str) -> float:
+    key, _, place = name.partition(".")
+    value: float = getattr(pantograph, key)[int(place)]
+    return value

@@ -1,0 +1,49 @@
+"""Pictures of estimates. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..base.arrays import Array
+from ..metrics.low_pass import low_pass_in_place
+from .estimate import Estimate
+from .verdict import WINDOW_NIS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = 10.0
+"""Seconds drawn of a record at most, from when its start has been forgotten."""
+
+
+def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None) -> Figure:
+    """Estimated contact force, low-passed at 20 Hz in place, and the size of innovations, of at most 10 s.
+
+    measured: contact force of the record (N), (n,), drawn beside it.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 6), layout="constrained")
+    force, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    begin = estimate.time[estimate.first]
+    end = min(begin + SHOWN, estimate.time[-1])
+    shown = (estimate.time >= begin) & (estimate.time <= end)
+    step = float(estimate.time[1] - estimate.time[0])
+    time = estimate.time[shown]
+    if measured is not None:
+        drawn = low_pass_in_place(measured, step)[shown]
+        force.plot(time, drawn, color="tab:orange", linewidth=3, label="recorded")
+    drawn = low_pass_in_place(estimate.force, step)[shown]
+    force.plot(time, drawn, color="black", linewidth=1, label="estimated")
+    force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
+    force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, fontsize="small", frameon=False)
+    tested = estimate.consistency
+    innovations.plot(tested.window_time, tested.window_nis, "o-", color="tab:blue", markersize=3)
+    innovations.axhline(1.0, color="0.4", linestyle=":")
+    innovations.axhline(WINDOW_NIS, color="tab:red", linestyle="--", linewidth=0.9)
+    rest = f"; the record ends at {estimate.time[-1]:.4g} s" if end < estimate.time[-1] else ""
+    innovations.set(xlabel=f"time (s){rest}", ylabel="innovations\n(squared, 1: as expected)")
+    for axis in (force, innovations):
+        axis.grid(color="0.9")
+    figure.suptitle(title, fontsize="medium", x=0.01, ha="left")
+    return figure

@@ -1,0 +1,102 @@
+"""The contact force as an input of which nothing at all is believed: a minimum-variance unbiased filter.
+
+S. Gillijns and B. De Moor, Automatica 43:111, 2007 (recalled): at each sample, the force over the step before
+is what least squares needs to explain it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..plant.pantograph.schema import PantographData
+from .estimate import model_of
+from .force import RandomWalk
+from .low_pass import CUTOFF, low_pass
+from .model import Model
+from .motion import Motion
+from .plausibility import check_motion
+from .settings import EstimatorSettings
+
+SETTLED = 1e-10
+"""Relative change of the covariance in a step below which it counts as settled."""
+_HELD = RandomWalk(intensity=0.01)  # hardly moves: what the force does over a step is no noise of the state
+
+
+class _Gain(NamedTuple):
+    state: Array  # (N, m)
+    force: Array  # (m,)
+
+
+def unknown_input(
+    motion: Motion,
+    pantograph: PantographData,
+    settings: EstimatorSettings | None = None,
+    *,
+    cutoff: float | None = CUTOFF,
+) -> Array:
+    """Contact force (N), (n,), low-passed at ``cutoff`` (Hz), or raw where that is None.
+
+    settings: whose force model is not used. Raises InputError as ``estimate`` does.
+    """
+    settings = EstimatorSettings() if settings is None else settings
+    check_motion(motion, pantograph)
+    system = _system(model_of(motion, pantograph, settings.model_copy(update={"force_model": _HELD})))
+    measured, known = motion.measured(len(system.observed)), motion.inputs @ system.inputs.T
+    state, covariance = system.observed.T @ measured[0], system.start_covariance
+    gain, settled = None, False
+    raw = np.empty(len(measured))
+    for k, sample in enumerate(measured):
+        if gain is None or not settled:
+            gain, corrected = _gain(system, covariance)
+            following = system.transition @ corrected @ system.transition.T + system.process_noise
+            settled = bool(np.abs(following - covariance).max() <= SETTLED * np.abs(covariance).max())
+            covariance = following
+        innovation = sample - system.observed @ state
+        raw[k] = gain.force @ innovation
+        state = system.transition @ (state + gain.state @ innovation) + known[k]
+    raw[0] = motion.lift  # of the step before the first sample nothing is known
+    return raw if cutoff is None else low_pass(raw, cutoff, motion.time_step)
+
+
+class _System(NamedTuple):
+    """As ``Model``, but that the contact force is no state: it is held over a step, and unknown."""
+
+    transition: Array  # (N, N)
+    inputs: Array  # (N, 2)
+    contact: Array  # (N,): change of the state by 1 N of contact force
+    process_noise: Array  # (N, N)
+    observed: Array  # (m, N)
+    measurement_noise: Array  # (m, m)
+    start_covariance: Array  # (N, N)
+
+
+def _system(model: Model) -> _System:
+    kept, force = np.flatnonzero(model.force == 0), np.flatnonzero(model.force)
+    square = np.ix_(kept, kept)
+    return _System(
+        transition=model.transition[square],
+        inputs=model.inputs[kept],
+        contact=model.transition[kept, force],
+        process_noise=model.process_noise[square],
+        observed=model.observed[:, kept],
+        measurement_noise=model.measurement_noise,
+        start_covariance=model.start_covariance[square],
+    )
+
+
+def _gain(system: _System, covariance: Array) -> tuple[_Gain, Array]:
+    """Gains for a sample, and covariance of the corrected state, for that of the predicted one, (N, N)."""
+    observed, contact = system.observed, system.contact
+    seen = observed @ covariance
+    innovation = seen @ observed.T + system.measurement_noise
+    known = np.linalg.solve(innovation, seen).T
+    through = observed @ contact
+    weight = np.linalg.solve(innovation, through)
+    force = weight / (through @ weight)
+    gain = known + np.outer(contact - known @ through, force)
+    after = np.eye(len(covariance)) - gain @ observed
+    corrected = after @ covariance @ after.T + gain @ system.measurement_noise @ gain.T
+    return _Gain(gain, force), corrected
