@@ -19,9 +19,10 @@ from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .state import NOW, TASK_ROW
 
-MEASURED, FULL, CENTRED = "measured", "full", "centred"
+MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
 """Kinds of observation: what a train can measure; that and more, free of noise and delay; what it can
-measure and the nominal force, each entry with a mean near 0 and a spread near 1 in a passive run."""
+measure and the nominal force, each entry with a mean near 0 and a spread near 1 in a passive run; the first
+with the contact force that a filter estimates, in the place of one that is measured."""
 CENTRES = {
     "head displacement": (0.056, 0.012),
     "frame displacement": (0.084, 0.013),
@@ -31,7 +32,11 @@ CENTRES = {
     "nominal force": (120.0, 30.0),
 }
 """Centre and scale in "centred" of entries that "measured" has too, from passive runs of Pantograph-v0."""
-KINDS: dict[str, tuple[str, ...]] = {MEASURED: (MEASURED, FULL, CENTRED), FULL: (FULL,), CENTRED: (CENTRED,)}
+KINDS: dict[str, tuple[str, ...]] = {
+    MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED),
+    FULL: (FULL,),
+    CENTRED: (CENTRED,),
+}
 """Kinds of observation that have an entry, by where it is said to belong."""
 
 

@@ -24,10 +24,12 @@ from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
 from ..plant.pantograph.schema import PantographData
+from ..plant.sensors import Reading
 from ..plant.state import ROW
-from .entries import CENTRED, FULL, MEASURED, WRITERS, Entry, entries_of
+from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, entries_of
 from .state import MAX_ENTRIES, NOW
 
+READINGS = len(Reading)
 BOUND = 10.0
 """Every entry is clipped to -BOUND..BOUND of its scale."""
 
@@ -74,7 +76,7 @@ class Layout:
         return entry.centre + float(observation[place]) * entry.scale
 
 
-OBSERVATIONS = (MEASURED, FULL, CENTRED)
+OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
 
 
@@ -111,7 +113,7 @@ def add_noise(sensors, idle, readings, lane):
         its = (lane + i) & NOT_NEGATIVE
         if not idle[its]:
             noise = sensors.noise[its, sensors.noise_used[its] & NOT_NEGATIVE]
-            for k in range(noise.size):
+            for k in range(READINGS):
                 put_number(readings, k, i, number_at(readings, k, i) + noise[k])
             sensors.noise_used[its] += 1
 

@@ -19,6 +19,7 @@ from ..base.names import suggest
 from ..base.ranges import Between
 from ..base.settings import parse, plain
 from ..catalog import load_catenary, load_pantograph
+from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import CLEAR, LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
@@ -49,6 +50,14 @@ def _observation(value: Any) -> str:
     if value not in OBSERVATIONS:
         raise InputError(f"observation must be one of {', '.join(OBSERVATIONS)}, not {value!r}.")
     return str(value)
+
+
+def _estimator(value: Any) -> EstimatorSettings:
+    return parse(EstimatorSettings, value, "estimator", ESTIMATORS)
+
+
+def _known_pantograph(value: Any) -> PantographData | None:
+    return None if value is None else load_pantograph(value)
 
 
 def _spans(value: Any) -> int | None:
@@ -144,7 +153,20 @@ class RunSettings(Numerics):
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
     )
     observation: Annotated[str, BeforeValidator(_observation)] = Field(
-        "measured", description='what a policy sees: "measured" or "full"'
+        "measured",
+        description='what a policy sees: "measured", "full", "centred" or "estimated": as measured, but with '
+        "the contact force that a Kalman filter estimates from the pantograph's motion",
+    )
+    estimator: Annotated[EstimatorSettings, BeforeValidator(_estimator)] = Field(
+        "usual",
+        validate_default=True,
+        description='that of the observation "estimated": "usual", "displacements", one with values as '
+        '"usual:suspension_drift=0", or a table',
+    )
+    known_pantograph: Annotated[PantographData | None, BeforeValidator(_known_pantograph)] = Field(
+        None,
+        description="pantograph that estimator and policies take it for: a name of the catalogue or a TOML "
+        "file; by default the true one",
     )
     reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
         None, validate_default=True, description="weights of the reward's terms: a table"

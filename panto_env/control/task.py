@@ -28,6 +28,7 @@ from ..plant.plant import Plant
 from ..plant.sensors import Noise
 from ..plant.state import Row
 from .context import Context
+from .entries import ESTIMATED
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
@@ -97,11 +98,10 @@ class Task:
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
-        abreast = plant.lanes_abreast
         self.episode = new_episode(settings, plant, self.layout, self.control_steps)
         self.results = self.new_results()
-        self.sensors = settings.sensors.arrays(plant.time_step, self.control_steps, lanes, abreast)
-        rms = settings.sensors.noise_rms
+        self.known_pantograph = settings.known_pantograph or settings.pantograph
+        self.sensors, rms = self._sensors()
         self.noise = None if rms is None else Noise(rms, lanes)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
@@ -115,6 +115,20 @@ class Task:
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
         copy_whole(*self._arrays)
         self._bind()
+
+    def _sensors(self) -> tuple[Any, tuple[float, ...] | None]:
+        """Sensors of all lanes, and the rms of their noise."""
+        settings, plant = self.settings, self.plant
+        form = plant.time_step, self.control_steps, self.lanes, plant.lanes_abreast
+        if settings.observation != ESTIMATED:
+            return settings.sensors.arrays(*form), settings.sensors.noise_rms
+        from ..estimation.readings import estimating  # slow: it imports SciPy
+
+        speed = 0.5 * sum(self.speed_range)
+        span_length = settings.catenary.span_length
+        return estimating(
+            settings.sensors, settings.estimator, self.known_pantograph, speed, span_length, *form
+        )
 
     @property
     def _arrays(self) -> tuple[Any, ...]:
@@ -207,7 +221,7 @@ class Task:
             span_length=self.plant.catenary.span_length,
             nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),
             catenary=self.plant.catenary,
-            pantograph=self.plant.pantograph,
+            pantograph=self.known_pantograph,
         )
 
     def step(
@@ -257,7 +271,7 @@ class Task:
     def _tables(self) -> list[Array]:
         """All that a step changes of lanes that go in groups."""
         plant = self.plant
-        return [*plant.run.table, *plant.actuators.table, self.sensors.table, self.episode.table]
+        return [*plant.run.table, *plant.actuators.table, *self.sensors.tables, self.episode.table]
 
     def run_passively(self) -> None:
         """Run all lanes, just reset, to their ends without actuators."""

@@ -51,3 +51,8 @@ class EstimatorSettings(Settings):
 
 PAPER2: dict[str, Any] = {"suspension_drift": 0.0}
 """Settings with which a two-mass pantograph has exactly the state of paper 2's Eq. 7."""
+ESTIMATORS: dict[str, EstimatorSettings] = {
+    "usual": EstimatorSettings(),
+    "displacements": EstimatorSettings(observation="displacements"),
+}
+"""By name."""

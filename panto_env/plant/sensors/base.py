@@ -28,8 +28,8 @@ class SensorArrays(Protocol):
     """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
 
     @property
-    def table(self) -> Array:
-        """All that changes but the noise, (groups, rows, lanes abreast)."""
+    def tables(self) -> tuple[Array, ...]:
+        """All that changes but the noise, each (groups, rows, lanes abreast)."""
 
     @property
     def noise(self) -> Array:

@@ -78,6 +78,11 @@ class DelayedArrays(NamedTuple):
     noise: Array  # (lanes, times, readings): of the next readings, in their units; no times for none
     noise_used: Index  # (lanes,): how many of them have been used
 
+    @property
+    def tables(self) -> tuple[Array, ...]:
+        """All that changes but the noise."""
+        return (self.table,)
+
     def reset(self, lanes: Lanes, samples: Array) -> None:
         """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
         past = np.tile(samples[..., list(SENSED)], self.table.shape[1] // _READINGS)
