@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from functools import partial
 from pathlib import Path
 
@@ -42,8 +41,9 @@ from panto_env.studies.paper1_control.cases import (
 )
 from panto_env.studies.paper1_control.linear import amplification
 from panto_env.studies.paper1_control.passes import longest, passive_at_mean, records, run
+from tests.pages import check_page, same_row, statements_table, tables_of
 
-PAGE = Path(__file__).parents[1] / "docs" / "paper1-control.md"
+PAGE = "paper1-control.md"
 CLAIMS = "The paper's claims beside ours"
 
 # --- helpers -------------------------------------------------------------------------------------
@@ -311,32 +311,6 @@ def test_a_finer_grid_and_time_step_say_the_same_over_speed_gain_and_angle(outco
     assert best[:speeds] == best[speeds : 2 * speeds]
 
 
-HAMMERS = 10.0  # CL (%) above which a control hammers the wire, and rounding alone moves its figures
-MOVES = 0.05  # by how much of themselves, as the page says
-
-
-def same_row(title: str, headings: list[str], shown: list[str], printed: list[str]) -> bool:
-    """Whether a row of the page is this one, but for the last digit, which rounding may turn."""
-    losses = [k for k, heading in enumerate(headings) if k and ("CL" in title or "CL" in heading)]
-    hammers = any(number(row[k]) > HAMMERS for k in losses for row in (shown, printed))
-    for cell, other in zip(shown, printed, strict=True):
-        a, b = number(cell), number(other)
-        if math.isnan(a) or math.isnan(b):
-            if cell != other:
-                return False
-        elif abs(a - b) > 1.01 * 10.0 ** -len(cell.partition(".")[2]) + (MOVES * abs(a) if hammers else 0):
-            return False
-    return True
-
-
-def number(cell: str) -> float:
-    """A cell's number; nan where it is none."""
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
-
-
 def test_a_row_of_the_page_is_known_by_every_cell() -> None:
     headings = ["control", "CL (%)", "σ (N)"]
     same = partial(same_row, "Actuators", headings)
@@ -352,33 +326,11 @@ def test_a_row_of_the_page_is_known_by_every_cell() -> None:
 def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     """Each table of the page with a title above it, cell by cell."""
     printed = {each.title: each for each in outcome.tables}
-    printed[CLAIMS] = Table(
-        CLAIMS,
-        ("claim", "unit", "ours", "the paper", "agrees"),
-        tuple(
-            (
-                item.quantity,
-                item.unit,
-                f"{item.ours:.3g}",
-                item.paper if isinstance(item.paper, str) else f"{item.paper:.3g}",
-                "yes" if item.agrees else "no",
-            )
-            for item in outcome.comparisons
-        ),
-    )
-    shown = re.findall(r"^\*(.+)\*\n\n((?:\|.*\n)+)", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    assert {title for title, _ in shown} >= {
-        CLAIMS,
-        *(title for title in printed if "Over speed" not in title),
-    }
-    for title, block in shown:
-        headings, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in block.splitlines())
-        columns = [printed[title].headings.index(heading) for heading in headings]
-        found = [[row[column] for column in columns] for row in printed[title].cells]
-        for row in rows:
-            assert any(same_row(title, headings, row, other) for other in found), (title, row)
-        if title == CLAIMS:
-            assert len(rows) == len(found)
+    printed[CLAIMS] = statements_table(CLAIMS, ("claim", "unit", "ours", "the paper", "agrees"), outcome)
+    shown = tables_of(PAGE)
+    assert set(shown) >= {title for title in printed if "Over speed" not in title}
+    assert len(shown[CLAIMS][1]) == len(outcome.comparisons)
+    check_page(PAGE, printed)
 
 
 @pytest.mark.slow
