@@ -11,6 +11,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
+from ..plant.plant import Plant
 from ..plant.state import Row
 from ..plant.valid_range import Ending, reason
 from .identity import identity
@@ -35,9 +36,18 @@ def refuse_divergence(task: Task, lanes: Any, deviation: Array, height: Array) -
         plant = task.plant
         raise InputError(
             f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
-            f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; take a time_step below "
-            f"{1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped contact."
+            f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; {_way_out(plant)}."
         )
+
+
+def _way_out(plant: Plant) -> str:
+    """What to do where a computation diverged."""
+    if plant.catenary.kind == "rig":
+        return "the loop of a rig that is not stable does so, see panto rig --stability"
+    return (
+        f"take a time_step below {1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped "
+        "contact"
+    )
 
 
 def trajectory(
