@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
-from scipy.linalg import block_diag
 
 from ..base.arrays import Array
 from ..base.errors import InputError
@@ -129,6 +128,8 @@ def _walk(intensity: float) -> ForceProcess:
 
 def _sum(*parts: ForceProcess) -> ForceProcess:
     """Independent processes, whose outputs add up to the force."""
+    from scipy.linalg import block_diag  # slow to import
+
     drift, noise, covariance = (
         block_diag(*(getattr(part, name) for part in parts))
         for name in ("drift", "noise", "start_covariance")
