@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..base.arrays import Array
 from .kalman import Filtered
@@ -72,6 +71,8 @@ def whiteness(normalised: Array) -> Whiteness:
     The probability is that of G. M. Ljung and G. E. P. Box, Biometrika 65:297, 1978 (recalled), the least of
     the quantities', times their number.
     """
+    from scipy.stats import chi2  # slow to import
+
     n, m = normalised.shape
     centred = normalised - normalised.mean(axis=0)
     power = (centred**2).sum(axis=0)
@@ -87,6 +88,8 @@ def whiteness(normalised: Array) -> Whiteness:
 
 def consistency(filtered: Filtered, time: Array, first: int = 0) -> Consistency:
     """Judge the innovations from sample ``first`` on; time: of all samples, (n,) (s)."""
+    from scipy.stats import chi2  # slow to import
+
     normalised = normalise(filtered)[first:]
     n, m = normalised.shape
     each = (normalised**2).sum(axis=1) / m

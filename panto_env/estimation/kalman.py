@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_discrete_are
 
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
@@ -52,6 +51,8 @@ def steady_covariance(model: Model) -> Array:
 
     Raises InputError where there is none, as when a part of the state can neither be seen nor fades away.
     """
+    from scipy.linalg import solve_discrete_are  # slow to import
+
     try:
         found = solve_discrete_are(
             model.transition.T, model.observed.T, model.process_noise, model.measurement_noise
@@ -138,6 +139,6 @@ def _correction(model: Model, covariance: Array) -> tuple[Array, Array]:
     innovation = seen @ model.observed.T + model.measurement_noise
     # Solved in units of the noise: those of displacements and velocities are far apart.
     unit = np.sqrt(np.diag(innovation))
-    factor = cho_factor(innovation / np.outer(unit, unit))
-    gain = (cho_solve(factor, seen / unit[:, None]) / unit[:, None]).T
+    scaled = innovation / np.outer(unit, unit)
+    gain = (np.linalg.solve(scaled, seen / unit[:, None]) / unit[:, None]).T
     return gain, innovation

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag, expm
 
 from ..base.arrays import Array
-from ..plant.pantograph.build import matrices
+from ..plant.pantograph.build import exponential, matrices
 from ..plant.pantograph.schema import PantographData
 from .force import ForceProcess
 from .settings import EstimatorSettings
@@ -53,6 +52,8 @@ def build_model(
     The covariance of what noise adds over a step is Van Loan's integral (IEEE Trans. Automatic Control
     23:395, 1978, recalled).
     """
+    from scipy.linalg import block_diag  # slow to import
+
     chain, forces = matrices(pantograph)  # inputs: contact, frame, head pair
     size, order = len(chain), len(force.output)
     suspension = int(settings.suspension_drift > 0)
@@ -104,8 +105,8 @@ def _discretise(drift: Array, inputs: Array, noise: Array, step: float) -> tuple
     n, m = inputs.shape
     held = np.zeros((n + m, n + m))
     held[:n, :n], held[:n, n:] = drift, inputs
-    whole = expm(step * held)
+    whole = exponential(step * held)
     transition = whole[:n, :n]
     pair = np.block([[-drift, noise], [np.zeros((n, n)), drift.T]])
-    covariance = transition @ expm(step * pair)[:n, n:]
+    covariance = transition @ exponential(step * pair)[:n, n:]
     return transition, whole[:n, n:], (covariance + covariance.T) / 2

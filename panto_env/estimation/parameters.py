@@ -13,14 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.pantograph.schema import PantographData
 from .estimate import SETTLING, filter_motion, model_of
-from .innovations import normalise
 from .kalman import steady_gains
 from .model import Model
 from .motion import Motion
@@ -75,6 +73,8 @@ def estimate_parameters(
 
     Raises InputError for a motion that can't be a pantograph's, or names that are not its parameters.
     """
+    from scipy.linalg import block_diag  # slow to import
+
     settings = EstimatorSettings() if settings is None else settings
     # A suspension whose error wanders takes up what the lift tells: all parameters then drift together.
     settings = settings.model_copy(update=PAPER2)
@@ -121,11 +121,16 @@ def information(
     """Fisher information, (p, p), on logarithms of parameters, "lift" among them, in a motion's innovations.
 
     The inverse bounds the covariance of any unbiased estimate of them (Cramér and Rao). A parameter without
-    information cannot be seen; a direction without any, no combination of its parameters.
+    information cannot be seen; a direction without any, no combination of its parameters. The gain is held:
+    what noise would tell, were its intensities known, does not count.
     """
     check_motion(motion, pantograph)
     _check([name for name in names if name != LIFT], pantograph)
     first = math.ceil(SETTLING / motion.time_step)
+
+    model = model_of(motion, pantograph, settings)
+    gains = steady_gains(model)
+    unit = np.linalg.cholesky(gains.innovation[0])
 
     def innovations(name: str, factor: float) -> Array:
         moved, other = motion, pantograph
@@ -134,7 +139,8 @@ def information(
         else:
             other = changed(pantograph, {name: factor * _get(pantograph, name)})
         model = model_of(moved, other, settings)
-        return normalise(filter_motion(model, steady_gains(model), moved))[first:].ravel()
+        filtered = filter_motion(model, gains, moved)
+        return np.linalg.solve(unit, filtered.innovations[first:].T).ravel()
 
     columns = [(innovations(name, 1 + STEP) - innovations(name, 1 - STEP)) / (2 * STEP) for name in names]
     slopes = np.array(columns)
