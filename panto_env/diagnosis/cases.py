@@ -16,10 +16,8 @@ from ..metrics.trajectory import Trajectory
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.pantograph.build import with_scatter
+from .kinds import BROKEN, LONG, RAISED, SHORT, SPOT, SUNK, TENSION, WORN
 
-BROKEN, LONG, SHORT = "broken dropper", "dropper too long", "dropper too short"
-RAISED, SUNK, SPOT = "raised support", "sunk support", "hard spot"
-WORN, TENSION = "worn wire", "lost tension"
 SEVERITIES: Mapping[str, tuple[float, ...]] = {
     BROKEN: (1.0,),
     LONG: (0.002, 0.005, 0.01),  # m
@@ -32,10 +30,10 @@ SEVERITIES: Mapping[str, tuple[float, ...]] = {
 }
 """Kinds of defects, and how bad each is made. A dropper more than about 10 mm too long carries nothing and is
 as good as broken."""
-LOCAL = tuple(kind for kind in SEVERITIES if kind != TENSION)
-"""Kinds that are somewhere."""
 SPANS = 30
 """Of a simulated line."""
+FIRST, BEYOND = FIRST_SETTLED + 2, SPANS - 5
+"""Spans from which on, and before which, defects are drawn: away from both ends of what is judged."""
 WORN_LENGTH = 15.0
 """Of a worn stretch (m)."""
 SPEED_SCATTER = 0.002
@@ -95,6 +93,13 @@ def draw_defect(track: Track, kind: str, severity: float, span: int, random: np.
     return Defect(kind, severity, {"worn_stretches": stretch}, begin + offset + WORN_LENGTH / 2)
 
 
+def every_defect(track: Track, random: np.random.Generator, broken: int = 1) -> list[Defect]:
+    """One of each kind and severity, and ``broken`` broken droppers, at places drawn."""
+    wanted = [(kind, severity) for kind, each in SEVERITIES.items() for severity in each]
+    wanted += [(BROKEN, 1.0)] * (broken - 1)
+    return [draw_defect(track, *each, int(random.integers(FIRST, BEYOND)), random) for each in wanted]
+
+
 def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajectory:
     """One pass over a track, its number-th, of which speed and pantograph are drawn."""
     random = np.random.default_rng([track.seed, number])
@@ -120,7 +125,3 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
 
 def _droppers(data: FlexibleCatenaryData) -> Array:
     return np.add.outer(np.arange(SPANS) * data.span_length, data.droppers.positions).ravel()
-
-
-FIRST, LAST = FIRST_SETTLED + 2, SPANS - 5
-"""Spans in which defects are drawn: away from both ends of what is judged."""

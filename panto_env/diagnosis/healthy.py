@@ -13,7 +13,8 @@ from typing import Self
 import numpy as np
 
 from ..base.arrays import Array
-from .passes import LEAD, Passes
+from .passes import Passes
+from .places import Evidence
 
 WINDOW = 8.0
 """Length (m) over which the energy of the whitened remainder is taken: about a dropper interval."""
@@ -67,20 +68,35 @@ class Healthy:
             predictor=predictor,
             white=float(left.std()),
             levels=np.array([_level(each / size, window) for each in rest]),
-            scores=_windowed(left / left.std(), window)[:, LEAD * passes.per_span :],
-            lead=LEAD * passes.per_span,
+            scores=_windowed(left / left.std(), window)[:, passes.lead :],
+            lead=passes.lead,
             window=window,
         )
 
-    def remainders(self, force: Array) -> tuple[Array, Array]:
-        """Levels, (passes,) (N), and remainders over them and their usual size, (passes, places), of forces."""
-        rest = [_remainder(each - self.mean, self.patterns, self.size) / self.size for each in force]
-        levels = np.array([_level(each, self.window) for each in rest])
-        return levels, np.array(rest) / levels[:, None]
+    def weigh(self, passes: Passes, threshold: float) -> tuple[Evidence, Array]:
+        """What passes show in the mean, and the level of each, (passes,) (N).
 
-    def score(self, unit: Array) -> Array:
-        """Mean energy in the window about each judged place, (..., judged), of remainders, whitened."""
-        return _windowed(_whiten(unit, self.predictor) / self.white, self.window)[..., self.lead :]
+        What passes have in common that is not the line's, the error of the healthy mean, keeps its size in
+        the mean of several: that is why the mean is levelled anew.
+        """
+        rest = np.array([_remainder(each - self.mean, self.patterns, self.size) for each in passes.force])
+        levels = np.array([_level(each / self.size, self.window) for each in rest])
+        unit = (rest / levels[:, None]).mean(axis=0) / self.size
+        left = _whiten(unit / _level(unit, self.window), self.predictor) / self.white
+        score = _windowed(left, self.window)
+        score[: self.lead] = 0.0
+        evidence = Evidence(
+            position=passes.position,
+            rest=rest.mean(axis=0),
+            score=score,
+            threshold=threshold,
+            span=passes.span,
+            droppers=passes.droppers,
+            speed=passes.speed,
+            wave_speed=passes.wave_speed,
+            level=float(levels.mean()),
+        )
+        return evidence, levels
 
 
 def _against(force: Array, others: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,21 +32,30 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class Passes:
-    """Forces of several passes along the spans that all of them cover; the first one leads in, and is not judged."""
+    """Forces of several passes along spans that all of them cover; the first leads in, and is not judged."""
 
     force: Array  # (passes, places): estimated (N)
     start: float  # of the first place (m)
     step: float  # between two places (m)
     per_span: int  # places in a span
-    droppers: Array  # (droppers,): positions along the line (m); none where runs do not say
+    droppers: Array  # (droppers,): positions along the line (m)
     line: str
     speed: float  # mean (m/s)
     wave_speed: float  # of the contact wire (m/s)
 
     @property
-    def judged(self) -> Array:
-        """Which places are judged: their positions (m)."""
-        return self.start + self.step * np.arange(LEAD * self.per_span, self.force.shape[1])
+    def position(self) -> Array:
+        """Of all places (m), (places,)."""
+        return self.start + self.step * np.arange(self.force.shape[1])
+
+    @property
+    def lead(self) -> int:
+        """Places before those that are judged."""
+        return LEAD * self.per_span
+
+    def only(self, *numbers: int) -> Passes:
+        """Some of the passes, counted from 0."""
+        return replace(self, force=self.force[list(numbers)])
 
     @property
     def span(self) -> float:
@@ -54,7 +63,9 @@ class Passes:
         return self.step * self.per_span
 
 
-def side_by_side(runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed: int = 0) -> tuple[Passes, Passes]:
+def side_by_side(
+    runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed: int = 0
+) -> tuple[Passes, Passes]:
     """The runs to be judged, and the healthy ones, from the tenth span on: before, their start is felt.
 
     seed: of the noise of the estimates. Raises InputError where they are too few or too short, are not of one
@@ -88,6 +99,10 @@ def side_by_side(runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed
     random = np.random.default_rng(seed)
     force = np.array([np.interp(places, run.position, estimated_force(run, random)) for run in everything])
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
+    if not len(droppers):
+        raise InputError(
+            "No run says where the line's droppers are; record one run with them, as `panto simulate` does."
+        )
     facts = (start, step, per_span, droppers, first.catenary, speed / 3.6, first.line.wave_speed)
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
 

@@ -1,18 +1,32 @@
-"""Places along the line whose score is beyond the threshold."""
+"""What passes show along a line, and the places of it whose score is beyond the threshold."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Array
-from .passes import Passes
 
-ECHO = (1.0, 3.0)
-"""Spans about a defect within which another is not told from its waves; and within which it is not, if its score
-is less than ``FAINT`` of the greater one."""
-FAINT = 0.1
+ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
+"""Distance (spans) from a defect up to which less than such a share of its score counts as its own waves: what
+simulated defects make at 160 to 280 km/h. Nearer than the first none is told apart."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What one pass shows, or the mean of several, held against healthy ones."""
+
+    position: Array  # (places,): m
+    rest: Array  # (places,): force beside what healthy passes would have (N)
+    score: Array  # (places,): 0 where the line is not judged
+    threshold: float  # of the score
+    span: float  # m
+    droppers: Array  # (droppers,): positions (m)
+    speed: float  # m/s
+    wave_speed: float  # m/s
+    level: float  # of the rest where the passes are quiet (N)
 
 
 class Region(NamedTuple):
@@ -23,21 +37,23 @@ class Region(NamedTuple):
     last: int  # and the last one
 
 
-def regions(score: Array, level: float, passes: Passes) -> list[Region]:
-    """Regions beyond a level, in their order along the line; waves of a greater one are none of their own."""
-    beyond = np.flatnonzero(np.diff(np.concatenate([[False], score > level, [False]]).astype(int)))
+def regions(evidence: Evidence) -> list[Region]:
+    """Regions beyond the threshold, in their order along the line; waves of a greater one are none."""
+    score = evidence.score
+    edges = np.diff(np.concatenate([[False], score > evidence.threshold, [False]]).astype(int))
     found = [
-        Region(first + int(np.argmax(score[first:end])), int(first), int(end) - 1)
-        for first, end in beyond.reshape(-1, 2)
+        Region(int(first + np.argmax(score[first:end])), int(first), int(end) - 1)
+        for first, end in np.flatnonzero(edges).reshape(-1, 2)
     ]
     kept: list[Region] = []
     for region in sorted(found, key=lambda each: -score[each.peak]):
-        if not any(_echo(region, other, score, passes.per_span) for other in kept):
+        if not any(_echo(region, greater, evidence) for greater in kept):
             kept.append(region)
     return sorted(kept)
 
 
-def _echo(region: Region, greater: Region, score: Array, per_span: int) -> bool:
-    near, far = ECHO
-    apart = abs(region.peak - greater.peak) / per_span
-    return apart <= near or (apart <= far and bool(score[region.peak] < FAINT * score[greater.peak]))
+def _echo(region: Region, greater: Region, evidence: Evidence) -> bool:
+    """Whether a region may be the waves of a greater one."""
+    apart = abs(evidence.position[region.peak] - evidence.position[greater.peak]) / evidence.span
+    share = next((share for within, share in ECHOES if apart <= within), 0.0)
+    return bool(evidence.score[region.peak] < share * evidence.score[greater.peak])
