@@ -124,4 +124,4 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
 
 
 def _droppers(data: FlexibleCatenaryData) -> Array:
-    return np.add.outer(np.arange(SPANS) * data.span_length, data.droppers.positions).ravel()
+    return np.asarray(np.add.outer(np.arange(SPANS) * data.span_length, data.droppers.positions).ravel())

@@ -20,8 +20,8 @@ from .threshold import ENOUGH, FALSE_ALARMS, threshold
 MANY = 6
 """Healthy passes from which on what they have in common is well known."""
 CHANGED, RARE = 2.0, 1e-3
-"""Level of a pass over that of healthy ones from which on the whole line counts as changed, where no more than
-this share of healthy passes would have it (Student's t of log levels). Healthy passes reached 1.9."""
+"""Level of a pass over that of healthy ones from which on the whole line counts as changed, where no more
+than this share of healthy passes would have it (Student's t of log levels)."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """What healthy passes of a line have in common, place by place, and how far a pass is from it.
 
 A pass is the mean of the healthy ones, plus a few patterns along the whole line by which passes differ (speed
-and pantograph: principal components), plus a remainder. The remainder, over its usual size at that place of
-a span and whitened along the line, is of size 1 where the line is healthy. Its energy in a window is the score.
+and pantograph: principal components), plus a remainder. The remainder, over its usual size there and whitened
+along the line, is of size 1 where the line is healthy. Its energy in a window is the score.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MOST_PATTERNS = 4
 SPANS_COUNT_AS = 4
 """Passes that the same place in other spans counts as, where the usual size of a remainder is asked for."""
 FLOOR = 0.1
-"""Share of white noise that whitening reckons with: without it, it would amplify what the 20 Hz filter left."""
+"""Share of white noise that whitening reckons with: without, it would amplify what the 20 Hz filter left."""
 QUIET = 0.25
 """Quantile of a pass' windows by which its level is taken: a defect disturbs its surroundings, not this."""
 ROUNDS, FAR = 8, 2.0
@@ -103,7 +103,7 @@ def _against(force: Array, others: Array) -> Array:
     """Remainder of a healthy pass against others, as much as that of a pass that is none of all."""
     count = len(others)
     rest = _remainder(force - others.mean(axis=0), _patterns(others), np.ones(len(force)))
-    return rest * np.sqrt((1 + 1 / (count + 1)) / (1 + 1 / count))
+    return np.asarray(rest * np.sqrt((1 + 1 / (count + 1)) / (1 + 1 / count)))
 
 
 def _patterns(force: Array) -> Array:
@@ -125,8 +125,8 @@ def _remainder(deviation: Array, patterns: Array, size: Array) -> Array:
 
 
 def _usual_size(rest: Array, passes: Passes) -> Array:
-    """Rms of remainders, (passes, places), by place: of this place, as far as passes are enough to tell, and of
-    the same place in all spans.
+    """Rms of remainders, (passes, places), by place: here, as far as passes are enough to tell, and at the same
+    place of all spans.
     """
     from scipy.ndimage import gaussian_filter1d  # slow to import
 
@@ -134,7 +134,7 @@ def _usual_size(rest: Array, passes: Passes) -> Array:
     alike = gaussian_filter1d(energy.reshape(-1, passes.per_span).mean(axis=0), smooth, mode="wrap")
     here = gaussian_filter1d(energy, smooth, mode="nearest")
     share = len(rest) / (len(rest) + SPANS_COUNT_AS)
-    return np.sqrt(share * here + (1 - share) * np.tile(alike, len(here) // passes.per_span))
+    return np.asarray(np.sqrt(share * here + (1 - share) * np.tile(alike, len(here) // passes.per_span)))
 
 
 def _predictor(unit: Array, memory: int) -> Array:

@@ -89,8 +89,8 @@ def side_by_side(
     last = min(last_whole_span(run.distance - END, span) for run in everything)
     if last < FIRST_SETTLED:
         raise InputError(
-            f"The shortest run goes to {min(run.distance for run in everything):.4g} m, but the start of a run "
-            f"is felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
+            f"The shortest run ends at {min(run.distance for run in everything):.4g} m, but a run's start is "
+            f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
             f"{FIRST_SETTLED * span + END:g} m or more."
         )
     per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)

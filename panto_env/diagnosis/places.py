@@ -10,8 +10,8 @@ import numpy as np
 from ..base.arrays import Array
 
 ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
-"""Distance (spans) from a defect up to which less than such a share of its score counts as its own waves: what
-simulated defects make at 160 to 280 km/h. Nearer than the first none is told apart."""
+"""Distance (spans) from a defect up to which less than such a share of its score counts as its own waves, as
+simulated ones make them at 160 to 280 km/h. Nearer than the first none is told apart."""
 
 
 @dataclass(frozen=True)
