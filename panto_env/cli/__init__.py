@@ -40,7 +40,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands, those of installed packages too."""
-    from . import catalogue, identify, reproduce, simulate, speed, sweep, validate
+    from . import catalogue, diagnose, identify, reproduce, simulate, speed, sweep, validate
 
     app = typer.Typer(
         name="panto",
@@ -56,6 +56,7 @@ def make_app() -> typer.Typer:
     app.command()(sweep.sweep)
     app.command()(validate.validate)
     app.command()(identify.identify)
+    app.command()(diagnose.diagnose)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     for name, point in plugins.installed(plugins.COMMANDS).items():

@@ -71,26 +71,25 @@ def diagnose(
     the one that comes with the project. seed: of the noise of the estimated forces. Raises InputError where
     passes are too few or too short, or cannot be compared.
     """
-    return judge(*side_by_side(runs, healthy, seed), false_alarms, classifier)
+    passes, reference = side_by_side(runs, healthy, seed)
+    return judge(passes, Healthy.of(reference), false_alarms, classifier)
 
 
 def judge(
     passes: Passes,
-    reference: Passes,
+    healthy: Healthy,
     false_alarms: float = FALSE_ALARMS,
     classifier: Classifier | None = None,
 ) -> Diagnosis:
-    """As ``diagnose``, of forces that lie side by side."""
-    model = Healthy.of(reference)
-    evidence, levels = model.weigh(
-        passes, threshold(model.scores, reference.per_span, reference.span, false_alarms)
-    )
+    """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
+    limit = threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
+    evidence, levels = healthy.weigh(passes, limit)
     asked = classifier or trained()
     found = [
         _finding(evidence, asked.answer(evidence, region), float(evidence.score[region.peak]))
         for region in regions(evidence)
     ]
-    level, changed = _whole_line(levels, model.levels)
+    level, changed = _whole_line(levels, healthy.levels)
     return Diagnosis(
         findings=tuple(sorted(found, key=lambda each: each.position)),
         changed=changed,
@@ -99,7 +98,7 @@ def judge(
         begin=float(passes.position[passes.lead]),
         end=float(passes.position[-1] + passes.step),
         false_alarms=false_alarms,
-        notes=tuple(_notes(passes, reference)),
+        notes=tuple(_notes(healthy, passes.per_span)),
     )
 
 
@@ -132,10 +131,10 @@ def _whole_line(levels: Array, healthy: Array) -> tuple[float, bool]:
     return math.exp(above), bool(rare and above > math.log(CHANGED))
 
 
-def _notes(passes: Passes, reference: Passes) -> list[str]:
+def _notes(healthy: Healthy, per_span: int) -> list[str]:
+    """Why the answer is less good than it could be."""
     notes = []
-    count = len(reference.force)
-    spans = (reference.force.shape[1] - reference.lead) // reference.per_span * count
+    count, spans = len(healthy.scores), healthy.scores.size // per_span
     if count < MANY:
         notes.append(
             f"Only {count} healthy passes: their mean is not well known, and less is found than with {MANY}."

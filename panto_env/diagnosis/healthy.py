@@ -125,8 +125,8 @@ def _remainder(deviation: Array, patterns: Array, size: Array) -> Array:
 
 
 def _usual_size(rest: Array, passes: Passes) -> Array:
-    """Rms of remainders, (passes, places), by place: here, as far as passes are enough to tell, and at the same
-    place of all spans.
+    """Rms of remainders, (passes, places), by place: here, as far as passes are enough to tell, and at the
+    same place of all spans.
     """
     from scipy.ndimage import gaussian_filter1d  # slow to import
 

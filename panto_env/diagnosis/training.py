@@ -52,7 +52,7 @@ def examples(track: Track) -> tuple[Array, Index]:
         [run for _, run in whole], [drive(track, k) for k in range(HEALTHY)], track.seed
     )
     model = Healthy.of(reference)
-    level = threshold(model.scores, reference.per_span, reference.span)
+    level = threshold(model.scores, passes.per_span, passes.span)
     shown, classes = [], []
     for k, (defect, _) in enumerate(whole):
         evidence, _ = model.weigh(passes.only(k), level)
