@@ -34,6 +34,7 @@ from .diagnosis_tables import (
     broken_row,
     broken_table,
     confusion_table,
+    elsewhere_per_10_km,
     severity_table,
     share,
     smallest_table,
@@ -164,7 +165,14 @@ def run(report: Report) -> Outcome:
             reference_table(),
         ),
         plots={"diagnosis-false-alarms": plot_rates(rates)},
-        numbers={"cases": [_plain(case) for case in cases], "rates": rates},
+        numbers={
+            "cases": [_plain(case) for case in cases],
+            "rates": rates,
+            "findings_far_from_the_defect_in_10_km": {
+                count: elsewhere_per_10_km([c for c in cases if usual(c) and c.passes == count])
+                for count in MEANS
+            },
+        },
     )
 
 

@@ -12,6 +12,7 @@ from ...diagnosis.diagnosis import Diagnosis, judge
 from ...diagnosis.healthy import Healthy
 from ...diagnosis.kinds import BROKEN, TENSION
 from ...diagnosis.passes import Passes, side_by_side
+from ...diagnosis.places import ECHOES
 from ...diagnosis.threshold import FALSE_ALARMS
 from ...metrics.trajectory import Trajectory
 
@@ -28,8 +29,8 @@ MEANS = (1, 3)
 """Passes over a defect of which the mean is judged."""
 RATES = (0.01, 0.03, 0.1, 0.3, 1.0)
 """False alarms per km for which thresholds are set, to draw what each costs."""
-NEAR = 0.75
-"""Way (spans) from a defect within which a finding is of it."""
+NEAR = ECHOES[0][0]
+"""Way (spans) from a defect within which a finding is of it: a sunk support is felt at its neighbours too."""
 
 
 @dataclass(frozen=True)

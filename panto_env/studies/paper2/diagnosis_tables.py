@@ -52,6 +52,12 @@ def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
     return 10 * alarms / way, float(10 * chi2.ppf(0.95, 2 * alarms + 2) / 2 / way)
 
 
+def elsewhere_per_10_km(cases: Sequence[Case]) -> float:
+    """Findings per 10 km that are far from the only defect of a line; of no lost tension, which is everywhere."""
+    local = [case for case in cases if case.kind not in ("", TENSION)]
+    return 10 * sum(case.others for case in local) / sum(case.distance for case in local)
+
+
 def broken_table(cases: Sequence[Case]) -> Table:
     """Broken droppers by line, speed and passes, and false alarms on healthy lines."""
     rows = []
