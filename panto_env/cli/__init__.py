@@ -40,7 +40,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands, those of installed packages too."""
-    from . import catalogue, estimate, identify, reproduce, rig, simulate, speed, sweep, validate
+    from . import catalogue, diagnose, estimate, identify, reproduce, rig, simulate, speed, sweep, validate
 
     app = typer.Typer(
         name="panto",
@@ -57,6 +57,7 @@ def make_app() -> typer.Typer:
     app.command()(validate.validate)
     app.command()(identify.identify)
     app.command()(estimate.estimate)
+    app.command()(diagnose.diagnose)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)

@@ -1,0 +1,84 @@
+"""``panto diagnose``: an overhead line's defects from the contact force."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..base.errors import InputError
+from ..metrics.trajectory import Trajectory
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+
+MOST_FALSE_ALARMS = 20.0
+"""Per km, about one in a span: beyond, a threshold means nothing."""
+
+
+def diagnose(
+    run: Annotated[Path, typer.Argument(help="Run to be judged, as `panto simulate --output` writes it.")],
+    more: Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)] = None,
+    healthy: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RUN...",
+            help="Healthy runs over the same line at the same speed, three or more; better six or more.",
+        ),
+    ] = None,
+    again: Annotated[
+        list[Path] | None,
+        typer.Option(help="A further run over the line that is judged, for a mean; can be given again."),
+    ] = None,
+    false_alarms: Annotated[
+        float | None, typer.Option(help="False alarms per km that set the threshold. Default: 0.1.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the noise of the estimated forces.")] = 0,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Say whether a line is healthy, and if not, where and of which kind its defects are.
+
+    The force is held against that of healthy runs, place by place, from the tenth span on. It is not taken
+    as simulated, but as an estimator on the train would give it: up to 20 Hz, with noise.
+    """
+    from ..diagnosis import diagnose as judge
+    from ..diagnosis.tables import findings_table, verdict
+    from ..diagnosis.threshold import FALSE_ALARMS
+
+    if not healthy:
+        raise InputError("Say which runs are healthy: panto diagnose RUN --healthy RUN RUN RUN.")
+    rate = FALSE_ALARMS if false_alarms is None else false_alarms
+    if not 0 < rate <= MOST_FALSE_ALARMS:
+        raise InputError(
+            f"--false-alarms must lie above 0 and up to {MOST_FALSE_ALARMS:g} per km, not {rate:g}."
+        )
+    if seed < 0:
+        raise InputError(f"--seed must be a whole number from 0 up, not {seed}.")
+    with progress_console.status("reading and judging"):
+        runs = [Trajectory.load(path) for path in (run, *(again or []))]
+        reference = [Trajectory.load(path) for path in (*healthy, *(more or []))]
+        found = judge(runs, reference, false_alarms=rate, seed=seed)
+    if plot is not None:
+        from ..analysis.plots import save
+        from ..diagnosis.plots import plot_diagnosis
+
+        title = (
+            f"{run.name}: {runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h, {len(reference)} healthy runs"
+        )
+        save(plot_diagnosis(found, title), plot)
+    if json:
+        findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
+        told = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
+        extra = {
+            "threshold": found.evidence.threshold,
+            "false_alarms": found.false_alarms,
+            "notes": found.notes,
+        }
+        print_json(told | extra | {"findings": findings})
+        return
+    for sentence in verdict(found):
+        console.print(sentence, soft_wrap=True)
+    if found.findings:
+        print_table(findings_table(found))
+    for note in found.notes:
+        console.print(f"[bold red]Degraded:[/] {note}", soft_wrap=True)

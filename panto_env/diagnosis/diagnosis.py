@@ -1,0 +1,147 @@
+"""Is the line healthy; if not, where, and what is it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..metrics.trajectory import Trajectory
+from .features import Sort
+from .healthy import Healthy
+from .kinds import Answer, Classifier, trained
+from .passes import Passes, side_by_side
+from .places import Evidence, regions
+from .threshold import ENOUGH, FALSE_ALARMS, threshold
+
+MANY = 6
+"""Healthy passes from which on what they have in common is well known."""
+CHANGED, RARE = 2.0, 1e-3
+"""Level of a pass over that of healthy ones from which on the whole line counts as changed, where no more
+than this share of healthy passes would have it (Student's t of log levels)."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A defect that was found."""
+
+    kind: str  # the most likely one
+    shares: Mapping[str, float]  # how likely each kind is
+    position: float  # m
+    span: int  # counted from 1
+    offset: float  # from the span's first support (m)
+    interval: int  # of the span: 1 lies before its first dropper
+    dropper: int | None  # of the span, counted from 1, where it is one
+    score: float  # over the threshold
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What passes say about a line."""
+
+    findings: tuple[Finding, ...]  # in their order along the line
+    changed: bool  # whether the whole line differs: findings are then what stands out beyond that
+    level: float  # of what the force has where passes are quiet, over that of healthy ones
+    evidence: Evidence
+    begin: float  # of what is judged (m)
+    end: float
+    false_alarms: float  # of the threshold, per km
+    notes: tuple[str, ...]  # why the answer is less good than it could be
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing was found."""
+        return not (self.findings or self.changed)
+
+
+def diagnose(
+    runs: Sequence[Trajectory],
+    healthy: Sequence[Trajectory],
+    *,
+    false_alarms: float = FALSE_ALARMS,
+    classifier: Classifier | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Hold one pass over a line, or the mean of several, against healthy passes over it at the same speed.
+
+    false_alarms: per km of healthy line, by which the threshold is set. classifier: of the kinds, by default
+    the one that comes with the project. seed: of the noise of the estimated forces. Raises InputError where
+    passes are too few or too short, or cannot be compared.
+    """
+    passes, reference = side_by_side(runs, healthy, seed)
+    return judge(passes, Healthy.of(reference), false_alarms, classifier)
+
+
+def judge(
+    passes: Passes,
+    healthy: Healthy,
+    false_alarms: float = FALSE_ALARMS,
+    classifier: Classifier | None = None,
+) -> Diagnosis:
+    """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
+    limit = threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
+    evidence, levels = healthy.weigh(passes, limit)
+    asked = classifier or trained()
+    found = [
+        _finding(evidence, asked.answer(evidence, region), float(evidence.score[region.peak]))
+        for region in regions(evidence)
+    ]
+    level, changed = _whole_line(levels, healthy.levels)
+    return Diagnosis(
+        findings=tuple(sorted(found, key=lambda each: each.position)),
+        changed=changed,
+        level=level,
+        evidence=evidence,
+        begin=float(passes.position[passes.lead]),
+        end=float(passes.position[-1] + passes.step),
+        false_alarms=false_alarms,
+        notes=tuple(_notes(healthy, passes.per_span)),
+    )
+
+
+def _finding(evidence: Evidence, answer: Answer, score: float) -> Finding:
+    position, span = answer.place.position, evidence.span
+    number = math.floor(position / span + 1e-9)
+    offset = position - number * span
+    own = evidence.droppers - number * span
+    own = own[(own > 0) & (own < span)]
+    return Finding(
+        kind=answer.kind,
+        shares=answer.shares,
+        position=position,
+        span=number + 1,
+        offset=max(offset, 0.0),
+        interval=int((own < offset - 1e-6).sum()) + 1,
+        dropper=int(np.argmin(np.abs(own - offset))) + 1 if answer.place.sort is Sort.DROPPER else None,
+        score=score / evidence.threshold,
+    )
+
+
+def _whole_line(levels: Array, healthy: Array) -> tuple[float, bool]:
+    """Level of passes over that of healthy ones, and whether that is more than chance."""
+    from scipy.stats import t  # slow to import
+
+    usual = np.log(healthy)
+    above = float(np.log(levels).mean() - usual.mean())
+    spread = float(usual.std(ddof=1)) * math.sqrt(1 / len(levels) + 1 / len(usual))
+    rare = above > t.isf(RARE, len(usual) - 1) * spread
+    return math.exp(above), bool(rare and above > math.log(CHANGED))
+
+
+def _notes(healthy: Healthy, per_span: int) -> list[str]:
+    """Why the answer is less good than it could be."""
+    notes = []
+    count, spans = len(healthy.scores), healthy.scores.size // per_span
+    if count < MANY:
+        notes.append(
+            f"Only {count} healthy passes: their mean is not well known, and less is found than with {MANY}."
+        )
+    if spans < ENOUGH:
+        notes.append(
+            f"Only {spans} healthy spans set the threshold: with fewer than {ENOUGH}, false alarms may be "
+            "several times as many, or as few."
+        )
+    return notes

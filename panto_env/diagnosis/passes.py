@@ -1,0 +1,129 @@
+"""Passes over one line at one speed, their forces side by side at the same places."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..metrics.low_pass import CUTOFF
+from ..metrics.spans import FIRST_SETTLED, last_whole_span
+from ..metrics.trajectory import Trajectory
+from .force import estimated_force
+
+STEP = 0.5
+"""Distance of the places at which forces are looked at (m), at most."""
+PER_WAVE = 2.5
+"""Places in the shortest wave that the force has, v / 20 Hz, at least."""
+SPEEDS = 0.01
+"""Relative difference of speed up to which passes can be compared: what 0.5 % does to a force is as much as
+the noise of its estimate, at 250 km/h."""
+LEAD = 1
+"""Spans before those that are judged: what is predicted from its past wants a past."""
+END = 10.0
+"""Way (m) before the end of a run that is not judged: a filter without delay does not know how it goes on."""
+FEWEST = 3
+"""Healthy passes: each is held against the mean of the others."""
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Forces of several passes along spans that all of them cover; the first leads in, and is not judged."""
+
+    force: Array  # (passes, places): estimated (N)
+    start: float  # of the first place (m)
+    step: float  # between two places (m)
+    per_span: int  # places in a span
+    droppers: Array  # (droppers,): positions along the line (m)
+    line: str
+    speed: float  # mean (m/s)
+    wave_speed: float  # of the contact wire (m/s)
+
+    @property
+    def position(self) -> Array:
+        """Of all places (m), (places,)."""
+        return self.start + self.step * np.arange(self.force.shape[1])
+
+    @property
+    def lead(self) -> int:
+        """Places before those that are judged."""
+        return LEAD * self.per_span
+
+    def only(self, *numbers: int) -> Passes:
+        """Some of the passes, counted from 0."""
+        return replace(self, force=self.force[list(numbers)])
+
+    @property
+    def span(self) -> float:
+        """Length of a span (m)."""
+        return self.step * self.per_span
+
+
+def side_by_side(
+    runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed: int = 0
+) -> tuple[Passes, Passes]:
+    """The runs to be judged, and the healthy ones, from the tenth span on: before, their start is felt.
+
+    seed: of the noise of the estimates. Raises InputError where they are too few or too short, are not of one
+    line and speed, hold what is no number, or one stands there twice.
+    """
+    if len(healthy) < FEWEST:
+        raise InputError(
+            f"What healthy passes have in common takes {FEWEST} of them at least, not {len(healthy)}; "
+            "give more with --healthy."
+        )
+    everything = [*runs, *healthy]
+    for run in everything:
+        _check(run)
+    first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))
+    for run in everything:
+        _check_alike(run, first, speed)
+    for k, run in enumerate(everything):
+        if any(np.array_equal(run.contact_force, other.contact_force) for other in everything[:k]):
+            raise InputError("One run stands there twice, which says nothing new; give each once.")
+    span = first.span_length
+    last = min(last_whole_span(run.distance - END, span) for run in everything)
+    if last < FIRST_SETTLED:
+        raise InputError(
+            f"The shortest run ends at {min(run.distance for run in everything):.4g} m, but a run's start is "
+            f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
+            f"{FIRST_SETTLED * span + END:g} m or more."
+        )
+    per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)
+    step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
+    places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
+    random = np.random.default_rng(seed)
+    force = np.array([np.interp(places, run.position, estimated_force(run, random)) for run in everything])
+    droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
+    if not len(droppers):
+        raise InputError(
+            "No run says where the line's droppers are; record one run with them, as `panto simulate` does."
+        )
+    facts = (start, step, per_span, droppers, first.catenary, speed / 3.6, first.line.wave_speed)
+    return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
+
+
+def _check(run: Trajectory) -> None:
+    """Raise InputError for a run that can't be judged by itself."""
+    if run.terminated:
+        raise InputError(f"{run.ending} A run that ended early cannot be judged.")
+    if not (np.isfinite(run.contact_force).all() and np.isfinite(run.position).all()):
+        raise InputError("The contact force or the position of a run is no number somewhere; leave it out.")
+
+
+def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:
+    """Raise InputError for a run that can't be compared with the others, whose mean speed is given (km/h)."""
+    if run.catenary != first.catenary or run.span_length != first.span_length:
+        raise InputError(
+            f"Passes of different lines, '{run.catenary}' and '{first.catenary}', cannot be compared; give "
+            "healthy passes of the line that is judged."
+        )
+    if abs(run.speed_kmh / speed - 1) > SPEEDS:
+        raise InputError(
+            f"Passes at {run.speed_kmh:.4g} and {speed:.4g} km/h cannot be compared: speeds may differ by "
+            f"{100 * SPEEDS:g} %."
+        )

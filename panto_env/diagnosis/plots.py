@@ -1,0 +1,48 @@
+"""Picture of a diagnosis along the line. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .diagnosis import Diagnosis
+from .tables import place
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
+    """Force beside healthy passes, and the score with its threshold, findings, supports and droppers."""
+    from matplotlib.figure import Figure
+
+    evidence = diagnosis.evidence
+    shown = (evidence.position >= diagnosis.begin) & (evidence.position <= diagnosis.end)
+    x = evidence.position[shown]
+    figure = Figure(figsize=(12, 6), layout="constrained")
+    force, score = figure.subplots(2, 1, sharex=True)
+    force.plot(x, evidence.rest[shown], color="tab:blue", linewidth=0.9)
+    force.set(ylabel="force beside healthy passes (N)")
+    score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color="tab:blue", linewidth=0.9, label="score")
+    words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"
+    score.axhline(evidence.threshold, color="tab:red", linestyle="--", linewidth=0.9, label=words)
+    inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
+    score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
+    for axis in (force, score):
+        for support in np.arange(diagnosis.begin, diagnosis.end + 1e-6, evidence.span):
+            axis.axvline(support, color="0.85", linewidth=0.8, zorder=0)
+        for finding in diagnosis.findings:
+            axis.axvline(finding.position, color="tab:orange", linewidth=1.2)
+    for finding in diagnosis.findings:
+        words = f"{finding.kind}, span {finding.span}, {place(finding)}"
+        force.annotate(
+            words, (finding.position, 1.0), (3, -4), xycoords=("data", "axes fraction"),
+            textcoords="offset points", rotation=90, va="top", fontsize="small",
+        )  # fmt: skip
+    score.set(
+        ylabel="score (-)", xlabel="position (m); grey lines: supports", xlim=(diagnosis.begin, diagnosis.end)
+    )
+    score.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize="small", frameon=False)
+    figure.suptitle(title)
+    return figure

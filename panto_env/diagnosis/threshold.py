@@ -1,0 +1,32 @@
+"""The score from which on a place is called defective: by false alarms per kilometre.
+
+The largest log score of a span is taken to have Gumbel's distribution, the limit of maxima of many values.
+It is fitted to the spans of healthy passes, each held against the others, and reaches to spans rarer than any
+of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.arrays import Array
+
+FALSE_ALARMS = 0.1
+"""Per kilometre: one in 10 km."""
+ENOUGH = 100
+"""Healthy spans for a threshold whose false alarms are right within a factor of about two."""
+
+
+def threshold(scores: Array, per_span: int, span: float, false_alarms: float = FALSE_ALARMS) -> float:
+    """Score that healthy lines exceed so many times per kilometre.
+
+    scores: (passes, places) of healthy passes; per_span: places in a span; span: its length (m).
+    """
+    from scipy.stats import gumbel_r  # slow to import
+
+    maxima = np.log(scores.reshape(-1, per_span).max(axis=1))
+    place, scale = gumbel_r.fit(maxima)
+    exceeded = -math.expm1(-false_alarms * span / 1e3)  # in a span, where alarms are Poisson's
+    return float(np.exp(gumbel_r.isf(exceeded, place, scale)))

@@ -1,0 +1,317 @@
+"""Diagnosis of the line: statistics against what is known of them, then simulated lines, then the command."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+from typer.testing import CliRunner
+
+from panto_env import InputError, simulate
+from panto_env.cli import make_app
+from panto_env.diagnosis import diagnose, estimated_force
+from panto_env.diagnosis.cases import BROKEN, TENSION, Defect, Track, draw_defect, drive
+from panto_env.diagnosis.diagnosis import judge
+from panto_env.diagnosis.features import OFFSETS, Sort, candidates, features
+from panto_env.diagnosis.healthy import FLOOR, Healthy
+from panto_env.diagnosis.kinds import KINDS, TRAINED, Classifier, trained
+from panto_env.diagnosis.passes import Passes, side_by_side
+from panto_env.diagnosis.places import Evidence, regions
+from panto_env.diagnosis.threshold import threshold
+from panto_env.diagnosis.training import NEAR, examples, fit, save
+from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.studies.paper2.diagnosis_cases import within_interval
+
+SPAN, PER_SPAN, SPANS = 60.0, 120, 40
+
+
+def made_up(count, random, spans=SPANS):
+    """Passes over a line that differ by one pattern and by coloured noise whose size goes with the span."""
+    x = np.arange(spans * PER_SPAN) * SPAN / PER_SPAN
+    mean, pattern = 100 + 20 * np.cos(2 * np.pi * x / SPAN), 8 * np.sin(2 * np.pi * x / 37)
+    size = 2 + np.cos(2 * np.pi * x / SPAN)
+    noise = lfilter([1.0], [1.0, -0.8], random.standard_normal((count, len(x)))) * 0.6
+    force = mean + random.standard_normal((count, 1)) * pattern + size * noise
+    droppers = np.add.outer(np.arange(spans) * SPAN, [5, 17, 30, 43, 55]).ravel()
+    return Passes(force, 0.0, SPAN / PER_SPAN, PER_SPAN, droppers, "made up", 70.0, 120.0)
+
+
+@pytest.fixture(scope="module")
+def learned():
+    return Healthy.of(made_up(10, np.random.default_rng(1)))
+
+
+def test_estimate_is_the_force_to_20_hz_with_noise_in_the_same_band():
+    run = simulate(distance=600.0, spans=20)
+    estimate = estimated_force(run, np.random.default_rng(0))
+    noise = estimate - low_pass_in_place(run.contact_force, run.time_step)
+    assert noise.std() == pytest.approx(3.0, rel=0.1)
+    power, frequency = np.abs(np.fft.rfft(noise)) ** 2, np.fft.rfftfreq(len(noise), run.time_step)
+    assert power[frequency > 22].sum() < 0.01 * power.sum()
+    assert not np.array_equal(estimate, estimated_force(run, np.random.default_rng(1)))
+
+
+def test_patterns_of_passes_are_taken_out_and_the_rest_is_as_large_as_it_was_made(learned):
+    passes = made_up(30, np.random.default_rng(2))
+    levels = [learned.weigh(passes.only(k), 1.0)[1][0] * np.sqrt((learned.size**2).mean()) for k in range(30)]
+    # Noise of rms 0.6 / sqrt(1 - 0.8^2) = 1 times a size of rms sqrt(4.5). The mean of 10 passes is off by a
+    # tenth of that variance, and so is what their pattern, known as well as the mean, explains.
+    rest = np.concatenate([learned.weigh(passes.only(k), 1.0)[0].rest for k in range(30)])
+    assert rest.std() == pytest.approx(np.sqrt(4.5) * np.sqrt(1 + 2 / 10), rel=0.03)
+    assert np.std(passes.force - learned.mean) > 1.5 * rest.std()
+    assert np.std(levels) < 0.2 * np.mean(levels)
+
+
+def test_whitened_remainders_are_white_and_their_energy_is_one(learned):
+    passes = made_up(20, np.random.default_rng(3))
+    scores = np.array([learned.weigh(passes.only(k), 1.0)[0].score[PER_SPAN:] for k in range(20)])
+    assert scores.mean() == pytest.approx(1.0, rel=0.1)
+    # Of noise whose correlation falls by 0.8 from place to place, with the white noise that it reckons with.
+    lags = 0.8 ** np.arange(len(learned.predictor) + 1) + FLOOR * (np.arange(len(learned.predictor) + 1) == 0)
+    np.testing.assert_allclose(learned.predictor, solve_toeplitz(lags[:-1], lags[1:]), atol=0.05)
+    # Of each span at its place: nowhere louder than elsewhere.
+    by_place = scores.reshape(-1, PER_SPAN).mean(axis=0)
+    assert by_place.max() / by_place.min() < 1.4
+
+
+@pytest.mark.parametrize("rate", [0.1, 1.0])
+def test_threshold_has_the_false_alarms_that_it_is_asked_for(rate):
+    """Scores whose spans' largest are Gumbel's in the logarithm, on lines that it has not seen."""
+    random = np.random.default_rng(0)
+    shape = np.exp(-np.linspace(0, 8, PER_SPAN))
+    largest = np.exp(random.gumbel(0.5, 0.3, (400, SPANS)))
+    seen = (largest[:20, :, None] * shape).reshape(20, -1)
+    level = threshold(seen, PER_SPAN, SPAN, rate)
+    measured = (largest[20:] > level).sum() / (largest[20:].size * SPAN / 1e3)
+    assert 0.5 * rate < measured < 2 * rate
+
+
+def test_a_bump_is_found_where_it_is_and_a_healthy_pass_has_none(learned):
+    passes = made_up(12, np.random.default_rng(4))
+    limit = threshold(learned.scores, PER_SPAN, SPAN)
+    for k, at in enumerate((25.25, 18.7, 9.4)):
+        bumped = passes.force.copy()
+        bumped[:, int(at * PER_SPAN) : int(at * PER_SPAN) + 12] += 15.0
+        evidence, _ = learned.weigh(replace(passes, force=bumped).only(k), limit)
+        (region,) = regions(evidence)
+        assert abs(evidence.position[region.peak] - at * SPAN) < 8
+    assert sum(len(regions(learned.weigh(passes.only(k), limit)[0])) for k in range(12)) <= 2
+
+
+def test_a_mean_of_passes_shows_what_one_does_not(learned):
+    passes = made_up(9, np.random.default_rng(5))
+    passes.force[:, 20 * PER_SPAN : 20 * PER_SPAN + 12] += 3.0
+    at = slice(20 * PER_SPAN - 10, 20 * PER_SPAN + 20)
+    alone = [learned.weigh(passes.only(k), 1.0)[0].score[at].max() for k in range(9)]
+    assert learned.weigh(passes, 1.0)[0].score[at].max() > 1.5 * np.median(alone)
+
+
+def evidence_of(score, rest=None):
+    x = np.arange(len(score)) * 0.5
+    rest = np.sin(x) if rest is None else rest
+    droppers = np.add.outer(np.arange(12) * SPAN, [5, 17, 30, 43, 55]).ravel()
+    return Evidence(x, rest, np.asarray(score, dtype=float), 5.0, SPAN, droppers, 70.0, 120.0, 2.0)
+
+
+def test_waves_of_a_defect_are_no_defects_of_their_own():
+    score = np.zeros(12 * PER_SPAN)
+    for span, value in ((3, 100.0), (4, 60.0), (5, 40.0), (6, 15.0), (8, 9.0), (11, 6.0)):
+        score[span * PER_SPAN + 4] = value
+    # 60 is within 1.3 spans, 40 is less than half within 2.5, 15 less than a fifth within 4; 9 and 6 are far.
+    assert [region.peak // PER_SPAN for region in regions(evidence_of(score))] == [3, 8, 11]
+
+
+def test_candidates_are_droppers_supports_and_the_wire_about_the_greatest_score():
+    score = np.zeros(12 * PER_SPAN)
+    score[5 * PER_SPAN :][:21] = 10 * np.hanning(21)  # greatest 5 m into span 6
+    evidence = evidence_of(score)
+    (region,) = regions(evidence)
+    found = candidates(evidence, region)
+    assert [c.position for c in found if c.sort is Sort.DROPPER] == [283, 295, 305, 317, 330]
+    assert [c.position for c in found if c.sort is Sort.SUPPORT] == [300]
+    shown = features(evidence, region, found)
+    assert np.isfinite(shown).all()
+    # What is shown of a candidate lies about it: the score's peak moves with the candidate.
+    middle = OFFSETS[shown[:, len(OFFSETS) : 2 * len(OFFSETS)].argmax(axis=1)]
+    np.testing.assert_allclose(middle[:4], [305 - c.position for c in found[:4]], atol=0.8)
+
+
+def test_network_gives_what_scikit_learn_gives(tmp_path):
+    from sklearn.neural_network import MLPClassifier
+
+    random = np.random.default_rng(0)
+    shown, classes = random.standard_normal((400, 5)), random.integers(0, 8, 400)
+    shown[:, 0] += classes
+    ours = fit(shown, classes)
+    path = tmp_path / "kinds.npz"
+    save(ours, path)
+    read = Classifier.load(path)
+    network = MLPClassifier((ours.inner.shape[1],), max_iter=1).fit(shown, classes)
+    network.coefs_, network.intercepts_ = [ours.inner, ours.outer], [ours.inner_bias, ours.outer_bias]
+    theirs = network.predict_proba((shown - ours.mean) / ours.scale)
+    np.testing.assert_allclose(ours.probabilities(shown), theirs, atol=1e-12)
+    np.testing.assert_allclose(read.probabilities(shown), theirs, atol=1e-4)
+
+
+def test_a_classifier_s_file_cannot_hold_anything_to_run(tmp_path):
+    path = tmp_path / "kinds.npz"
+    with np.load(TRAINED) as arrays:
+        np.savez(path, **dict(arrays) | {"mean": np.array([print], dtype=object)})
+    with pytest.raises(ValueError, match="allow_pickle=False"):
+        Classifier.load(path)
+
+
+def test_an_interval_reaches_to_the_next_droppers():
+    droppers = np.array([5.0, 17.0, 30.0, 43.0, 55.0, 65.0])
+    assert within_interval(43.0, 30.0, droppers)
+    assert within_interval(17.0, 30.0, droppers)
+    assert not within_interval(43.5, 30.0, droppers)
+    assert within_interval(64.0, 55.0, droppers)
+    assert not within_interval(42.0, 55.0, droppers)
+
+
+TRACK = Track("en50318-2002", "dsa250", 220.0, seed=31)
+
+
+@pytest.fixture(scope="module")
+def healthy_runs():
+    return [drive(TRACK, k) for k in range(8)]
+
+
+@pytest.fixture(scope="module")
+def model(healthy_runs):
+    return Healthy.of(side_by_side(healthy_runs[:1], [*healthy_runs[1:], drive(TRACK, 9)])[1])
+
+
+def test_broken_droppers_are_found_and_named_and_a_healthy_line_is_healthy(healthy_runs):
+    """At a speed, under a pantograph, and on lines that the classifier has not seen."""
+    places = [(13, 3), (16, 5), (19, 7), (22, 4)]
+    located = named = 0
+    for k, (span, number) in enumerate(places):
+        at = (span - 1) * 60 + TRACK.data.droppers.positions[number - 1]
+        run = drive(TRACK, 20 + k, (Defect(BROKEN, 1.0, {"broken_droppers": [(span, number)]}, at),))
+        found = diagnose([run], healthy_runs)
+        assert not found.healthy
+        assert not found.changed
+        best = max(found.findings, key=lambda each: each.score)
+        located += within_interval(best.position, at, found.evidence.droppers)
+        named += (best.kind, best.span, best.dropper) == (BROKEN, span, number)
+    assert located == 4
+    assert named >= 3
+    controls = [diagnose([drive(TRACK, 40 + k)], healthy_runs) for k in range(3)]
+    assert sum(len(each.findings) for each in controls) <= 1
+    assert not any(each.changed for each in controls)
+
+
+def test_lost_tension_changes_the_whole_line(healthy_runs):
+    defect = draw_defect(TRACK, TENSION, 0.05, 15, np.random.default_rng(0))
+    found = diagnose([drive(TRACK, 60, (defect,))], healthy_runs)
+    assert found.changed
+    assert found.level > 2
+    assert found.notes == ()
+
+
+def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
+    found = diagnose(healthy_runs[:1], healthy_runs[1:4])
+    assert len(found.notes) == 2
+    assert found.notes[0].startswith("Only 3 healthy passes")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"catenary": "re330"}, "different lines, 're330' and 'en50318-2002'"),
+        ({"speed_kmh": 224.0}, "Passes at 224 and 220.5 km/h cannot be compared: speeds may differ by 1 %"),
+        ({"terminated": True, "ending": "It ended."}, "It ended. A run that ended early cannot be judged"),
+        ({"dropper_position": np.zeros(0)}, "No run says where the line's droppers are"),
+    ],
+)
+def test_runs_that_cannot_be_compared_are_refused(healthy_runs, change, message):
+    runs = [replace(run, **change) if "dropper_position" in change else run for run in healthy_runs]
+    runs[-1] = replace(runs[-1], **change)
+    with pytest.raises(InputError, match=message):
+        diagnose(runs[:1], runs[1:])
+
+
+def test_runs_that_say_too_little_are_refused(healthy_runs):
+    with pytest.raises(InputError, match="takes 3 of them at least, not 2; give more with --healthy"):
+        diagnose(healthy_runs[:1], healthy_runs[1:3])
+    with pytest.raises(InputError, match="One run stands there twice"):
+        diagnose(healthy_runs[:1], healthy_runs[:4])
+    broken = replace(healthy_runs[0], contact_force=np.full_like(healthy_runs[0].contact_force, np.nan))
+    with pytest.raises(InputError, match="no number somewhere; leave it out"):
+        diagnose([broken], healthy_runs[1:])
+    short = simulate(TRACK.catenary, "dsa250", 220.0, distance=600.0, spans=20)
+    with pytest.raises(
+        InputError, match=r"ends at 600.1 m, but a run's start is felt up to span 9, .* 610 m"
+    ):
+        diagnose([short], healthy_runs[1:])
+
+
+def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
+    """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
+    monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_MORE", 1)
+    monkeypatch.setattr(
+        "panto_env.diagnosis.cases.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
+    )
+    shown, classes = examples(TRACK)
+    assert set(classes) == {0, 1, KINDS.index("hard spot") + 1, KINDS.index("worn wire") + 1}
+    assert (classes == 1).sum() == 1
+    assert 1 <= (classes == KINDS.index("hard spot") + 1).sum() <= 2 * NEAR[Sort.WIRE] + 1
+    assert shown.shape[1] == len(trained().mean)
+
+
+@pytest.fixture(scope="module")
+def files(healthy_runs, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    at = 17 * 60 + TRACK.data.droppers.positions[4]
+    judged = drive(TRACK, 77, (Defect(BROKEN, 1.0, {"broken_droppers": [(18, 5)]}, at),))
+    names = []
+    for k, run in enumerate([judged, *healthy_runs]):
+        whole = replace(run, dropper_force=np.zeros((len(run.time), len(run.dropper_position))))
+        names.append(str(folder / f"run{k}.parquet"))
+        whole.save(names[-1])
+    return names
+
+
+def test_command_prints_a_table_and_draws(files, tmp_path):
+    picture = tmp_path / "line.png"
+    call = ["diagnose", files[0], "--healthy", *files[1:], "--plot", str(picture)]
+    told = CliRunner().invoke(make_app(), call, env={"COLUMNS": "200"})
+    assert told.exit_code == 0, told.output
+    assert "1 defect from 540 to 1620 m." in told.output
+    assert "broken dropper" in told.output
+    assert "dropper 5" in told.output
+    assert picture.stat().st_size > 20_000
+
+
+def test_command_prints_json(files):
+    call = ["diagnose", files[0], "--healthy", files[1], "--healthy", files[2], files[3], "--json"]
+    told = CliRunner().invoke(make_app(), call)
+    found = json.loads(told.stdout)
+    assert found["healthy"] is False
+    assert [note[:6] for note in found["notes"]] == ["Only 3", "Only 5"]
+    assert all(sum(each["shares"].values()) == pytest.approx(1) for each in found["findings"])
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ([], "Say which runs are healthy"),
+        (["--healthy", "none.parquet"], "none.parquet does not exist"),
+        (["--healthy", "a.parquet", "--false-alarms", "0"], "must lie above 0 and up to 20 per km, not 0"),
+        (["--healthy", "a.parquet", "--seed", "-1"], "--seed must be a whole number from 0 up, not -1"),
+    ],
+)
+def test_command_refuses(files, extra, message):
+    told = CliRunner().invoke(make_app(), ["diagnose", files[0], *extra])
+    assert isinstance(told.exception, InputError)
+    assert message in str(told.exception)
+
+
+def test_threshold_that_is_asked_for_is_used(model, healthy_runs):
+    passes, _ = side_by_side(healthy_runs[:1], healthy_runs[1:])
+    rare, often = (judge(passes, model, rate).evidence.threshold for rate in (0.01, 5.0))
+    assert rare > 1.2 * often
