@@ -15,7 +15,7 @@ from panto_env.diagnosis import diagnose, estimated_force
 from panto_env.diagnosis.cases import BROKEN, TENSION, Defect, Track, draw_defect, drive
 from panto_env.diagnosis.diagnosis import judge
 from panto_env.diagnosis.features import OFFSETS, Sort, candidates, features
-from panto_env.diagnosis.healthy import FLOOR, Healthy
+from panto_env.diagnosis.healthy import FLOOR, Healthy, _whiten
 from panto_env.diagnosis.kinds import KINDS, TRAINED, Classifier, trained
 from panto_env.diagnosis.passes import Passes, side_by_side
 from panto_env.diagnosis.places import Evidence, regions
@@ -74,6 +74,14 @@ def test_whitened_remainders_are_white_and_their_energy_is_one(learned):
     # Of each span at its place: nowhere louder than elsewhere.
     by_place = scores.reshape(-1, PER_SPAN).mean(axis=0)
     assert by_place.max() / by_place.min() < 1.4
+
+
+def test_a_place_is_predicted_by_those_before_it(learned):
+    """So that what a defect does begins where it is: one step, then what was predicted of it in vain."""
+    unit = np.zeros(60)
+    unit[20] = 1.0
+    expected = np.concatenate([np.zeros(20), [1.0], -learned.predictor, np.zeros(60)])[:60]
+    np.testing.assert_allclose(_whiten(unit, learned.predictor), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("rate", [0.1, 1.0])

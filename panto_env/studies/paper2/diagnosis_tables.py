@@ -53,7 +53,7 @@ def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
 
 
 def elsewhere_per_10_km(cases: Sequence[Case]) -> float:
-    """Findings per 10 km far from the only defect of a line; of no lost tension, which is everywhere."""
+    """Findings in 10 km far from the only defect of a line; lost tension is left out."""
     local = [case for case in cases if case.kind not in ("", TENSION)]
     return 10 * sum(case.others for case in local) / sum(case.distance for case in local)
 
