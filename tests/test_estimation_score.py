@@ -12,7 +12,7 @@ from panto_env.catalog import load_pantograph
 from panto_env.estimation.estimate import estimate, model_of
 from panto_env.estimation.force import RandomWalk
 from panto_env.estimation.inertia import inertia_corrected
-from panto_env.estimation.low_pass import low_pass
+from panto_env.estimation.low_pass import CUTOFF, low_pass
 from panto_env.estimation.motion import Motion
 from panto_env.estimation.score import phases, score
 from panto_env.estimation.settings import EstimatorSettings
@@ -100,7 +100,7 @@ def test_inertia_corrected_is_the_force_low_passed(driven):
         with pytest.raises(InputError, match=r"'dsa380' has 3 masses; .* needs two"):
             inertia_corrected(motion, pantograph)
         return
-    wanted = low_pass(motion.contact_force, 40.0, STEP)
+    wanted = low_pass(motion.contact_force, CUTOFF, STEP)
     # A difference looks half a step back. Inertia may be larger than the force, and so may its delay.
     for velocities, late in ((True, 1.0), (False, 2.0)):
         found = inertia_corrected(motion, pantograph, velocities=velocities)
@@ -209,6 +209,7 @@ def test_bias_error_and_correlation_are_those_of_the_band():
     told = score(true, true + 2.5 + slow + fast, STEP, 20.0)
     assert told.bias == pytest.approx(2.5, abs=0.01)
     assert told.rms == pytest.approx(6 / np.sqrt(2), rel=0.01)
+    assert told.whole_rms == pytest.approx(np.sqrt((6**2 + 50**2) / 2), rel=1e-3)
     assert told.correlation == pytest.approx(1 / np.sqrt(1 + (6 / 30) ** 2), abs=1e-3)
     assert told.delay == pytest.approx(0.0, abs=2e-3)
 

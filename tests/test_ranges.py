@@ -13,6 +13,8 @@ from panto_env import InputError, simulate
 from panto_env.base.ranges import Between, ranges_of
 from panto_env.base.settings import parse
 from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.estimation.force import FORCE_MODELS, as_force_model
+from panto_env.estimation.settings import EstimatorSettings
 from panto_env.plant.actuators import ACTUATORS, actuator_settings
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.line_condition import LineCondition
@@ -26,6 +28,14 @@ ALONE = {  # of settings that are not files: how they are read
     "line condition": ((LineCondition,), lambda value: parse(LineCondition, value, "line_condition")),
     "actuator": (ACTUATORS.values(), actuator_settings),
     "sensors": (SENSORS.values(), sensor_settings),
+    "estimator": ((EstimatorSettings,), lambda value: parse(EstimatorSettings, value, "settings")),
+    **{
+        f"force model {name}": (
+            (kind,),
+            lambda value, name=name: as_force_model({"kind": name} | value),
+        )
+        for name, kind in FORCE_MODELS.items()
+    },
 }
 
 
@@ -154,7 +164,7 @@ def test_an_absurd_number_of_a_table_is_refused(read, kind, keys, annotation, pl
 
 def test_units_of_ranges_are_those_of_the_descriptions():
     schemas = [kind.schema for kind in CATENARIES.values()] + [PantographData, LineCondition]
-    schemas += [*ACTUATORS.values(), *SENSORS.values()]
+    schemas += [*ACTUATORS.values(), *SENSORS.values(), EstimatorSettings, *FORCE_MODELS.values()]
 
     def fields(schema):
         for field in schema.model_fields.values():

@@ -80,6 +80,8 @@ def estimate_parameters(
     settings = settings.model_copy(update=PAPER2)
     check_motion(motion, pantograph)
     names = frame_parameters(pantograph) if names is None else tuple(names)
+    if not names:
+        raise InputError("Name one parameter at least.")
     _check(names, pantograph)
     linear = _Linearised(motion, pantograph, settings, names)
     model, p = linear.model, len(names)
@@ -125,7 +127,7 @@ def information(
     what noise would tell, were its intensities known, does not count.
     """
     check_motion(motion, pantograph)
-    _check([name for name in names if name != LIFT], pantograph)
+    _check([name for name in names if name not in (HEAD_MASS, LIFT)], pantograph)
     first = math.ceil(SETTLING / motion.time_step)
 
     model = model_of(motion, pantograph, settings)
@@ -195,14 +197,17 @@ class _Linearised:
 
 def _check(names: Sequence[str], pantograph: PantographData) -> None:
     known = parameter_names(pantograph)
+    if HEAD_MASS in names:
+        raise InputError(
+            f"The head's mass, '{HEAD_MASS}', can't be estimated with an unknown contact force, which takes "
+            "up whatever it is wrong by; weigh the head, and leave it out."
+        )
     for name in names:
         if name not in known:
             raise InputError(
                 f"'{name}' is no parameter of '{pantograph.name}' that can be estimated: "
                 f"{suggest(name, list(known))}."
             )
-    if not names:
-        raise InputError("Name one parameter at least.")
 
 
 def _get(pantograph: PantographData, name: str) -> float:

@@ -29,6 +29,7 @@ class Score:
     rms: float  # of estimate less truth without that mean (N)
     correlation: float  # -1..1, as they stand, delay included
     delay: float  # at which their cross-correlation is largest (s); positive: the estimate is late
+    whole_rms: float  # as rms, at all frequencies: noise and what is lost beyond the band count too (N)
     phase_delay: float  # mean over the band's coherent frequencies, by power (s); nan: none is coherent
 
 
@@ -54,6 +55,7 @@ def score(true: Array, estimated: Array, time_step: float, band: float, ends: fl
         rms=float(error.std()),
         correlation=float(np.corrcoef(a, b)[0, 1]),
         delay=delay,
+        whole_rms=float((estimated - true)[inner].std()),
         phase_delay=_phase_delay(true[inner], estimated[inner], time_step, band, delay),
     )
 

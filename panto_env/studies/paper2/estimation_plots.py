@@ -1,0 +1,60 @@
+"""The estimator's figures: the paper's Figs 11 and 12, and delay over frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ...base.arrays import Array
+from ...estimation.motion import Motion
+from ...estimation.score import COHERENT, phases
+from .estimation import MISMATCH, OBSERVATIONS, SPEED_KMH, START
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = 4.0
+"""Seconds drawn: about five spans at 250 km/h. Own choice."""
+HIGHEST = 20.0
+"""Of the frequencies shown (Hz)."""
+
+
+def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
+    """True and estimated contact force (N), (n,): Fig. 11 with velocities, Fig. 12 without."""
+    from matplotlib.figure import Figure
+
+    assert motion.contact_force is not None
+    number = 11 + OBSERVATIONS.index(observation)
+    shown = (motion.time >= START) & (motion.time <= START + SHOWN)
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    axis = figure.subplots()
+    axis.plot(motion.time[shown], motion.contact_force[shown], color="tab:orange", linewidth=2, label="true")
+    axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
+    axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
+    axis.set_title(
+        f"As Fig. {number}: from {observation}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %",
+        fontsize="medium",
+    )
+    axis.legend(fontsize="small", loc="upper right")
+    axis.grid(color="0.9")
+    return figure
+
+
+def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
+    """Delay by phase over frequency of estimates (N), (n,), by name; only where they are coherent."""
+    from matplotlib.figure import Figure
+
+    assert motion.contact_force is not None
+    kept = slice(round(START / motion.time_step), None)
+    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    axis = figure.subplots()
+    for name, force in forces.items():
+        found = phases(motion.contact_force[kept], force[kept], motion.time_step)
+        used = (found.frequency <= HIGHEST) & (found.coherence >= COHERENT)
+        axis.plot(found.frequency[used], 1e3 * found.delay[used], "o-", markersize=3, label=name)
+    axis.axhline(0, color="0.4", linewidth=0.8)
+    axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
+    axis.set_title(f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent", fontsize="medium")
+    axis.legend(fontsize="small")
+    axis.grid(color="0.9")
+    return figure

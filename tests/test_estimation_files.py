@@ -1,0 +1,154 @@
+"""Records, refusals, verdicts and the command, on a simulated pass."""
+
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from panto_env import simulate
+from panto_env.estimation.motion import measure
+from panto_env.estimation.motion_file import read_motion, write_motion
+from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
+
+PANTO = Path(sys.executable).with_name("panto")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate("en50318-2002", "dsa350", 250, time_step=5e-4, record_droppers=False)
+
+
+@pytest.fixture(scope="module")
+def motion(run):
+    return measure(run)
+
+
+@pytest.fixture(scope="module")
+def record(motion, tmp_path_factory):
+    path = tmp_path_factory.mktemp("train") / "record.csv"
+    write_motion(motion, path)
+    return path
+
+
+def panto(*arguments, cwd=None):
+    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+
+
+def test_a_measurement_is_the_run_with_noise(run):
+    clean = measure(run, displacement_noise=0.0, velocity_noise=0.0)
+    seen = measure(run, seed=3)
+    assert seen.time_step == pytest.approx(1e-3)
+    for name, noise in (("head", 2e-5), ("frame", 2e-5), ("head_velocity", 5e-3), ("frame_velocity", 5e-3)):
+        added = getattr(seen, name) - getattr(clean, name)
+        assert added.std() == pytest.approx(noise, rel=0.03)
+        assert abs(np.corrcoef(added[1:], added[:-1])[0, 1]) < 0.03
+        between = np.interp(clean.time, run.time, getattr(run, name))
+        np.testing.assert_allclose(getattr(clean, name), between, atol=2e-3 * np.ptp(between))
+    np.testing.assert_array_equal(measure(run, seed=3).head, seen.head)
+    assert not np.array_equal(measure(run, seed=4).head, seen.head)
+    # A cubic through the heights moves as the velocities say.
+    moved = np.cumsum(clean.head_velocity) * clean.time_step
+    np.testing.assert_allclose(np.diff(clean.head), np.diff(moved), atol=1e-5)
+    # The true force is a mean over the sampling interval: its sum is that of the run.
+    begin, end = clean.time[0] - 5e-4, clean.time[-1] + 5e-4
+    inside = (run.time > begin) & (run.time < end)
+    assert clean.contact_force.sum() * 1e-3 == pytest.approx(run.contact_force[inside].sum() * 5e-4, rel=1e-4)
+    assert (clean.lift, clean.span_length, clean.speed) == (120.0, 60.0, pytest.approx(250 / 3.6))
+    assert len(measure(run, rate=200.0).head) == pytest.approx(len(clean.head) / 5, abs=2)
+
+
+def test_known_forces_are_those_until_the_next_sample(run):
+    """A step of an actuator's force half way between samples is half a step in that interval."""
+    acting = np.where(run.time > 3.0005, 10.0, 0.0)
+    seen = measure(dataclasses.replace(run, frame_force=acting, head_force=-acting))
+    before = int(np.searchsorted(seen.time, 3.0005)) - 1
+    share = 10 * (seen.time[before] + 1e-3 - 3.0005) / 1e-3
+    np.testing.assert_allclose(seen.frame_force[before - 1 : before + 2], [0.0, share, 10.0], atol=1e-6)
+    np.testing.assert_array_equal(seen.head_force, -seen.frame_force)
+
+
+def test_the_bar_of_the_estimator(run):
+    """250 km/h, 120 N static, noise of real sensors, parameters 5 % wrong: above 0.97 in 0 to 20 Hz."""
+    delays = {}
+    for observation in OBSERVATIONS:
+        scores = []
+        for seed in range(2):
+            seen = measure(run, seed=seed)
+            force = filtered("random-walk", 0.0, seen, known_pantograph(seed), observation)
+            scores.append(settled_scores(seen, force)[-1])
+        delays[observation] = 1e3 * np.mean([each.delay for each in scores])
+        assert min(each.correlation for each in scores) > (0.97 if "velocities" in observation else 0.94)
+    assert 2.0 < delays[OBSERVATIONS[0]] < 3.5
+    assert 4.2 < delays[OBSERVATIONS[1]] < 6.0
+
+
+def test_a_motion_survives_its_file(motion, record):
+    again = read_motion(record, lift=120.0, speed=motion.speed, span_length=60.0)
+    for name in ("head", "frame", "head_velocity", "frame_velocity", "frame_force", "contact_force", "time"):
+        np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
+
+
+def test_the_command_prints_compares_and_writes(record, tmp_path):
+    output, picture = tmp_path / "force.parquet", tmp_path / "force.png"
+    shown = panto(
+        "estimate", record, "--pantograph", "dsa350", "--output", output, "--plot", picture, "--json"
+    )
+    assert shown.returncode == 0, shown.stderr
+    told = json.loads(shown.stdout)
+    assert told["mean"] == pytest.approx(116.4, abs=0.5)
+    assert told["std"] == pytest.approx(27.4, abs=1.0)
+    assert told["believe"] is True
+    assert told["scores"][-1]["correlation"] > 0.97
+    table = pq.read_table(output)
+    assert table.column_names == ["time", "contact_force", "nis"]
+    assert np.mean(table["nis"].to_numpy()) == pytest.approx(told["nis"], rel=0.05)
+    assert picture.stat().st_size > 10_000
+    shown = panto(
+        "estimate", record, "--pantograph", "dsa350", "--displacements", "--speed", "250", "--span", "60",
+        "--force-model", "periodic", "--lag", "0.1",
+    )  # fmt: skip
+    assert shown.returncode == 0, shown.stderr
+    assert "from displacements, periodic" in " ".join(shown.stdout.split())
+    assert "to be believed" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "message"),
+    [
+        (lambda rows: [*rows[:3000], *rows[3100:]], (), "Time steps are not equal"),
+        (lambda rows: [*rows[:3000], rows[2000], *rows[3001:]], (), "Time does not increase at sample 3000"),
+        (lambda rows: [rows[0].replace("head (mm)", "head"), *rows[1:]], (), "Column head of .* has no unit"),
+        (lambda rows: [rows[0].replace("frame (mm)", "y (mm)"), *rows[1:]], (), "has no column frame"),
+        (
+            lambda rows: [*rows[:50], rows[50].replace(",", ",x", 1), *rows[51:]],
+            (),
+            "Line 51 of .*: column head",
+        ),
+        (lambda rows: rows[:15], (), "14 samples, too few to estimate a force"),
+        (lambda rows: rows, ("--pantograph", "dsa380"), "aerodynamic uplift; give the speed"),
+        (lambda rows: rows, ("--force-model", "shaped"), "The shaped force model needs the speed"),
+        (
+            lambda rows: rows,
+            ("--force-model", "shaped:damping=99"),
+            "damping.* must be a number from",
+        ),
+        (lambda rows: rows, ("--displacement-noise", "2"), "displacement_noise.* from 1e-08 to 0.1 m"),
+        (lambda rows: rows, ("--lag", "100"), "lag.* from 0 to 5 s"),
+        (lambda rows: rows, ("--output", "force.txt"), "must end in one of .csv, .parquet"),
+    ],
+)
+def test_bad_input_to_the_command_is_one_sentence(change, options, message, record, tmp_path):
+    path = tmp_path / "mine.csv"
+    path.write_text("\n".join(change(record.read_text().splitlines())) + "\n")
+    given = options if "--pantograph" in options else ("--pantograph", "dsa350", *options)
+    shown = panto("estimate", path, *given, cwd=tmp_path)
+    assert shown.returncode == 2
+    assert re.search(message, " ".join(shown.stderr.split())), shown.stderr
+    assert "Traceback" not in shown.stderr
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["mine.csv"]

@@ -1,0 +1,106 @@
+"""What the paper says of its Figs 11 and 12, and the tables around them, with figures that may not drift."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from panto_env.analysis.plots import save
+from panto_env.estimation.motion import measure
+from panto_env.studies.paper2 import estimation
+from panto_env.studies.paper2.estimation import (
+    METHODS,
+    OBSERVATIONS,
+    cases,
+    known_pantograph,
+    over_noise,
+    run,
+    told_parameters,
+)
+from panto_env.studies.paper2.estimation_plots import delay_plot, figure_11_12
+from panto_env.studies.paper2.estimation_tables import (
+    comparisons,
+    noise_table,
+    over_speed_tables,
+    parameters_table,
+)
+
+BOTH, ONE = OBSERVATIONS
+
+
+@pytest.fixture(scope="module")
+def at_250():
+    return cases((250.0,))
+
+
+@pytest.fixture(scope="module")
+def trajectory():
+    return run(250.0)
+
+
+def test_every_statement_holds(at_250):
+    found = comparisons(at_250)
+    assert {each.quantity: each.ours for each in found} == {
+        "displacements and velocities: correlation": pytest.approx(0.9872, abs=0.002),
+        "displacements: correlation": pytest.approx(0.9571, abs=0.004),
+        "displacements: delay": pytest.approx(5.10, abs=0.2),
+        "displacements: delay over that with velocities": pytest.approx(1.90, abs=0.15),
+        "displacements, smoothed: correlation": pytest.approx(0.9998, abs=2e-4),
+    }
+    assert all(each.agrees for each in found)
+
+
+def test_the_ways_rank_as_told(at_250):
+    """At equal noise, errors at all frequencies: beliefs about the force pay; none at all costs
+    everything.
+    """
+    errors = {(case.observation, case.method): case.scores[-1].whole_rms for case in at_250}
+    for observation in OBSERVATIONS:
+        by_method = {method: errors[observation, method] for method in METHODS}
+        assert min(by_method, key=by_method.get) == "smoother, 100 ms"
+        assert by_method["filter, shaped"] < by_method["filter, random-walk"]
+        assert by_method["filter, periodic"] < by_method["filter, random-walk"]
+        assert by_method["filter, random-walk"] < by_method["inertia-corrected"]
+    assert errors[BOTH, "unknown input"] < 1.1 * errors[BOTH, "inertia-corrected"]
+    assert errors[ONE, "unknown input"] > 2 * errors[ONE, "inertia-corrected"]
+
+
+def test_tables_show_every_way_and_band(at_250):
+    tables = over_speed_tables(at_250)
+    assert [len(table.rows) for table in tables] == [36, 36, 12, 12, 36, 36]
+    assert tables[0].headings == ("observations", "method", "band", "250 km/h")
+    assert float(tables[0].rows[2][3]) == pytest.approx(at_250[0].scores[2].correlation, abs=1e-4)
+    pickle.loads(pickle.dumps(at_250))  # numbers alone, that go to a file
+
+
+def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
+    monkeypatch.setattr(estimation, "NOISES", (1e-5, 1e-4))
+    scores = over_noise(trajectory)
+    for observation in OBSERVATIONS:
+        assert scores[observation, 1e-4].delay > 1.8 * scores[observation, 1e-5].delay
+    assert len(noise_table(scores).rows) == 2
+
+
+def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
+    told = told_parameters(trajectory)
+    true = {"masses.1": 13.0, "stiffnesses.0": 7000.0, "dampings.1": 100.0}
+    found = dict(zip(told.found.names, told.found.values, strict=True))
+    for name, value in true.items():
+        assert found[name] == pytest.approx(value, rel=0.005)
+    assert told.bounds["masses.0"] > 5 * told.bounds["masses.1"]
+    assert told.scale > 0.5
+    assert len(parameters_table(told).rows) == 8
+
+
+def test_figures_are_drawn(trajectory, tmp_path):
+    motion = measure(trajectory, seed=0)
+    method = METHODS["filter, random-walk"]
+    forces = {observation: method(motion, known_pantograph(0), observation) for observation in OBSERVATIONS}
+    for number, observation in ((11, BOTH), (12, ONE)):
+        figure = figure_11_12(motion, forces[observation], observation)
+        assert f"As Fig. {number}" in figure.axes[0].get_title()
+        save(figure, tmp_path / f"{number}.png")
+    figure = delay_plot(motion, forces)
+    late = {line.get_label(): np.nanmean(line.get_ydata()) for line in figure.axes[0].lines[:2]}
+    assert late[ONE] > late[BOTH] > 0
+    save(figure, tmp_path / "delay.png")
