@@ -33,13 +33,20 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
         for support in np.arange(diagnosis.begin, diagnosis.end + 1e-6, evidence.span):
             axis.axvline(support, color="0.85", linewidth=0.8, zorder=0)
         for finding in diagnosis.findings:
-            axis.axvline(finding.position, color="tab:orange", linewidth=1.2)
+            axis.axvline(finding.position, color="tab:orange", linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {finding.span}, {place(finding)}"
         force.annotate(
-            words, (finding.position, 1.0), (3, -4), xycoords=("data", "axes fraction"),
-            textcoords="offset points", rotation=90, va="top", fontsize="small",
-        )  # fmt: skip
+            words,
+            (finding.position, 1.0),
+            (3, -4),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            rotation=90,
+            va="top",
+            fontsize="small",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
+        )
     score.set(
         ylabel="score (-)", xlabel="position (m); grey lines: supports", xlim=(diagnosis.begin, diagnosis.end)
     )

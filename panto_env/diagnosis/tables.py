@@ -10,7 +10,8 @@ def place(finding: Finding) -> str:
     """Where a finding is, in words."""
     if finding.dropper is not None:
         return f"dropper {finding.dropper}"
-    return "support" if finding.offset < 1e-6 else f"interval {finding.interval}"
+    # A support has the number of the span before it, as in a line condition.
+    return f"support {finding.span - 1}" if finding.offset < 1e-6 else f"interval {finding.interval}"
 
 
 def findings_table(diagnosis: Diagnosis) -> Table:

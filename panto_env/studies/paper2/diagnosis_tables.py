@@ -44,10 +44,12 @@ def share(cases: Sequence[Case], of: Chosen) -> tuple[float, float, float]:
 
 
 def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
-    """False alarms on healthy lines per 10 km, and their upper 95 % bound after Poisson."""
+    """False alarms on healthy lines per 10 km, and their upper 95 % bound after Poisson; nan without any."""
     from scipy.stats import chi2  # slow to import
 
     healthy = [case for case in cases if not case.kind]
+    if not healthy:
+        return float("nan"), float("nan")
     alarms, way = sum(case.others for case in healthy), sum(case.distance for case in healthy)
     return 10 * alarms / way, float(10 * chi2.ppf(0.95, 2 * alarms + 2) / 2 / way)
 
