@@ -118,6 +118,18 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     assert "to be believed" in shown.stdout
 
 
+def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
+    seen = measure(run, rate=250.0, displacement_noise=6e-5)
+    write_motion(seen, tmp_path / "noisy.csv")
+    shown = panto("estimate", tmp_path / "noisy.csv", "--pantograph", "dsa350", "--tune", "--json")
+    assert shown.returncode == 0, shown.stderr
+    told = json.loads(shown.stdout)
+    assert told["settings"]["displacement_noise"] == pytest.approx(6e-5, rel=0.1)
+    assert told["settings"]["velocity_noise"] == pytest.approx(5e-3, rel=0.1)
+    assert told["nis"] == pytest.approx(1.0, abs=0.1)
+    assert "the size of its innovations is no test" in " ".join(shown.stderr.split())
+
+
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [

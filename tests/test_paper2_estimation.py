@@ -51,9 +51,7 @@ def test_every_statement_holds(at_250):
 
 
 def test_the_ways_rank_as_told(at_250):
-    """At equal noise, errors at all frequencies: beliefs about the force pay; none at all costs
-    everything.
-    """
+    """Errors at all frequencies, at equal noise: beliefs about the force pay, none at all costs most."""
     errors = {(case.observation, case.method): case.scores[-1].whole_rms for case in at_250}
     for observation in OBSERVATIONS:
         by_method = {method: errors[observation, method] for method in METHODS}

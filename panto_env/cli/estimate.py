@@ -109,7 +109,15 @@ def estimate(
 
         names = TUNED if only else (*TUNED, "velocity_noise")
         with progress_console.status("tuning"):
-            settings = find([motion], known, settings, names).settings
+            tuned = find([motion], known, settings, names)
+        settings = tuned.settings
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in tuned.values.items())
+        progress_console.print(
+            f"Tuned on this record: {values}; so the size of its innovations is no test of it, nor of "
+            "another that is as faulty."
+        )
+        for name in tuned.at_bounds:
+            progress_console.print(f"[bold red]Warning:[/] the record does not tell {name}.")
     found = run(motion, known, settings)
     scores = _scores(motion, found)
     if output is not None:

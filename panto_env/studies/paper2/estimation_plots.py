@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...base.arrays import Array
 from ...estimation.motion import Motion
 from ...estimation.score import COHERENT, phases
@@ -50,8 +52,8 @@ def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
     axis = figure.subplots()
     for name, force in forces.items():
         found = phases(motion.contact_force[kept], force[kept], motion.time_step)
-        used = (found.frequency <= HIGHEST) & (found.coherence >= COHERENT)
-        axis.plot(found.frequency[used], 1e3 * found.delay[used], "o-", markersize=3, label=name)
+        late = np.where(found.coherence >= COHERENT, 1e3 * found.delay, np.nan)
+        axis.plot(found.frequency, late, "o-", markersize=3, label=name)
     axis.axhline(0, color="0.4", linewidth=0.8)
     axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
     axis.set_title(f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent", fontsize="medium")
