@@ -261,6 +261,7 @@ def test_runs_that_say_too_little_are_refused(healthy_runs):
 def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
     """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
     monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_MORE", 1)
+    monkeypatch.setattr("panto_env.diagnosis.training.EACH", 1)
     monkeypatch.setattr(
         "panto_env.diagnosis.cases.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
     )
