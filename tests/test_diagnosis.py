@@ -285,10 +285,11 @@ def files(healthy_runs, tmp_path_factory):
     return names
 
 
-def test_command_prints_a_table_and_draws(files, tmp_path):
+def test_command_prints_a_table_and_draws(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(console, "_width", 200)  # it has asked for its width when it was made
     picture = tmp_path / "line.png"
     call = ["diagnose", files[0], "--healthy", *files[1:], "--plot", str(picture)]
-    told = CliRunner().invoke(make_app(), call, env={"COLUMNS": "200"})
+    told = CliRunner().invoke(make_app(), call)
     assert told.exit_code == 0, told.output
     assert "1 defect from 540 to 1620 m." in told.output
     assert "broken dropper" in told.output
