@@ -23,6 +23,7 @@ from panto_env.diagnosis.threshold import threshold
 from panto_env.diagnosis.training import NEAR, examples, fit, save
 from panto_env.metrics.low_pass import low_pass_in_place
 from panto_env.studies.paper2.diagnosis_cases import within_interval
+from panto_env.terminal import console
 
 SPAN, PER_SPAN, SPANS = 60.0, 120, 40
 
