@@ -150,7 +150,7 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
     level = float(np.median(healthy.levels))
     if level > ALIKE:
         notes.append(
-            f"Healthy passes differ by {level:.1f} N rms, more than the {ALIKE:g} N of passes over one line: if "
-            "they are over other lines of its design, much less is found."
+            f"Healthy passes differ by {level:.1f} N rms, more than the {ALIKE:g} N of passes over one line: "
+            "if they are over other lines of its design, much less is found."
         )
     return notes
