@@ -148,7 +148,7 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
             "several times as many, or as few."
         )
     level = float(np.median(healthy.levels))
-    if level > ALIKE:
+    if count >= MANY and level > ALIKE:  # of fewer, the mean itself is off by as much
         notes.append(
             f"Healthy passes differ by {level:.1f} N rms, more than the {ALIKE:g} N of passes over one line: "
             "if they are over other lines of its design, much less is found."
