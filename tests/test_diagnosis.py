@@ -222,6 +222,13 @@ def test_lost_tension_changes_the_whole_line(healthy_runs):
     assert found.notes == ()
 
 
+def test_healthy_passes_over_other_lines_are_said_to_be_unlike(healthy_runs):
+    others = [drive(replace(TRACK, seed=1000 + k), 0) for k in range(6)]
+    found = diagnose(healthy_runs[:1], others)
+    assert "differ by" in found.notes[-1]
+    assert "if they are over other lines" in found.notes[-1]
+
+
 def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
     found = diagnose(healthy_runs[:1], healthy_runs[1:4])
     assert len(found.notes) == 2
@@ -261,8 +268,7 @@ def test_runs_that_say_too_little_are_refused(healthy_runs):
 
 def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
     """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
-    monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_MORE", 1)
-    monkeypatch.setattr("panto_env.diagnosis.training.EACH", 1)
+    monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_EACH", 1)
     monkeypatch.setattr(
         "panto_env.diagnosis.cases.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
     )

@@ -63,6 +63,15 @@ def test_tables_and_curves_hold_every_case():
     assert len(study.rate_rows(cases)) == len(judged.MEANS) * len(judged.RATES)
 
 
+def test_outer_droppers_are_those_next_to_a_support():
+    assert [judged.is_outer(TRACK, 12 * 60 + x) for x in TRACK.data.droppers.positions] == [
+        True,
+        *[False] * 7,
+        True,
+    ]
+    assert not judged.is_outer(TRACK, 12 * 60)
+
+
 def test_a_defect_is_drawn_where_it_says_it_is():
     random = np.random.default_rng(0)
     for defect in every_defect(TRACK, random, 3):

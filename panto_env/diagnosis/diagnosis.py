@@ -19,6 +19,9 @@ from .threshold import ENOUGH, FALSE_ALARMS, threshold
 
 MANY = 6
 """Healthy passes from which on what they have in common is well known."""
+ALIKE = 3.0
+"""Level of healthy passes (N) that those over one line keep to: simulated ones have 2.1 to 2.7 N at 160 to
+280 km/h on two lines. Over several lines of a design, droppers differing by 5 mm rms, it is 3.5 to 6.6 N."""
 CHANGED, RARE = 2.0, 1e-3
 """Level of a pass over that of healthy ones from which on the whole line counts as changed, where no more
 than this share of healthy passes would have it (Student's t of log levels)."""
@@ -143,5 +146,11 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
         notes.append(
             f"Only {spans} healthy spans set the threshold: with fewer than {ENOUGH}, false alarms may be "
             "several times as many, or as few."
+        )
+    level = float(np.median(healthy.levels))
+    if count >= MANY and level > ALIKE:  # of fewer, the mean itself is off by as much
+        notes.append(
+            f"Healthy passes differ by {level:.1f} N rms, more than the {ALIKE:g} N of passes over one line: "
+            "if they are over other lines of its design, much less is found."
         )
     return notes

@@ -29,8 +29,8 @@ PANTOGRAPH = "dsa380"
 SPEEDS_KMH = (160.0, 200.0, 240.0, 280.0)
 SEEDS = (1, 2, 3, 4, 5, 6)
 """What the classifier sees; the study judges it on other speeds, lines, pantographs and seeds."""
-HEALTHY, EACH, BROKEN_MORE = 8, 2, 8
-"""Healthy passes over each line, defects of each kind and severity, and broken droppers as often as that."""
+HEALTHY, BROKEN_EACH = 8, 8
+"""Of each track: healthy passes, and broken droppers; of other kinds there is one of each severity."""
 HIDDEN, PENALTY, EPOCHS = 48, 0.5, 50
 """Of the network: units, weight decay, rounds. Chosen on lines of seeds 11 and 12, which no study sees."""
 REPEATED = 2.0
@@ -45,7 +45,7 @@ UNLIKE = 2.0
 def examples(track: Track) -> tuple[Array, Index]:
     """Features, (n, features), and classes, (n,), of what defects on one track show."""
     random = np.random.default_rng([track.seed, round(track.speed_kmh)])
-    defects = [defect for _ in range(EACH) for defect in every_defect(track, random, BROKEN_MORE)]
+    defects = every_defect(track, random, BROKEN_EACH)
     runs = [drive(track, HEALTHY + k, (defect,)) for k, defect in enumerate(defects)]
     whole = [(defect, run) for defect, run in zip(defects, runs, strict=True) if not run.terminated]
     passes, reference = side_by_side(

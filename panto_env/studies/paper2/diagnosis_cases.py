@@ -48,6 +48,7 @@ class Case:
     named: str  # kind of the finding; "" where there is none
     others: int  # findings that are not of the defect
     distance: float  # judged (km)
+    outer: bool = False  # whether it is at the first or the last dropper of a span
 
 
 def judge_track(
@@ -103,6 +104,7 @@ def _case(track: Track, defect: Defect | None, own: Passes, healthy: Healthy, ra
         named="",
         others=len(found.findings) + found.changed,
         distance=(found.end - found.begin) / 1e3,
+        outer=defect is not None and is_outer(track, defect.position),
     )
     if defect is None:
         return case
@@ -127,6 +129,13 @@ def _located(case: Case, defect: Defect, found: Diagnosis) -> Case:
         named=best.kind,
         others=case.others - len(near),
     )
+
+
+def is_outer(track: Track, position: float) -> bool:
+    """Whether the first or the last dropper of a span is at a position (m)."""
+    data = track.data
+    offset = position % data.span_length
+    return min(abs(offset - data.droppers.positions[k]) for k in (0, -1)) < 1e-6
 
 
 def within_interval(place: float, defect: float, droppers: Sequence[float] | np.ndarray) -> bool:

@@ -71,9 +71,14 @@ def broken_table(cases: Sequence[Case]) -> Table:
                     (f"{count} pass{'es' if count > 1 else ''}, {line}", f"{speed:g}", *broken_row(own))
                 )
         own = [c for c in cases if usual(c) and c.passes == count]
-        rows.append((f"{count} pass{'es' if count > 1 else ''}, all", "", *broken_row(own)))
+        words = f"{count} pass{'es' if count > 1 else ''}"
+        rows.append(
+            (f"{words}, next to a support", "", *broken_row([c for c in own if c.outer or not c.kind]))
+        )
+        rows.append((f"{words}, other droppers", "", *broken_row([c for c in own if not c.outer])))
+        rows.append((f"{words}, all", "", *broken_row(own)))
     headings = ("mean of", "km/h", *BROKEN_HEADINGS)
-    ends = tuple((len(LINES) * len(SPEEDS_KMH) + 1) * (k + 1) - 1 for k in range(len(MEANS)))
+    ends = tuple((len(LINES) * len(SPEEDS_KMH) + 3) * (k + 1) - 1 for k in range(len(MEANS)))
     return Table("Broken droppers on lines not trained on", headings, tuple(rows), section_ends=ends)
 
 
