@@ -20,7 +20,7 @@ from panto_env.plant.catenary.protocol import (
     place_contact,
 )
 from panto_env.plant.catenary.rig import Rig
-from panto_env.plant.catenary.rig.arrays import RigRow
+from panto_env.plant.catenary.rig.arrays import RIG_ROW, RigRow
 from panto_env.plant.catenary.rig.build import assumed, bank, outer_lead
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
@@ -65,14 +65,14 @@ def error(data, time_step, reference, low=0.0, high=20.0, **settings):
 def drive_cylinder(line, wire, commands, force, heights, cells, counts):
     """Run a rig without its computer: a command and a force for each step."""
     for k in range(commands.size):
-        wire.table[0, 6] = commands[k]
+        wire.table[0, RIG_ROW.COMMAND] = commands[k]
         x = 0.01 * (k + 0.5)
         place_contact(line, wire, 0, counts, x)
         advance_wire(line, wire, 0)
         apply_force(line, wire, 0, counts, x, force[k])
         end_step(line, wire, 0)
-        heights[k] = wire.table[0, 0]
-        cells[k] = wire.table[0, 4]
+        heights[k] = wire.table[0, RIG_ROW.HEIGHT]
+        cells[k] = wire.table[0, RIG_ROW.FILTERED]
 
 
 def parts_of_run(data, commands, force):

@@ -52,11 +52,17 @@ def keep(past, value):
 
 
 @inlined
+def moved(matrix, k, value, rate, force):
+    """Row k of a matrix (2, 3) times value, rate and input."""
+    return matrix[k, 0] * value + matrix[k, 1] * rate + matrix[k, 2] * force
+
+
+@inlined
 def low_pass(rig, fit, value_before, rate_row, value):
     """Value and rate behind the filter of the fit; the rate stands in its row."""
-    a, rate = rig.fit_filter, fit[rate_row]
-    fit[rate_row] = a[1, 0] * value_before + a[1, 1] * rate + a[1, 2] * value
-    return a[0, 0] * value_before + a[0, 1] * rate + a[0, 2] * value
+    rate = fit[rate_row]
+    fit[rate_row] = moved(rig.fit_filter, 1, value_before, rate, value)
+    return moved(rig.fit_filter, 0, value_before, rate, value)
 
 
 @inlined

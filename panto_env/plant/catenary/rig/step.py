@@ -20,19 +20,13 @@ from ..protocol import (
     rise_at_contact,
 )
 from .arrays import RIG_ROW, RigLine
-from .computer import take_sample
+from .computer import moved, take_sample
 
 
 @inlined
 def arrived(line, wire, lane):
     """The command (m) that holds in this step: the mean over it."""
     return (1.0 - line.late_share) * wire.late[lane, 1] + line.late_share * wire.late[lane, 0]
-
-
-@inlined
-def moved(matrix, k, value, rate, force):
-    """Row k of a matrix (2, 3) times value, rate and input."""
-    return matrix[k, 0] * value + matrix[k, 1] * rate + matrix[k, 2] * force
 
 
 @implements(place_contact, RigLine)
