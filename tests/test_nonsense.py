@@ -8,9 +8,10 @@ from collections import Counter
 
 import numpy as np
 import pytest
+
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.catenary.flexible.resolution import HARD_CONTACT_ERROR
+from panto_env.plant.catenary.flexible.resolution import HARD_CONTACT_ERROR, HARD_CONTACT_MEAN_ERROR
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 LINES = ("en50318-2002", "benchmark-2015", "re250", "shinkansen-simple", "ln2")
@@ -72,8 +73,8 @@ def case_of(seed):
     droppers = line.droppers.model_copy(update={"contact_clamp_mass": clamp, "messenger_clamp_mass": clamp})
     changed = {
         "force": "applied",  # a mean to be met would want longer runs
-        "contact_stiffness": random.choice([20e3, 50e3, 200e3, 1e6]),
-        "contact_damping": random.choice([0.0, 100.0, 1000.0]),
+        "contact_stiffness": float(random.choice([20e3, 50e3, 200e3, 1e6])),
+        "contact_damping": float(random.choice([0.0, 100.0, 1000.0])),
     }
     pantograph = load_pantograph(PANTOGRAPHS[random.integers(len(PANTOGRAPHS))])
     conditions = ("new", "worn", {"wear_depth": 2e-3, "wear_wavelength": 0.4})
@@ -151,11 +152,12 @@ def check(case):
     fine = finer(line, pantograph, case, run, **numbers)
     assert not fine.terminated
     ours, true = run.summary(spans), fine.summary(spans)
-    assert ours.mean == pytest.approx(true.mean, rel=0.005, abs=0.2)
     if pantograph.hard_contact:
+        assert ours.mean == pytest.approx(true.mean, rel=HARD_CONTACT_MEAN_ERROR / 100, abs=0.2)
         assert any("contact stiffer" in str(each.message) for each in warned)
         assert ours.std == pytest.approx(true.std, rel=HARD_CONTACT_ERROR / 100, abs=0.5)
         return "agreed, as warned"
+    assert ours.mean == pytest.approx(true.mean, rel=0.005, abs=0.2)
     # The catalogue's lines are within 1 % and 0.1 points; these are far from any of them.
     assert ours.std == pytest.approx(true.std, rel=0.03, abs=0.3)
     assert ours.contact_loss == pytest.approx(true.contact_loss, abs=2.0)
@@ -173,7 +175,7 @@ def test_a_few_random_runs_are_refused_or_right(seed):
 
 @pytest.mark.slow
 def test_random_runs_are_refused_or_right():
-    """As many as the variable NONSENSE says, from the seed NONSENSE_FROM on; `make nonsense` runs thousands."""
+    """As many as NONSENSE says, from the seed NONSENSE_FROM on; `make nonsense` runs thousands."""
     first = int(os.environ.get("NONSENSE_FROM", FIRST))
     ways: Counter[str] = Counter()
     wrong = []
