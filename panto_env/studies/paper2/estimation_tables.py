@@ -14,33 +14,62 @@ from .estimation import MISMATCH, OBSERVATIONS, PANTOGRAPH, SEEDS, SPEED_KMH, Ca
 QUANTITIES: dict[str, Callable[[Score], str]] = {
     "correlation with the true force": lambda score: number(score.correlation, 4),
     "rms error without its mean (N)": lambda score: number(score.rms, 2),
-    "rms error without its mean, all frequencies (N)": lambda score: number(score.whole_rms, 2),
-    "mean error (N)": lambda score: number(score.bias, 2),
     "delay by cross-correlation (ms)": lambda score: number(1e3 * score.delay, 2),
-    "delay by phase (ms)": lambda score: number(1e3 * score.phase_delay, 2),
 }
-"""What tables show of scores, by their titles."""
-ONCE = ("rms error without its mean, all frequencies (N)", "mean error (N)")
-"""That differ little or not at all from band to band."""
+"""What tables show over speed in 0 to 20 Hz, by their titles."""
+
+
+def ways_table(cases: Sequence[Case]) -> Table:
+    """Every way at the paper's speed, by band."""
+    rows = []
+    for case in cases:
+        if case.speed_kmh != SPEED_KMH:
+            continue
+        last = case.scores[-1]
+        rows.append(
+            (
+                case.observation,
+                case.method,
+                *(number(score.correlation, 4) for score in case.scores),
+                *(number(score.rms, 2) for score in case.scores),
+                number(last.whole_rms, 2),
+                number(last.bias, 2),
+                *(number(1e3 * score.delay, 2) for score in case.scores),
+                number(1e3 * last.phase_delay, 2),
+            )
+        )
+    bands = [f"0–{band:g} Hz" for band in BANDS]
+    headings = (
+        "observations",
+        "method",
+        *(f"correlation, {band}" for band in bands),
+        *(f"rms error (N), {band}" for band in bands),
+        "all",
+        "mean error (N)",
+        *(f"late by (ms), {band}" for band in bands),
+        f"by phase (ms), {bands[-1]}",
+    )
+    title = (
+        f"The estimated force at {SPEED_KMH:g} km/h, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds"
+    )
+    return Table(title, headings, rows, text_columns=2)
 
 
 def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
-    """One table a quantity: methods, observations and bands down, speeds across."""
+    """One table a quantity, in 0 to 20 Hz: methods and observations down, speeds across."""
     speeds = sorted({case.speed_kmh for case in cases})
-    headings = ("observations", "method", "band", *(f"{speed:g} km/h" for speed in speeds))
-    found = {(case.observation, case.method, case.speed_kmh): case.scores for case in cases}
+    headings = ("observations", "method", *(f"{speed:g} km/h" for speed in speeds))
+    found = {(case.observation, case.method, case.speed_kmh): case.scores[-1] for case in cases}
     ways = list(dict.fromkeys((case.observation, case.method) for case in cases))
-    tables = []
-    for title, cell in QUANTITIES.items():
-        bands = BANDS[-1:] if title in ONCE else BANDS
-        rows = [
-            (*way, f"0 to {band:g} Hz", *(cell(found[*way, speed][BANDS.index(band)]) for speed in speeds))
-            for way in ways
-            for band in bands
-        ]
-        whole = f"{title}, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds"
-        tables.append(Table(whole, headings, rows, text_columns=3))
-    return tuple(tables)
+    return tuple(
+        Table(
+            f"Estimated force, {title}, 0 to {BANDS[-1]:g} Hz",
+            headings,
+            [(*way, *(cell(found[*way, speed]) for speed in speeds)) for way in ways],
+            text_columns=2,
+        )
+        for title, cell in QUANTITIES.items()
+    )
 
 
 def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:

@@ -96,8 +96,8 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
             f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
             f"N s/m, bounces in waves shorter than a grid of {found.spacing:.3g} m carries: where contact is "
             f"lost, the mean may be wrong by up to about {HARD_CONTACT_MEAN_ERROR} %, the standard deviation "
-            f"by {HARD_CONTACT_ERROR} %, and the contact-loss ratio be several times too large; see what half "
-            "the spacing gives.",
+            f"by {HARD_CONTACT_ERROR} %, and the contact-loss ratio be several times too large; see what "
+            "half the spacing gives.",
             AccuracyWarning,
             stacklevel=2,
         )
