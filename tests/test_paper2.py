@@ -18,6 +18,11 @@ EXPECTED = {  # ours, and how far it may move before somebody must look
     "the flexible line in the rig: force to 20 Hz, difference over rms": (0.0147, 0.005),
     "delay that rig bears, linear loop over simulation": (0.994, 0.05),
     "delay that rig-flexible bears, linear loop over simulation": (0.994, 0.05),
+    "displacements and velocities: correlation": (0.987, 0.002),
+    "displacements: correlation": (0.957, 0.004),
+    "displacements: delay": (5.10, 0.2),
+    "displacements: delay over that with velocities": (1.90, 0.15),
+    "displacements, smoothed: correlation": (0.9998, 2e-4),
     "motors on the frame at 250 km/h and 15 W: change of the force, 0-2 Hz": (-40.5, 2),
     "motors on the frame at 250 km/h and 15 W: change of the force, 5-20 Hz, the worse half": (3.12, 2),
     "motors on the head at 250 km/h and 15 W: change of the force, 5-20 Hz, the worse half": (-27.3, 2),
@@ -66,4 +71,12 @@ def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
 
 def test_figures_and_numbers_are_written(outcome: Outcome, tmp_path) -> None:  # type: ignore[no-untyped-def]
     names = {path.name for path in write(outcome, tmp_path)}
-    assert names == {"numbers.json", "fig05-08-rig.png", "fig14-15-bench.png", "closed-loop.png"}
+    assert names == {
+        "numbers.json",
+        "fig05-08-rig.png",
+        "fig11-displacements-and-velocities.png",
+        "fig12-displacements.png",
+        "estimator-delay.png",
+        "fig14-15-bench.png",
+        "closed-loop.png",
+    }
