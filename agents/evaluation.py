@@ -52,7 +52,7 @@ class Pair:
     @property
     def mean_range(self) -> tuple[float, float]:
         """Lowest and highest mean force (N) that qualifies."""
-        qualifying: tuple[float, float] = mean_range(self.passive.mean, self.nominal_force)
+        qualifying: tuple[float, float] = mean_range(self.passive.mean)
         return qualifying
 
     @property

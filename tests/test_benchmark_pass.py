@@ -7,6 +7,7 @@ from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import drive, run_pass
 from panto_env import simulate
 from panto_env.base.settings import parse
+from panto_env.catalog import load_pantograph
 
 LINE = Line(catenary="periodic-stiffness", pantograph="three-mass", distance=160.0)
 SPEED_KMH = 300.0
@@ -28,6 +29,7 @@ def run(**given):
         {"sensors": {"delay": 0.03}},
         {"line_condition": "worn"},
         {"control_interval": INTERVAL},
+        {"pantograph_scatter": 0.1},
     ],
     ids=lambda setting: next(iter(setting)),
 )
@@ -76,4 +78,36 @@ def test_a_pass_that_ends_early_has_no_figures():
     given = settings(actuator={"force_limit": 1000.0}, line_condition="new")
     row = run_pass(given, LINE, (2, 3), Down(), SPEED_KMH, seed=0)
     assert row.terminated
-    assert np.isnan([*row.figures.as_dict().values(), row.action_rate]).all()
+    assert np.isnan([*row.figures.as_dict().values(), row.action_rate, row.power, row.pressed_std]).all()
+
+
+def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
+    given = settings(line_condition="new")
+    row = run_pass(given, LINE, (2, 3), "p:gain=0.5", SPEED_KMH, seed=0)
+    arguments = {"distance": 160.0, "line_condition": "new", "control_interval": 0.01}
+    passive = simulate(LINE.catenary, LINE.pantograph, SPEED_KMH, **arguments)
+    force = load_pantograph(LINE.pantograph).static_force
+    pressed = [
+        simulate(
+            LINE.catenary,
+            load_pantograph(LINE.pantograph).model_copy(update={"static_force": force + more}),
+            SPEED_KMH,
+            **arguments,
+        ).summary((2, 3))
+        for more in (-20.0, 0.0, 20.0)
+    ]
+    expected = np.interp(row.figures.mean, [one.mean for one in pressed], [one.std for one in pressed])
+    assert row.pressed_std == pytest.approx(expected, rel=0.01)
+    assert row.pressed_std != pytest.approx(passive.summary((2, 3)).std, rel=1e-3)
+    own = run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0)
+    assert (own.pressed_std, own.pressed_cost_function) == (own.figures.std, own.figures.cost_function)
+
+
+def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
+    given = settings(actuator={"force_limit": 50.0}, line_condition="new", control_interval=INTERVAL)
+    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0)
+    plan = np.random.default_rng(0).normal(0, 1, (200, 1))
+    assert row.saturation == pytest.approx(np.mean(np.abs(plan[30:90]) > 0.999))
+    run, _ = drive(given, LINE, Shouting(), SPEED_KMH, seed=0)
+    inside = (run.position > 50.0) & (run.position < 150.0)
+    assert row.power == pytest.approx(np.abs(run.frame_force * run.frame_velocity)[inside].mean(), rel=0.01)

@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import statistics
+from panto_baselines.benchmark.overall import standings
 from panto_baselines.benchmark.single_pass import Row
 from panto_env.metrics.figures import Figures
 
 ONES = Figures(*[1.0] * len(fields(Figures)))
 
 
-def row(policy="passive", seed=0, *, terminated=False, speed_kmh=300.0, action_rate=0.0, **figures):
-    """A pass with these figures, under a nominal force of 120 N."""
-    figures = replace(ONES, **{"mean": 110.0} | figures)
-    return Row(policy, "line", "pantograph", speed_kmh, seed, 120.0, terminated, figures, action_rate)
+def row(policy="passive", seed=0, *, line="line", speed_kmh=300.0, pressed=(1.0, 1.0), **given):
+    """A pass with these figures, under a nominal force of 120 N; pressed: σ and CF of the pressed passive."""
+    terminated, rate = given.pop("terminated", False), given.pop("action_rate", 0.0)
+    figures = replace(ONES, **{"mean": 110.0} | given)
+    own = (figures.std, figures.cost_function) if policy == "passive" else pressed
+    return Row(policy, line, "pantograph", speed_kmh, seed, 120.0, terminated, figures, rate, 0.0, 0.0, *own)
 
 
 def test_interquartile_mean_leaves_out_the_ends():
@@ -44,32 +47,46 @@ def test_interval_repeats_and_is_missing_where_nothing_is_known():
         assert statistics.bootstrap_interval(np.array(nothing)) is None
 
 
-def test_mean_force_lies_between_passive_and_nominal_widened():
-    assert statistics.mean_range(44.0, 54.0) == pytest.approx((0.975 * 44, 1.025 * 54))
-    assert statistics.mean_range(130.0, 120.0) == pytest.approx((0.975 * 120, 1.025 * 130))
+def test_the_mean_force_may_move_by_a_little():
+    assert statistics.mean_range(100.0) == pytest.approx((98.5, 101.5))
 
 
-def test_the_qualified_are_ranked_by_cost_and_the_others_are_not():
+def test_the_qualified_are_ranked_by_sigma_and_the_others_are_not():
     cells = statistics.compare(
         [
-            row(mean=110.0, cost_function=9.0),
-            row("pressing less", mean=107.0, cost_function=1.0),
-            row("just enough", mean=107.5, cost_function=8.0),
-            row("as much as allowed", mean=122.9, cost_function=7.0),
-            row("pressing more", mean=123.1, cost_function=2.0),
-            row("off the wire", mean=np.nan, cost_function=np.nan, terminated=True),
+            row(mean=110.0),
+            row("pressing less", mean=108.3, std=0.1),
+            row("just enough", mean=108.4, std=0.9),
+            row("as much as allowed", mean=111.6, std=0.8),
+            row("pressing more", mean=111.7, std=0.1),
+            row("off the wire", mean=np.nan, std=np.nan, terminated=True),
+            row("not to be pressed to", std=0.1, pressed=(np.nan, np.nan)),
         ]
     )
-    assert [cell.rank for cell in cells] == [3, None, 2, 1, None, None]
-    assert "107.0 N, outside 107.2 to 123.0 N" in cells[1].disqualified
+    assert [cell.rank for cell in cells] == [3, None, 2, 1, None, None, None]
+    assert cells[1].disqualified == "it moves the mean force by -1.5 %, more than 1.5 %"
     assert "1 of 1 runs ended early" in cells[5].disqualified
+    assert "no passive pantograph can be pressed" in cells[6].disqualified
     assert cells[0].disqualified == ""
 
 
-def test_equal_costs_share_a_rank():
-    costs = {"passive": 3.0, "a": 2.0, "b": 2.0}
-    cells = statistics.compare([row(policy, cost_function=cost) for policy, cost in costs.items()])
+def test_equal_changes_share_a_rank():
+    cells = statistics.compare([row(), row("a", std=0.5), row("b", std=0.5)])
     assert [cell.rank for cell in cells] == [3, 1, 1]
+
+
+def test_changes_are_against_the_passive_pantograph_pressed_to_the_same_mean():
+    """Sigma falls because the mean does: held against a passive one pressed as little, it rises."""
+    cells = statistics.compare(
+        [
+            row(mean=110.0, std=30.0, cost_function=50.0),
+            row("a", mean=109.0, std=29.7, cost_function=60.0, pressed=(27.0, 40.0)),
+        ]
+    )
+    assert cells[1].change == pytest.approx(10.0)
+    assert cells[1].cost_change == pytest.approx(50.0)
+    assert cells[1].mean_change == pytest.approx(-100 / 110)
+    assert (cells[1].improved, cells[0].improved) == (0.0, 0.0)
 
 
 def test_one_run_that_ends_early_disqualifies_whatever_its_figures():
@@ -87,16 +104,22 @@ def test_nothing_is_ranked_where_the_passive_pantograph_ends_early():
 
 
 def test_change_of_sigma_is_paired_by_seed():
-    """Each seed's line is easier or harder for both: what differs is 1 N throughout, but for a little."""
-    harder, noise = np.array([0.0, 10.0, 30.0, 20.0]), np.array([0.0, 0.1, -0.1, 0.0])
-    rows = [row(seed=k, std=30 + harder[k]) for k in range(4)]
-    rows += [row("a", k, std=29 + harder[k] + noise[k]) for k in range(4)]
+    """Each seed's line is easier or harder for both: what differs is 10 % throughout, but for a little."""
+    sigma, noise = np.array([30.0, 40.0, 60.0, 50.0]), np.array([0.0, 0.01, -0.01, 0.0])
+    rows = [row(seed=k, std=sigma[k]) for k in range(4)]
+    rows += [row("a", k, std=sigma[k] * (0.9 + noise[k]), pressed=(sigma[k], 1.0)) for k in range(4)]
     passive, active = statistics.compare(rows)
-    assert active.std_change == pytest.approx(-1.0)
-    low, high = active.std_interval
-    assert -1.11 < low < -1.0 < high < -0.89
-    assert (passive.std_change, passive.std_interval) == (0.0, None)
-    assert active.seeds == 4
+    assert active.change == pytest.approx(-10.0)
+    low, high = active.interval
+    assert -11.01 < low < -10.0 < high < -8.99
+    assert (passive.change, passive.interval) == (0.0, None)
+    assert (active.seeds, active.improved) == (4, 1.0)
+    assert passive.spread == pytest.approx(100 * sigma.std(ddof=1) / sigma.mean())
+
+
+def test_change_of_the_mean_is_paired_by_seed():
+    rows = [row(mean=100.0), row(seed=1, mean=200.0), row("a", mean=101.0), row("a", 1, mean=202.0)]
+    assert statistics.compare(rows)[1].mean_change == pytest.approx(1.0)
 
 
 def test_figures_are_interquartile_means_over_the_seeds_of_one_speed():
@@ -105,3 +128,36 @@ def test_figures_are_interquartile_means_over_the_seeds_of_one_speed():
     fast, slow = statistics.compare(rows)
     assert (fast.speed_kmh, fast.figures["std"], fast.figures["action_rate"]) == (300.0, 2.0, 4.0)
     assert (slow.speed_kmh, slow.figures["std"], slow.seeds) == (200.0, 7.0, 1)
+
+
+def two_cells(policy, easy, hard):
+    """Passes of a policy on two lines with these ratios of sigma, one a seed."""
+    return [row(policy, k, std=x, line="easy") for k, x in enumerate(easy)] + [
+        row(policy, k, std=x, line="hard") for k, x in enumerate(hard)
+    ]
+
+
+def test_standings_are_over_all_cells():
+    rows = two_cells("passive", [1.0, 1.0], [1.0, 1.0])
+    rows += two_cells("a", [0.5, 0.6], [0.9, 1.2]) + two_cells("b", [0.7, 0.7], [0.8, 0.9])
+    rows += [row("on one line alone", k, line="easy", std=0.1) for k in range(2)]
+    found = {each.policy: each for each in standings(rows, statistics.compare(rows))}
+    assert list(found) == ["passive", "a", "b"]
+    a, b = found["a"], found["b"]
+    assert a.change == pytest.approx(100 * (np.mean([0.6, 0.9]) - 1))  # without the best and the worst
+    assert (a.worst, a.worst_at) == (pytest.approx(5.0), "hard, 300 km/h")
+    assert (a.improved, b.improved) == (0.75, 1.0)
+    assert a.better_than == {"passive": 0.75, "b": 0.5}
+    assert b.better_than["a"] == 0.5
+    assert [found[name].rank for name in ("passive", "a", "b")] == [3, 1, 1]
+    low, high = a.interval
+    assert low < a.change < high
+    assert found["passive"].interval is None
+
+
+def test_who_does_not_qualify_in_one_cell_has_no_standing():
+    rows = two_cells("passive", [1.0], [1.0])
+    rows += [row("a", std=0.5, line="easy"), row("a", std=0.5, line="hard", mean=100.0)]
+    passive, a = standings(rows, statistics.compare(rows))
+    assert (passive.rank, a.rank) == (1, None)
+    assert a.disqualified.startswith("hard at 300 km/h: it moves the mean force by -9.1 %")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
+from math import isnan
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
@@ -13,59 +14,100 @@ from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
 from .run import Benchmark
+from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 120
+WIDTH = 150
 """Columns that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # and their decimals
-    "cost_function": 0,
-    "contact_loss": 2,
-    "mean": 1,
     "std": 2,
+    "mean": 1,
+    "contact_loss": 2,
     "max": 0,
     "min": 0,
     "max_uplift": 0,
     "effort": 1,
     "action_rate": 0,
+    "power": 1,
+    "saturation": 2,
 }
-ACTION_RATE = Label("rate of the commanded force, rms", "rate", "N/s")
-SIGMA = "std"
+OWN_LABELS = {
+    "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
+    "power": Label("mechanical power of the actuators", "power", "W"),
+    "saturation": Label("share of commands at the limit", "at limit", "-"),
+}
 LEGEND = (
-    "Interquartile means over the seeds; Δσ against passive, pass by pass, with its 95 % bootstrap "
-    "interval. F_m, σ, max and min of the force low-passed at 20 Hz. Ranked by CF for each line and "
-    "speed, but only policies whose mean force lies within its range."
+    "Interquartile means over the seeds. Δσ and ΔCF, pass by pass, against a passive pantograph pressed to "
+    "the same mean force, with a 95 % bootstrap interval; ΔF_m against the passive one as it is. σ, max and "
+    "min of the force low-passed at 20 Hz. Ranked by Δσ, but only policies that move the mean force by 1.5 % "
+    "at most."
 )
 
 
 def tables(outcome: Benchmark) -> RenderableType:
-    """One table per line, and a legend."""
+    """One table per line, one over all of them, and a legend."""
     parts: list[RenderableType] = []
     cells = groupby(outcome.cells, key=lambda cell: (cell.catenary, cell.pantograph))
     for (names, cells_of_line), (first, last) in zip(cells, outcome.spans, strict=True):
         title = f"{' on '.join(reversed(names))}, spans {first}–{last}"
         parts += [*_table_of_line(list(cells_of_line), title), ""]
-    return Group(*parts, Text(LEGEND, style="dim"))
+    return Group(*parts, _overall(outcome), Text(LEGEND, style="dim"))
+
+
+def _overall(outcome: Benchmark) -> Table:
+    """One row per policy, over all lines and speeds."""
+    title = f"{outcome.settings.title}: all lines, speeds and seeds"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("policy", overflow="fold")
+    best = next((each for each in outcome.standings if each.rank == 1), None)
+    headings = ["rank", "Δσ (%)", "worst cell (%)", "passes improved", "power (W)", "at limit"]
+    for heading in [*headings, *(["beaten by the first in"] if best else [])]:
+        table.add_column(heading, justify="right")
+    for each in outcome.standings:
+        low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
+        values = [
+            "–" if each.rank is None else str(each.rank),
+            f"{number(each.change, 1)}{low_high}",
+            f"{number(each.worst, 1)} at {each.worst_at}",
+            _share(each.improved),
+            number(each.power, 1),
+            number(each.saturation, 2),
+        ]
+        if best is not None:
+            values.append("–" if each is best else _share(best.better_than[each.policy]))
+        style = "red" if each.disqualified else "bold" if each is best else ""
+        table.add_row(each.policy, *values, style=style)
+    return table
+
+
+def _share(value: float) -> str:
+    return "–" if isnan(value) else f"{100 * value:.0f} %"
 
 
 def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     """The table, and a sentence for each policy that is disqualified."""
     title += f", {cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
+    spreads = [cell.spread for cell in cells if cell.policy == REFERENCE and not isnan(cell.spread)]
+    if spreads:
+        title += f"; passive σ spreads by up to {max(spreads):.1f} % rms over them"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("km/h", justify="right")
     table.add_column("policy", overflow="fold")
     table.add_column("rank", justify="right")
     for name in FIGURES:
         table.add_column(_label(name).column, justify="right")
-        if name == SIGMA:
-            table.add_column("Δσ\n(N)", justify="right", no_wrap=True)
+        if name == "std":
+            table.add_column("Δσ\n(%)", justify="right", no_wrap=True)
+            table.add_column("ΔF_m\n(%)", justify="right")
+            table.add_column("ΔCF\n(%)", justify="right")
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
             values = []
             for name, decimals in FIGURES.items():
                 values.append(number(_label(name).scale * cell.figures[name], decimals))
-                if name == SIGMA:
-                    values.append(_std_change(cell))
+                if name == "std":
+                    values += [_change(cell), number(cell.mean_change, 1), number(cell.cost_change, 0)]
             rank = "–" if cell.rank is None else str(cell.rank)
             style = "red" if cell.disqualified else "bold" if cell.rank == 1 else ""
             table.add_row(f"{speed:g}" if k == 0 else "", cell.policy, rank, *values, style=style)
@@ -77,12 +119,12 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
 
 
 def _label(name: str) -> Label:
-    return ACTION_RATE if name == "action_rate" else LABELS[name]
+    return OWN_LABELS.get(name) or LABELS[name]
 
 
-def _std_change(cell: Cell) -> str:
-    """Change of sigma against passive, with its interval where there is one."""
-    if cell.std_interval is None:
-        return number(cell.std_change, 2)
-    low, high = cell.std_interval
-    return f"{cell.std_change:+.2f} ({low:+.2f} to {high:+.2f})"
+def _change(cell: Cell) -> str:
+    """Change of sigma against the pressed passive pantograph, with its interval where there is one."""
+    if cell.interval is None:
+        return number(cell.change, 1)
+    low, high = cell.interval
+    return f"{cell.change:+.1f} ({low:+.1f} to {high:+.1f})"

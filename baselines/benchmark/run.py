@@ -19,6 +19,7 @@ from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
 from panto_env.policies import find_policy
 
 from .controls import policy_of
+from .overall import Standing, standings
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
 from .statistics import Cell, compare
@@ -35,6 +36,7 @@ class Benchmark:
     spans: tuple[tuple[int, int], ...]  # evaluated on each line: first and last, counted from 1
     rows: tuple[Row, ...]  # one per pass, in the order of lines, speeds, policies and seeds
     cells: tuple[Cell, ...]  # one per policy, line and speed
+    standings: tuple[Standing, ...]  # one per policy that runs on every line
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, ready for JSON: nan becomes None."""
@@ -43,6 +45,7 @@ class Benchmark:
                 "version": __version__,
                 "settings": self.settings.model_dump(mode="json"),
                 "spans": self.spans,
+                "standings": [asdict(each) for each in self.standings],
                 "cells": [asdict(cell) for cell in self.cells],
                 "rows": [row.as_dict() for row in self.rows],
             }
@@ -88,7 +91,8 @@ def run(
         rows = one_by_one(jobs, progress=progress)
     else:
         rows = in_processes(jobs, workers=workers, progress=progress)
-    return Benchmark(settings, spans, tuple(rows), compare(rows))
+    cells = compare(rows)
+    return Benchmark(settings, spans, tuple(rows), cells, standings(rows, cells))
 
 
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
@@ -100,6 +104,7 @@ def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]
         "actuator": settings.actuator,
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
+        "pantograph_scatter": settings.pantograph_scatter,
         "distance": line.distance,
         "control_interval": settings.control_interval,
     }

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_configs import find
-from panto_env.analysis.pool import MOST_PASSES
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
@@ -18,6 +17,8 @@ from panto_env.control.settings import default, description
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensors import SensorSettings, sensor_settings
+
+from .seeds import TEST, check_seeds
 
 S = TypeVar("S", bound=Settings)
 REFERENCE = "passive"
@@ -69,6 +70,7 @@ class Line(Settings):
 class BenchmarkSettings(Settings):
     """Policies, lines with speeds, and seeds. Every policy runs on the same lines, under the same noise."""
 
+    title: str = Field("benchmark", description="what tables and pages call it")
     policies: tuple[str, ...] = Field(
         ("passive", "p", "pd", "fb+ff"),
         description="names, with parameters (p:gain=0.5) or without, or model files, or controls of such: "
@@ -77,7 +79,9 @@ class BenchmarkSettings(Settings):
     )
     lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, with pantograph and speeds")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        tuple(range(5)), min_length=1, description="seeds, or their number, counted from 0"
+        tuple(range(5)),
+        min_length=1,
+        description="seeds, or their number, counted from 0; only those that are for tests",
     )
     actuator: _Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
@@ -85,6 +89,9 @@ class BenchmarkSettings(Settings):
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
     line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
+    )
+    pantograph_scatter: Annotated[float, Field(ge=0, le=0.3)] = Field(
+        default("pantograph_scatter"), description=description("pantograph_scatter")
     )
     control_interval: Positive = Field(
         default("control_interval"), description=description("control_interval")
@@ -98,8 +105,8 @@ class BenchmarkSettings(Settings):
     @classmethod
     def _from_a_number_of_seeds(cls, value: Any) -> Any:
         if isinstance(value, int | float | str):
-            if not (isinstance(value, int) and 1 <= value <= MOST_PASSES and not isinstance(value, bool)):
-                raise ValueError(f"must be a whole number from 1 to {MOST_PASSES:,}, or a list of seeds")
+            if not (isinstance(value, int) and 1 <= value <= len(TEST) and not isinstance(value, bool)):
+                raise ValueError(f"must be a whole number from 1 to {len(TEST):,}, or a list of seeds")
             return tuple(range(value))
         return value
 
@@ -107,6 +114,15 @@ class BenchmarkSettings(Settings):
     @classmethod
     def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
         return _checked_distinct(value)
+
+    @field_validator("seeds")
+    @classmethod
+    def _for_tests(cls, value: tuple[int, ...]) -> tuple[int, ...]:
+        try:
+            check_seeds(value, "test")
+        except InputError as error:
+            raise ValueError(str(error).rstrip(".")) from error
+        return value
 
     @field_validator("policies")
     @classmethod

@@ -18,9 +18,13 @@ from panto_env.metrics.spans import within
 from panto_env.policies import Policy, find_policy, wishes
 
 from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
-from .settings import BenchmarkSettings, Line
+from .pressed import NONE, Pressed, power, pressed_passive
+from .settings import REFERENCE, BenchmarkSettings, Line
 
 Array = NDArray[np.float64]
+
+FULL = 0.999
+"""Share of the largest force from which on a command counts as the largest."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,17 @@ class Row:
     terminated: bool
     figures: Figures
     action_rate: float  # rms change of the commanded force between control steps, per second (N/s)
+    saturation: float  # share of control steps that command the actuator's largest force
+    power: float  # mean magnitude of the actuators' mechanical power (W)
+    pressed_std: float  # sigma of the passive pantograph pressed to the same mean (N)
+    pressed_cost_function: float  # its CF (N m)
 
     def as_dict(self) -> dict[str, Any]:
         """Names and values in the order above, with the figures in one table with the rest."""
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "figures"}
-        action_rate = values.pop("action_rate")
-        return values | self.figures.as_dict() | {"action_rate": action_rate}
+        names = [f.name for f in fields(self)]
+        before, after = names[: names.index("figures")], names[names.index("figures") + 1 :]
+        first, last = ({name: getattr(self, name) for name in part} for part in (before, after))
+        return first | self.figures.as_dict() | last
 
 
 def run_pass(
@@ -57,14 +66,21 @@ def run_pass(
     Raises InputError, naming the policy, if the policy fails.
     """
     run, force = drive(settings, line, policy, speed_kmh, seed)
-    if run.terminated:
-        figures = Figures.none()
-        action_rate = float("nan")
-    else:
+    figures, pressed = Figures.none(), NONE
+    action_rate = saturation = watts = float("nan")
+    if not run.terminated:
         figures = run.summary(spans)
         position = np.arange(len(force)) * settings.control_interval * speed_kmh / 3.6
-        changes = np.diff(force[within(position, spans, run.span_length)], axis=0) / settings.control_interval
+        asked = force[within(position, spans, run.span_length)]
+        changes = np.diff(asked, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
+        saturation = float(np.mean(np.abs(asked) >= FULL * settings.actuator.force_limit))
+        watts = power(run, spans)
+        if policy != REFERENCE:
+            arguments = _arguments(settings, line, speed_kmh, seed)
+            pressed = pressed_passive(run, spans, arguments)
+        else:
+            pressed = Pressed(figures.std, figures.cost_function)
     return Row(
         policy=policy,
         catenary=line.catenary,
@@ -75,6 +91,10 @@ def run_pass(
         terminated=run.terminated,
         figures=figures,
         action_rate=action_rate,
+        saturation=saturation,
+        power=watts,
+        pressed_std=pressed.std,
+        pressed_cost_function=pressed.cost_function,
     )
 
 
@@ -91,20 +111,25 @@ def _record(
 ) -> tuple[Trajectory, _CommandRecorder]:
     recorder = _CommandRecorder(_player(settings, line, policy, speed_kmh, seed), policy)
     with _torch_on_one_thread():
-        run = simulate(
-            line.catenary,
-            line.pantograph,
-            speed_kmh,
-            recorder,
-            seed=seed,
-            actuator=settings.actuator,
-            sensors=settings.sensors,
-            line_condition=settings.line_condition,
-            control_interval=settings.control_interval,
-            distance=line.distance,
-            record_droppers=False,
-        )
+        run = simulate(policy=recorder, **_arguments(settings, line, speed_kmh, seed))
     return run, recorder
+
+
+def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
+    """Arguments of ``simulate`` for a pass, but for its policy."""
+    return {
+        "catenary": line.catenary,
+        "pantograph": line.pantograph,
+        "speed_kmh": speed_kmh,
+        "seed": seed,
+        "actuator": settings.actuator,
+        "sensors": settings.sensors,
+        "line_condition": settings.line_condition,
+        "pantograph_scatter": settings.pantograph_scatter,
+        "control_interval": settings.control_interval,
+        "distance": line.distance,
+        "record_droppers": False,
+    }
 
 
 def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:

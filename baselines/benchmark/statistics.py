@@ -13,17 +13,23 @@ from .single_pass import Row
 
 Array = NDArray[np.float64]
 
+IDENTITY = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
+"""What a row is, not how good."""
+
 TRIM = 0.25
 """Share of the values that the interquartile mean leaves out at each end."""
 RESAMPLES = 9999
 CONFIDENCE = 0.95
-WIDENING = 0.025
-"""Share by which the range of qualifying mean forces is widened at both ends (DESIGN.md, 5)."""
+MOVED = 0.015
+"""Share by which a policy may move the mean force from that of its own passive run."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One policy on one line at one speed, over all seeds."""
+    """One policy on one line at one speed, over all seeds; changes are relative, pass by pass.
+
+    The pressed passive pantograph has the mean force of the policy's own pass, on the same line.
+    """
 
     policy: str
     catenary: str
@@ -32,11 +38,14 @@ class Cell:
     seeds: int
     nominal_force: float  # N
     figures: dict[str, float]  # interquartile means; nan if a pass ended early
-    std_change: float  # interquartile mean of sigma minus sigma of the passive pass (N)
-    std_interval: tuple[float, float] | None  # 95 % interval of std_change; None: see bootstrap_interval
-    mean_range: tuple[float, float]  # of mean forces that qualify (N)
+    change: float  # of sigma against the pressed passive pantograph (%)
+    interval: tuple[float, float] | None  # 95 % interval of ``change``; None: see bootstrap_interval
+    cost_change: float  # of CF against the pressed passive pantograph (%)
+    mean_change: float  # of the mean force against the passive pantograph (%)
+    improved: float  # share of passes with a smaller sigma than the pressed passive pantograph's
+    spread: float  # standard deviation of sigma over the seeds, over its mean (%)
     disqualified: str  # the reason, or "" if the policy qualifies
-    rank: int | None  # by CF among the policies that qualify, from 1
+    rank: int | None  # by ``change`` among the policies that qualify, from 1
 
 
 def interquartile_mean(values: Array) -> float:
@@ -61,10 +70,9 @@ def bootstrap_interval(values: Array) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def mean_range(passive: float, nominal: float) -> tuple[float, float]:
-    """Range (N) of mean forces that qualify, from the passive mean and the nominal force."""
-    low, high = sorted((passive, nominal))
-    return low * (1 - WIDENING), high * (1 + WIDENING)
+def mean_range(passive: float) -> tuple[float, float]:
+    """Range (N) of mean forces that qualify, from the passive mean."""
+    return passive * (1 - MOVED), passive * (1 + MOVED)
 
 
 def compare(rows: Sequence[Row]) -> tuple[Cell, ...]:
@@ -80,25 +88,27 @@ def _ranked_cells(rows_of_policies: dict[str, list[Row]]) -> list[Cell]:
     """Cells of all policies on one line at one speed."""
     passive_rows = rows_of_policies[REFERENCE]
     cells = [_cell(rows, passive_rows) for rows in rows_of_policies.values()]
-    costs = sorted(cell.figures["cost_function"] for cell in cells if not cell.disqualified)
+    changes = sorted(cell.change for cell in cells if not cell.disqualified)
     return [
-        cell if cell.disqualified else replace(cell, rank=1 + costs.index(cell.figures["cost_function"]))
-        for cell in cells
+        cell if cell.disqualified else replace(cell, rank=1 + changes.index(cell.change)) for cell in cells
     ]
 
 
 def _cell(rows: list[Row], passive_rows: list[Row]) -> Cell:
     """Cell of one policy on one line at one speed; its rank is still missing."""
     first = rows[0]
-    names = [*first.figures.as_dict(), "action_rate"]
     tables = [row.as_dict() for row in rows]
+    names = [name for name in tables[0] if name not in IDENTITY]
     figures = {name: interquartile_mean(np.array([table[name] for table in tables])) for name in names}
-    # Pass by pass, with the same line, speed, seed and noise.
-    std_changes = np.array(
-        [row.figures.std - passive.figures.std for row, passive in zip(rows, passive_rows, strict=True)]
+    sigma = np.array([row.figures.std for row in rows])
+    changes = relative_changes(rows)
+    costs = _relative(
+        [row.figures.cost_function for row in rows], [row.pressed_cost_function for row in rows]
     )
-    passive_mean = interquartile_mean(np.array([row.figures.mean for row in passive_rows]))
-    qualifying = mean_range(passive_mean, first.nominal_force)
+    # Pass by pass, with the same line, speed, seed and noise.
+    paired = zip(rows, passive_rows, strict=True)
+    means = np.array([row.figures.mean / passive.figures.mean - 1 for row, passive in paired])
+    mean_change = interquartile_mean(means)
     return Cell(
         policy=first.policy,
         catenary=first.catenary,
@@ -107,24 +117,37 @@ def _cell(rows: list[Row], passive_rows: list[Row]) -> Cell:
         seeds=len(rows),
         nominal_force=first.nominal_force,
         figures=figures,
-        std_change=interquartile_mean(std_changes),
-        std_interval=bootstrap_interval(std_changes),
-        mean_range=qualifying,
-        disqualified=_disqualification(rows, passive_rows, figures["mean"], qualifying),
+        change=100 * interquartile_mean(changes),
+        interval=bootstrap_interval(100 * changes),
+        cost_change=100 * interquartile_mean(costs),
+        mean_change=100 * mean_change,
+        improved=float("nan") if np.isnan(changes).any() else float(np.mean(changes < 0)),
+        spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
+        disqualified=_disqualification(rows, passive_rows, mean_change),
         rank=None,
     )
 
 
-def _disqualification(
-    rows: list[Row], passive_rows: list[Row], mean: float, qualifying: tuple[float, float]
-) -> str:
+def relative_changes(rows: Sequence[Row]) -> Array:
+    """Of sigma against the passive pantograph pressed to the same mean, (rows,); nan where there is none."""
+    return _relative([row.figures.std for row in rows], [row.pressed_std for row in rows])
+
+
+def _relative(values: Sequence[float], to: Sequence[float]) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):  # a sigma of 0 has no relative change
+        changes: Array = np.asarray(values) / np.asarray(to) - 1
+    return changes
+
+
+def _disqualification(rows: list[Row], passive_rows: list[Row], mean_change: float) -> str:
     """Why a policy is not ranked; empty if it is."""
     ended_early = sum(row.terminated for row in rows)
     if ended_early:
         return f"{ended_early} of {len(rows)} runs ended early, outside the plant's range"
     if any(row.terminated for row in passive_rows):
         return "the passive pantograph's runs ended early: there is nothing to compare with"
-    low, high = qualifying
-    if not low <= mean <= high:
-        return f"mean force {mean:.1f} N, outside {low:.1f} to {high:.1f} N"
+    if abs(mean_change) > MOVED:
+        return f"it moves the mean force by {100 * mean_change:+.1f} %, more than {100 * MOVED:g} %"
+    if any(np.isnan(row.pressed_std) for row in rows):
+        return "no passive pantograph can be pressed to its mean force"
     return ""

@@ -1,0 +1,111 @@
+"""A whole track in one row per policy: over all lines, speeds and seeds of a benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .settings import REFERENCE
+from .single_pass import Row
+from .statistics import (
+    CONFIDENCE,
+    RESAMPLES,
+    TRIM,
+    Array,
+    Cell,
+    interquartile_mean,
+    relative_changes,
+)
+
+Place = tuple[str, str, float]
+"""Line, pantograph and speed (km/h) of a cell."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One policy over a whole track."""
+
+    policy: str
+    change: float  # of sigma against the pressed passive pantograph, interquartile mean of all passes (%)
+    interval: tuple[float, float] | None  # 95 %, seeds drawn anew within each cell
+    worst: float  # largest change of any cell (%)
+    worst_at: str  # which cell that is
+    improved: float  # share of passes with a smaller sigma than the pressed passive pantograph's
+    effort: float  # rms actuator force, mean over cells (N)
+    power: float  # mechanical power, mean over cells (W)
+    saturation: float  # share of control steps at the actuator's limit, mean over cells
+    better_than: Mapping[str, float]  # by other policy: share of passes with a smaller change than it
+    disqualified: str  # the reason, or "" if it qualifies in every cell
+    rank: int | None  # by ``change``, from 1
+
+
+def standings(rows: Sequence[Row], cells: Sequence[Cell]) -> tuple[Standing, ...]:
+    """Policies that run in every cell, in the order of the rows; ranked where they qualify in every cell."""
+    changes: dict[str, dict[Place, Array]] = {}
+    for cell in cells:
+        own = [row for row in rows if _place(row) == _place(cell) and row.policy == cell.policy]
+        changes.setdefault(cell.policy, {})[_place(cell)] = relative_changes(own)
+    places = list(changes[REFERENCE])
+    everywhere = {policy: found for policy, found in changes.items() if list(found) == places}
+    found = [_standing(policy, everywhere, cells) for policy in everywhere]
+    ranked = sorted(each.change for each in found if not each.disqualified)
+    return tuple(
+        each if each.disqualified else replace(each, rank=1 + ranked.index(each.change)) for each in found
+    )
+
+
+def _place(one: Row | Cell) -> Place:
+    return one.catenary, one.pantograph, one.speed_kmh
+
+
+def _standing(policy: str, changes: Mapping[str, Mapping[Place, Array]], cells: Sequence[Cell]) -> Standing:
+    own = [cell for cell in cells if cell.policy == policy]
+    by_place = changes[policy]
+    every = np.concatenate(list(by_place.values()))
+    worst = max(own, key=lambda cell: -np.inf if np.isnan(cell.change) else cell.change)
+    reasons = [cell for cell in own if cell.disqualified]
+
+    def mean(name: str) -> float:
+        return float(np.mean([cell.figures[name] for cell in own]))
+
+    return Standing(
+        policy=policy,
+        change=100 * interquartile_mean(every),
+        interval=_interval(list(by_place.values())),
+        worst=worst.change,
+        worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
+        improved=float(np.mean([cell.improved for cell in own])),
+        effort=mean("effort"),
+        power=mean("power"),
+        saturation=mean("saturation"),
+        better_than={
+            other: float(np.mean([np.mean(by_place[place] < found[place]) for place in by_place]))
+            for other, found in changes.items()
+            if other != policy
+        },
+        disqualified=f"{_where(reasons[0])}: {reasons[0].disqualified}" if reasons else "",
+        rank=None,
+    )
+
+
+def _where(cell: Cell) -> str:
+    return f"{cell.catenary} at {cell.speed_kmh:g} km/h"
+
+
+def _interval(groups: Sequence[Array]) -> tuple[float, float] | None:
+    """95 % percentile-bootstrap interval (%) of the interquartile mean of all; each group is drawn by itself.
+
+    None where the values say nothing about the spread.
+    """
+    from scipy.stats import trim_mean  # slow to import
+
+    every = np.concatenate(groups)
+    if np.isnan(every).any() or all(len(group) < 2 or np.ptp(group) == 0 for group in groups):
+        return None
+    random = np.random.default_rng(0)
+    drawn = np.concatenate([random.choice(group, size=(RESAMPLES, len(group))) for group in groups], axis=1)
+    tail = (1 - CONFIDENCE) / 2
+    low, high = np.quantile(trim_mean(drawn, TRIM, axis=1), (tail, 1 - tail))
+    return 100 * float(low), 100 * float(high)

@@ -1,0 +1,26 @@
+"""Seeds by purpose: nothing is judged on a line that it was trained, tuned or selected on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+from panto_env.base.errors import InputError
+
+TEST = range(1000)
+SELECTION = range(1000, 2000)
+TRAINING = range(2000, 1_000_000)
+Purpose = Literal["test", "selection", "training"]
+SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING}
+"""Disjoint: a seed draws a line, its pantograph and all noise."""
+
+
+def check_seeds(seeds: Iterable[int], purpose: Purpose) -> None:
+    """Raise InputError for a seed that is kept for another purpose."""
+    own = SEEDS[purpose]
+    wrong = next((seed for seed in seeds if seed not in own), None)
+    if wrong is not None:
+        raise InputError(
+            f"Seed {wrong} is not for {purpose}: its seeds are {own.start} to {own.stop - 1}, the others are "
+            "kept for other purposes, so that nothing is judged on what it has seen."
+        )
