@@ -66,6 +66,7 @@ class Scale(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
+        """The place of a value, in units of the view box."""
         share = (value - self.lowest) / (self.highest - self.lowest)
         return round(self.begin + share * (self.end - self.begin), 1)
 
@@ -125,9 +126,7 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
     if not known:
         return None
     x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
-    y_ticks, y = _axis(
-        min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP
-    )
+    y_ticks, y = _axis(min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP)
     taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in known]
     drawn = []
     for policy, across, up, hollow in known:

@@ -7,7 +7,16 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    model_validator,
+)
 
 from panto_env.base.errors import InputError
 
@@ -129,7 +138,8 @@ class Result(Part):
     def _whole(self) -> Self:
         if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
             raise ValueError("must have cells, and spans of each of their lines")
-        if not {one.policy for one in (*self.standings, *self.traces)} <= set(self.policies):
+        named = {one.policy for one in self.standings} | {one.policy for one in self.traces}
+        if not named <= set(self.policies):
             raise ValueError("must have a cell of every policy")
         return self
 

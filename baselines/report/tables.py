@@ -1,4 +1,4 @@
-"""Tables of a page, as what their cells say and how they sort: the leaderboard, and one per line and speed."""
+"""Tables of a page: what their cells say and how they sort. The leaderboard, and one per line and speed."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def _change(one: Standing | Cell, scale: Scale) -> Entry:
     low, high = one.interval or (one.change, one.change)
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
     inside = scale.lowest <= low and high <= scale.highest
-    bar = Bar(*map(scale, (0.0, low, high, one.change))) if inside else None
+    bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
     return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
