@@ -72,7 +72,7 @@ def leaderboard(result: Result) -> Table:
     }
     columns: list[Column[Standing]] = [
         *_first_columns(result.standings),
-        Column("worst cell, Δσ (%)", lambda one: _figure(one.worst, 1, f"at {one.worst_at}")),
+        Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
         Column("power (W)", lambda one: _figure(one.power, 1)),
@@ -136,12 +136,12 @@ def _of_figure(name: str, decimals: int) -> Column[Cell]:
     )
 
 
-def _figure(value: float, decimals: int, note: str = "") -> Entry:
-    return Entry(number(value, decimals), _key(value), note)
+def _figure(value: float, decimals: int) -> Entry:
+    return Entry(number(value, decimals), _key(value))
 
 
-def _signed(value: float, decimals: int) -> Entry:
-    return Entry(signed(value, decimals), _key(value))
+def _signed(value: float, decimals: int, note: str = "") -> Entry:
+    return Entry(signed(value, decimals), _key(value), note)
 
 
 def signed(value: float, decimals: int) -> str:
