@@ -20,6 +20,8 @@ LENGTH = 120
 """Control steps in which the answer to a command has died out."""
 RATE = 2500.0
 """N/s: largest change of the command, that of the actuator "realistic"."""
+HELD = 0.4
+"""Hz: below this the integral of the command costs more than a force of the command's size would."""
 TOLERANCE = 1e-3
 """Of the solver (N, and relative)."""
 AVERAGED = 2.0
@@ -31,8 +33,9 @@ class PredictiveControl(TunableLaw):
 
     Predicted force = passive force of the line as designed at the places to come + answers to commands given
     and to be given, each with the response of the place where it is given (``preview``: stiffness along the
-    span, waves, delay and lag are all in it) + what is measured beyond that now, fading. To minimise
-    sum of F^2 + effort u^2, with |u| and |change of u| within the actuator's limits: a quadratic program,
+    span, waves, delay and lag are all in it) + what was measured beyond that at these places in the spans
+    before + what is measured beyond all of it now, fading. To minimise
+    sum of F^2 + effort u^2 + (2 pi held q)^2, q the integral of u, so that the mean force stays, with |u| and |change of u| within the actuator's limits: a quadratic program,
     solved by OSQP (Stellato et al., Math. Prog. Comp. 12:637, 2020) where the limits matter.
 
     It needs to know the line's and the pantograph's design, the place within the span, the speed, delays and
@@ -42,8 +45,9 @@ class PredictiveControl(TunableLaw):
     def __init__(
         self, gains: Source = "mpc", delay: float = DELAY, lag: float = LAG, rate: float = RATE
     ) -> None:
-        """gains: (3,): log10 of effort (N^2/N^2), share of what is measured beyond the prediction that is
-        believed, log10 of the time in which that fades (s); or a file of gains by name or path.
+        """gains: (4,): log10 of effort (N^2/N^2), share of what is measured beyond the prediction that is
+        believed, log10 of the time in which that fades (s), share of it that is learnt for the next span; or
+        a file of gains by name or path.
 
         delay of actuator and sensors together, lag of the actuator: s; rate: N/s.
         """
@@ -55,14 +59,16 @@ class PredictiveControl(TunableLaw):
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in so many lanes: run the line as designed, and make the programs."""
         super().begin(context, lanes)
-        effort, self._believed, fading = 10.0 ** self.gains[0], self.gains[1], 10.0 ** self.gains[2]
+        effort, fading = 10.0 ** self.gains[0], 10.0 ** self.gains[2]
+        self._believed, self._learning = self.gains[1], self.gains[3]
         self._preview = preview(context, LENGTH + HORIZON, *self._delays)
         self._programs = Programs(
-            self._preview, effort, context.force_limit, self._rate * context.control_interval
+            self._preview, effort, context.force_limit, self._rate, context.control_interval
         )
         self._fading = np.exp(-context.control_interval / fading * np.arange(1, HORIZON + 1))
         self._due = np.zeros((lanes, LENGTH + HORIZON))  # answers to commands given: now, in a step, ...
-        self._last = np.zeros(lanes)
+        self._learnt = np.zeros((lanes, len(self._preview.passive)))
+        self._last, self._sum = np.zeros(lanes), np.zeros(lanes)
         self._slow = 1 - np.exp(-context.control_interval / AVERAGED)
         self._average: Array | None = None
 
@@ -75,16 +81,19 @@ class PredictiveControl(TunableLaw):
         position = self.span_angle(observations) / (2 * np.pi) * self.context.span_length
         step = self._preview.step(position)
         passive = self._preview.passive
-        beyond = contact - self._average - passive[step] - self._due[:, 0]
+        own = np.arange(self.lanes)
+        beyond = contact - self._average - passive[step] - self._due[:, 0] - self._learnt[own, step]
         coming = (step[:, None] + np.arange(1, HORIZON + 1)) % len(passive)
-        free = passive[coming] + self._due[:, 1 : HORIZON + 1]
+        free = passive[coming] + self._learnt[own[:, None], coming] + self._due[:, 1 : HORIZON + 1]
+        self._learnt[own, step] += self._learning * beyond
         free += self._believed * beyond[:, None] * self._fading
         self._last = np.array(
             [
                 self._programs.first(*each)
-                for each in zip(step.tolist(), free, self._last.tolist(), strict=True)
+                for each in zip(step.tolist(), free, self._last.tolist(), self._sum.tolist(), strict=True)
             ]
         )
+        self._sum += self._last * self.context.control_interval
         self._due[:, :-1] = self._due[:, 1:]
         self._due[:, -1] = 0.0
         self._due += self._last[:, None] * self._preview.response[step]
@@ -93,24 +102,24 @@ class PredictiveControl(TunableLaw):
     @classmethod
     def gain_names(cls, context: Context) -> list[str]:
         """Names of the gains, in order."""
-        return ["log effort", "believed", "log fading"]
+        return ["log effort", "believed", "log fading", "learning"]
 
     @classmethod
     def first_gains(cls, context: Context) -> Array:
         """Gains from which a tuner starts."""
-        return np.array([-1.0, 0.7, -1.0])
+        return np.array([-1.0, 0.5, -1.0, 0.3])
 
     @classmethod
     def gain_steps(cls, context: Context) -> Array:
         """Changes of the gains of like, small effect."""
-        return np.array([0.2, 0.1, 0.1])
+        return np.array([0.2, 0.1, 0.1, 0.1])
 
 
 class Programs:
-    """The quadratic programs of all steps through a span; limit: N, change: N per step."""
+    """The quadratic programs of all steps through a span; limit: N, rate: N/s, interval: s."""
 
-    def __init__(self, line: Preview, effort: float, limit: float, change: float) -> None:
-        self._limit, self._change = limit, change
+    def __init__(self, line: Preview, effort: float, limit: float, rate: float, interval: float) -> None:
+        self._limit, self._change = limit, rate * interval
         steps = len(line.passive)
         ahead = np.arange(HORIZON)
         places = (np.arange(steps)[:, None] + ahead) % steps
@@ -118,12 +127,18 @@ class Programs:
         for m in range(HORIZON):
             self.answers[:, m:, m] = line.response[places[:, m], : HORIZON - m]
         self.weights = self.answers.transpose(0, 2, 1) @ self.answers + effort * np.eye(HORIZON)
+        sums = 2 * np.pi * HELD * interval * np.tri(HORIZON)
+        self.weights += sums.T @ sums
+        self._of_sum = (2 * np.pi * HELD) ** 2 * interval * np.arange(HORIZON, 0, -1)
         self._inverse = np.linalg.inv(self.weights)
         self._solver: Any = None
 
-    def first(self, step: int, free: Array, last: float) -> float:
-        """First command (N) of the best ones at a step, for forces without them, (HORIZON,), after ``last``."""
-        slope = free @ self.answers[step]
+    def first(self, step: int, free: Array, last: float, total: float) -> float:
+        """First command (N) of the best ones at a step, for forces without them, (HORIZON,), (N).
+
+        last: command before (N); total: integral of all commands before (N s).
+        """
+        slope = free @ self.answers[step] + total * self._of_sum
         best = -self._inverse[step] @ slope
         changes = np.diff(best, prepend=last)
         if np.abs(best).max() > self._limit or np.abs(changes).max() > self._change:
