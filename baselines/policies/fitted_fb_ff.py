@@ -7,7 +7,7 @@ import numpy as np
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .periodic import HARMONICS, LEAD, STEP, series, series_names
 
 SIGNALS = {
@@ -17,7 +17,7 @@ SIGNALS = {
     "frame velocity": 0.1,
     "contact force": 30.0,
 }
-"""Entries fed back, and the unit that their gains count in (m, m/s, N): about their spread in a passive run."""
+"""Entries fed back, and the unit that their gains count in (m, m/s, N): their spread in a passive run."""
 HISTORY = 3
 """Control steps of each signal that count, the present one included."""
 COMMANDS = 2
@@ -48,24 +48,20 @@ class FittedFeedback(TunableLaw):
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in so many lanes."""
         super().begin(context, lanes)
-        self._past: Array | None = None
+        self._past = np.zeros((HISTORY, len(SIGNALS), lanes))
         self._commands = np.zeros((COMMANDS, lanes))
-        self._share = 1 - np.exp(-context.control_interval / AVERAGED)
+        self._from_average = FromAverage(context.control_interval, AVERAGED)
 
     def forces(self, observations: Observations) -> Array:
-        """Force (N) of each lane, (lanes,), before the actuator's limit, for observations, (lanes, entries)."""
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         signals = np.stack([self.read(observations, name) / unit for name, unit in SIGNALS.items()])
-        if self._past is None:
-            self._average = signals.copy()
-            self._past = np.zeros((HISTORY, *signals.shape))
-        self._average += self._share * (signals - self._average)
-        self._past = np.concatenate([(signals - self._average)[None], self._past[:-1]])
+        self._past = np.concatenate([self._from_average(signals)[None], self._past[:-1]])
         limit = self.context.force_limit
         split = 2 * HARMONICS
         feedforward = series(self.span_angle(observations, LEAD)) @ self.gains[:split]
         feedback = self.gains[split:-COMMANDS] @ self._past.reshape(-1, self.lanes)
         past = self.gains[-COMMANDS:] @ (self._commands / COMMAND_UNIT)
-        force = np.clip(feedforward + feedback + past, -limit, limit)
+        force: Array = np.clip(feedforward + feedback + past, -limit, limit)
         self._commands = np.concatenate([force[None], self._commands[:-1]])
         return force
 

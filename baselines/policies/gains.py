@@ -95,8 +95,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
         if (tuning.catenary, tuning.pantograph, tuning.place) == (line, pantograph, place):
             return _at_speed(tuning, names, 3.6 * context.speed, path)
     raise InputError(
-        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator at "
-        f"{place}: make them with `panto tune`, or take a policy that needs none."
+        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
+        f"at {place}: make them with `panto tune`, or take a policy that needs none."
     )
 
 

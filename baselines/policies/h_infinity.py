@@ -10,7 +10,7 @@ from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
 
 CORNER = 30.0
@@ -25,7 +25,8 @@ NEAR = 1.1
 """The bound used, over the least one: a controller at the least bound is badly conditioned."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
-HALVINGS = 10
+SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
+"""Bounds (-) between which the least one is sought, by what factor first, how often that is then halved."""
 
 
 class HInfinity(TunableLaw):
@@ -43,7 +44,7 @@ class HInfinity(TunableLaw):
     """
 
     def __init__(self, gains: Source = "h-infinity", delay: float = DELAY, lag: float = LAG) -> None:
-        """gains: (3,): log10 of the weight's performance (N/N), of its frequency (Hz), and of the wire's height
+        """gains: (3,): log10 of the weight's performance (N/N), of its frequency (Hz), of the wire's height
         (mm); or a file of gains by name or path. delay of actuator and sensors together, lag: s.
         """
         super().__init__(gains)
@@ -64,16 +65,12 @@ class HInfinity(TunableLaw):
             (*controller, np.zeros((1, len(OUTPUTS)))), interval, "bilinear"
         )
         self._state = np.zeros((len(self._a), lanes))
-        self._slow = 1 - np.exp(-interval / AVERAGED)
-        self._average: Array | None = None
+        self._from_average = FromAverage(interval, AVERAGED)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         readings = np.stack([self.read(observations, name) for name in OUTPUTS])
-        if self._average is None:
-            self._average = readings.copy()
-        self._average += self._slow * (readings - self._average)
-        seen = (readings - self._average) / np.array(READING_NOISE)[:, None]
+        seen = self._from_average(readings) / np.array(READING_NOISE)[:, None]
         force: Array = (self._c @ self._state + self._d @ seen)[0]
         self._state = self._a @ self._state + self._b @ seen
         return force
@@ -136,17 +133,19 @@ def weighted(model: LineModel, performance: float, centre: float, height: float)
 
 
 def least_bound(plant: Weighted) -> tuple[float, Controller]:
-    """A bound (-) a little above the least one, and the controller that keeps it; InputError where none does."""
-    low, high = 1e-3, 1e-3
-    while central(plant, high) is None:
-        low, high = high, 4 * high
-        if high > 1e6:
-            raise InputError("h-infinity finds no controller with these gains; take smaller ones.")
+    """A bound (-) a little above the least, and the controller that keeps it; InputError where none does."""
+    bound = SMALLEST
+    while central(plant, bound) is None:
+        bound *= STRIDE
+        if bound > LARGEST:
+            raise InputError("h-infinity finds no controller with these gains; take others.")
+    low, high = bound / STRIDE, bound
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if central(plant, middle) is None else (low, middle)
     found = central(plant, NEAR * high)
-    assert found is not None  # larger bounds are kept more easily
+    if found is None:  # the equations are too badly conditioned to be solved at one bound after another
+        raise InputError("h-infinity's equations cannot be solved with these gains; take others.")
     return NEAR * high, found
 
 
@@ -164,7 +163,7 @@ def central(plant: Weighted, bound: float) -> Controller | None:
 
 
 def _stabilising(a: Array, worst: Array, b: Array, c: Array, bound: float) -> Array | None:
-    """Solution, not negative, of A'X + XA + X (W W' / bound^2 - B B') X + C'C = 0; None where there is none."""
+    """Solution, not negative, of A'X + XA + X (W W' / bound^2 - B B') X + C'C = 0; None without one."""
     from scipy.linalg import solve_continuous_are
 
     inputs = np.hstack([worst, b])

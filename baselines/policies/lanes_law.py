@@ -40,7 +40,7 @@ class LanesLaw(ABC):
 
     @abstractmethod
     def forces(self, observations: Observations) -> Array:
-        """Force (N) of each lane, (lanes,), before the actuator's limit, for observations, (lanes, entries)."""
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
 
     def read(self, observations: Observations, name: str) -> Array:
         """Physical values of an entry, (lanes,). Raises InputError where there is none of this name."""
@@ -90,3 +90,19 @@ class TunableLaw(LanesLaw):
     @abstractmethod
     def gain_steps(cls, context: Context) -> Array:
         """Changes of the gains of like, small effect, by which a tuner tells what they do."""
+
+
+class FromAverage:
+    """Readings counted from slow averages, which begin at the first ones: no constant part is left."""
+
+    def __init__(self, interval: float, averaged: float) -> None:
+        """interval: between readings (s); averaged: time constant of the averages (s)."""
+        self._share = 1 - np.exp(-interval / averaged)
+        self._average: Array | None = None
+
+    def __call__(self, readings: Array) -> Array:
+        """Deviations of readings, (..., lanes), which move the averages."""
+        if self._average is None:
+            self._average = readings.copy()
+        self._average += self._share * (readings - self._average)
+        return readings - self._average

@@ -7,7 +7,7 @@ import numpy as np
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, MeanLine, Sampled, line_model, mean_line
 
 HIGHEST = 8.0
@@ -17,7 +17,7 @@ FADING = 0.05
 HEIGHT = 1e-3
 """m: unit of the noise that drives heights."""
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
-"""Of ``OUTPUTS``, rms: the model's own error is most of it, so that the force is trusted first (N, m, m/s)."""
+"""Of ``OUTPUTS``, rms: the model's own error is most of it, so that force is trusted first (N, m, m/s)."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
 HELD = 0.7
@@ -28,11 +28,11 @@ class LinearQuadraticGaussian(TunableLaw):
     """Kalman filter and linear-quadratic regulator of the pantograph under the mean line.
 
     Model (``line_model``): the pantograph, the actuator with its lag and delay, the wire as a spring and a
-    dashpot. What disturbs it is the height of the wire at the contact point: lightly damped oscillators at the
-    span's harmonics, and a height that wanders. The regulator minimises the mean of F^2 + effort u^2, the
+    dashpot. What disturbs it is the height of the wire at the contact point: lightly damped oscillators at
+    the span's harmonics, and a height that wanders. The regulator minimises the mean of F^2 + effort u^2, the
     filter estimates all states from five readings; both are discrete Riccati equations (Kwakernaak and Sivan,
-    Linear Optimal Control Systems, 1972, ch. 6). Through the oscillators the regulator also acts ahead on what
-    the span repeats. Readings are counted from slow averages, and the integral of the command
+    Linear Optimal Control Systems, 1972, ch. 6). Through the oscillators the regulator also acts ahead on
+    what the span repeats. Readings are counted from slow averages, and the integral of the command
     is a state that costs: below HELD effort costs the more the slower, and the mean command is zero.
 
     It needs to know the pantograph, tension and mass of the wires, the span, the speed, and the delays.
@@ -60,19 +60,18 @@ class LinearQuadraticGaussian(TunableLaw):
         known = len(self.model.a) - 1  # all states but the command's integral
         self.filter = np.zeros((known + 1, len(OUTPUTS)))
         self.filter[:known] = kalman(
-            self.model.a[:known, :known], self.model.c[:, :known], self.model.noise[:known], np.square(READING_NOISE) * [1.0, *[motion**2] * 4]
+            self.model.a[:known, :known],
+            self.model.c[:, :known],
+            self.model.noise[:known],
+            np.square(READING_NOISE) * [1.0, *[motion**2] * 4],
         )
         self._state = np.zeros((len(self.model.a), lanes))
-        self._slow = 1 - np.exp(-context.control_interval / AVERAGED)
-        self._average: Array | None = None
+        self._from_average = FromAverage(context.control_interval, AVERAGED)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         readings = np.stack([self.read(observations, name) for name in OUTPUTS])
-        if self._average is None:
-            self._average = readings.copy()
-        self._average += self._slow * (readings - self._average)
-        seen = readings - self._average - self.model.c @ self._state
+        seen = self._from_average(readings) - self.model.c @ self._state
         self._state = self._state + self.filter @ seen
         limit = self.context.force_limit
         force: Array = np.clip(-self.feedback @ self._state, -limit, limit)
@@ -82,7 +81,14 @@ class LinearQuadraticGaussian(TunableLaw):
     @classmethod
     def gain_names(cls, context: Context) -> list[str]:
         """Names of the gains, in order."""
-        return ["log effort", "log harmonics", "log wandering", "log damper factor", "log spring factor", "log motion noise factor"]
+        return [
+            "log effort",
+            "log harmonics",
+            "log wandering",
+            "log damper factor",
+            "log spring factor",
+            "log motion noise factor",
+        ]
 
     @classmethod
     def first_gains(cls, context: Context) -> Array:
@@ -96,7 +102,7 @@ class LinearQuadraticGaussian(TunableLaw):
 
 
 class Disturbed:
-    """A sampled model with more states: the wire's height, as oscillators and one that wanders; the command's sum."""
+    """A sampled model and more states: the wire's height (oscillators, one that wanders), commands' sum."""
 
     def __init__(self, sampled: Sampled, context: Context, harmonics: float, wandering: float) -> None:
         interval, span_rate = context.control_interval, context.speed / context.span_length

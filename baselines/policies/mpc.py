@@ -10,7 +10,7 @@ from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .line_model import DELAY, LAG
 from .preview import Preview, preview
 
@@ -35,8 +35,9 @@ class PredictiveControl(TunableLaw):
     and to be given, each with the response of the place where it is given (``preview``: stiffness along the
     span, waves, delay and lag are all in it) + what was measured beyond that at these places in the spans
     before + what is measured beyond all of it now, fading. To minimise
-    sum of F^2 + effort u^2 + (2 pi held q)^2, q the integral of u, so that the mean force stays, with |u| and |change of u| within the actuator's limits: a quadratic program,
-    solved by OSQP (Stellato et al., Math. Prog. Comp. 12:637, 2020) where the limits matter.
+    sum of F^2 + effort u^2 + (2 pi held q)^2, q the integral of u (so that the mean force stays), with |u|
+    and |change of u| within the actuator's limits: a quadratic program, solved by OSQP (Stellato et al.,
+    Math. Prog. Comp. 12:637, 2020) where the limits matter.
 
     It needs to know the line's and the pantograph's design, the place within the span, the speed, delays and
     limits of the actuator. Computing the preview takes about a second for each speed.
@@ -69,20 +70,16 @@ class PredictiveControl(TunableLaw):
         self._due = np.zeros((lanes, LENGTH + HORIZON))  # answers to commands given: now, in a step, ...
         self._learnt = np.zeros((lanes, len(self._preview.passive)))
         self._last, self._sum = np.zeros(lanes), np.zeros(lanes)
-        self._slow = 1 - np.exp(-context.control_interval / AVERAGED)
-        self._average: Array | None = None
+        self._from_average = FromAverage(context.control_interval, AVERAGED)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
-        contact = self.read(observations, "contact force")
-        if self._average is None:
-            self._average = contact.copy()
-        self._average += self._slow * (contact - self._average)
+        contact = self._from_average(self.read(observations, "contact force"))
         position = self.span_angle(observations) / (2 * np.pi) * self.context.span_length
         step = self._preview.step(position)
         passive = self._preview.passive
         own = np.arange(self.lanes)
-        beyond = contact - self._average - passive[step] - self._due[:, 0] - self._learnt[own, step]
+        beyond = contact - passive[step] - self._due[:, 0] - self._learnt[own, step]
         coming = (step[:, None] + np.arange(1, HORIZON + 1)) % len(passive)
         free = passive[coming] + self._learnt[own[:, None], coming] + self._due[:, 1 : HORIZON + 1]
         self._learnt[own, step] += self._learning * beyond
@@ -143,7 +140,9 @@ class Programs:
         changes = np.diff(best, prepend=last)
         if np.abs(best).max() > self._limit or np.abs(changes).max() > self._change:
             best = self._limited(step, slope, last)
-        return float(np.clip(best[0], max(-self._limit, last - self._change), min(self._limit, last + self._change)))
+        return float(
+            np.clip(best[0], max(-self._limit, last - self._change), min(self._limit, last + self._change))
+        )
 
     def _limited(self, step: int, slope: Array, last: float) -> Array:
         from scipy.sparse import csc_matrix

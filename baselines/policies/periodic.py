@@ -35,7 +35,7 @@ class Periodic(TunableLaw):
         super().__init__(gains)
 
     def forces(self, observations: Observations) -> Array:
-        """Force (N) of each lane, (lanes,), before the actuator's limit, for observations, (lanes, entries)."""
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         return series(self.span_angle(observations, LEAD)) @ self.gains
 
     @classmethod

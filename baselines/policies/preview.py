@@ -16,7 +16,7 @@ from panto_env.base.remember import remembered
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
-from panto_env.plant.actuators import LaggedActuator
+from panto_env.plant.actuators.lagged import LaggedActuator
 from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.state import Place
@@ -71,7 +71,7 @@ def _preview(
             "catenary": catenary,
             "pantograph": pantograph,
             "speed_kmh": speed_kmh,
-            "actuator": LaggedActuator(place=place, delay=delay, lag=lag, force_limit=PULSE),  # type: ignore[arg-type]
+            "actuator": LaggedActuator(place=place, delay=delay, lag=lag, force_limit=PULSE),
             "accuracy": "fast",
             "distance": spans * catenary.span_length,
             "spans": spans + CLEAR,

@@ -8,18 +8,19 @@ from numpy.typing import NDArray
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .line_model import DELAY, LAG, line_model, mean_line
 
 HIGHEST = 8.0
 """Hz: harmonics of the span up to this are learnt. Above, a force at the frame moves little."""
 LISTENING = 3.0
 """Spans without control at the start, of which the last two say what the passive sigma is about."""
-TOLERATED = 1.15
+TOLERATED = 1.05
 """Sigma of a span over that, from which on the control backs off."""
-BACK_OFF = 0.5
-"""What is left of the learnt force after each span in which it backs off."""
-GAINS = (0.3, 0.1, 0.15)
+BACK_OFF, RECOVERY = 0.5, 1.05
+"""What is left of the learnt force, and of learning, after each span in which it backs off; by how much
+learning grows after any other, up to what it was."""
+GAINS = (0.5, 0.01, 0.4)
 """Learning per span, forgetting per span, and the response (N/N) below which learning slows down."""
 
 
@@ -27,15 +28,17 @@ class Repetitive(TunableLaw):
     """Adaptive cancellation of the span's harmonics, from the measured contact force.
 
     The force is u = Re sum_k c_k e^(ik phi), phi the angle of the place within the span, and
-    s dc_k/dx = - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k,
+    s dc_k/dx = - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi)
+                - forgetting c_k,
     where G_k is the model's answer of the contact force to a command at the k-th harmonic's frequency, delays
     included (``line_model``). Averaged over a span, this is c_k - learning E_k / G_k for an error E_k: where
     the model's phase is right within 90 degrees, the error falls, span by span; forgetting bounds what is
     learnt where it is not. (Bodson and Douglas, Automatica 33:2213, 1997, for adaptive feed-forward
     cancellation; the same as repetitive control with a model's inverse.)
 
-    It backs off, halving what it has learnt, after each span in which the measured sigma is above 1.15 times
-    that of the first spans, or in which, by the model, the force would vary less without its own part.
+    It backs off, halving what it has learnt and how fast it learns, after each span in which the measured
+    sigma is above 1.05 times that of the first spans, or in which, by the model, the force would vary less
+    without its own part.
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, and the place
     within the span; nothing of droppers or stiffness along the span. It needs some spans to learn.
@@ -54,7 +57,7 @@ class Repetitive(TunableLaw):
         super().begin(context, lanes)
         model = line_model(context, mean_line(context), *self._delays)
         span_rate = context.speed / context.span_length  # 1/s
-        self._numbers = np.arange(1, max(1, int(HIGHEST / span_rate)) + 1)
+        self._numbers = np.arange(1.0, max(1, int(HIGHEST / span_rate)) + 1)
         learning, forgetting, least = np.abs(self.gains)
         response = model.response(self._numbers * span_rate)
         share = context.control_interval * span_rate  # of a span, in one control step
@@ -63,25 +66,23 @@ class Repetitive(TunableLaw):
         self._sampled = model.sampled(context.control_interval)
         self._state = np.zeros((self._sampled.size, lanes))
         self._learnt: NDArray[np.complex128] = np.zeros((lanes, len(self._numbers)), dtype=complex)
-        self._slow = 1 - np.exp(-share)
-        self._average: Array | None = None
-        self._ledger = _Ledger(lanes)
+        self._from_average = FromAverage(context.control_interval, 1 / span_rate)
+        self._ledger, self._trust = _Ledger(lanes), np.ones(lanes)
         self._share = share
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
-        contact = self.read(observations, "contact force")
-        if self._average is None:
-            self._average = contact.copy()
-        self._average += self._slow * (contact - self._average)
-        error = contact - self._average
+        error = self._from_average(self.read(observations, "contact force"))
         turns = np.exp(1j * np.multiply.outer(self.span_angle(observations), self._numbers))
         free = error - self._sampled.c[0] @ self._state
         worse = self._ledger.add(error, free, self._share)
         if worse is not None:
             self._learnt[worse] *= BACK_OFF
+            self._trust = np.minimum(1.0, self._trust * np.where(worse, BACK_OFF, RECOVERY))
         if self._ledger.spans >= LISTENING:
-            self._learnt = self._kept * self._learnt - self._towards * error[:, None] * np.conj(turns)
+            self._learnt = self._kept * self._learnt - self._towards * (
+                (self._trust * error)[:, None] * np.conj(turns)
+            )
         limit = self.context.force_limit
         force: Array = np.clip((self._learnt * turns).real.sum(axis=1), -limit, limit)
         self._state = self._sampled.a @ self._state + np.multiply.outer(self._sampled.b, force)

@@ -13,9 +13,9 @@ from .lanes_law import Array, Observations, TunableLaw
 class Skyhook(TunableLaw):
     """Force against the absolute velocities of frame and head: dashpots between them and the sky.
 
-    u = - frame dz_f/dt - head dz_h/dt (Karnopp, Crosby and Harwood, J. Eng. Ind. 96:619, 1974). A force at the
-    frame that opposes the frame's velocity only takes energy out; one that follows the head's may put some
-    in, so that its gain may have either sign. It takes no part in the mean force.
+    u = - frame dz_f/dt - head dz_h/dt (Karnopp, Crosby and Harwood, J. Eng. Ind. 96:619, 1974). A force at
+    the frame that opposes the frame's velocity only takes energy out; one that follows the head's may put
+    some in, so that its gain may have either sign. It takes no part in the mean force.
 
     It needs to know nothing of the line but its gains, and reads two velocities.
     """
@@ -27,9 +27,9 @@ class Skyhook(TunableLaw):
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         frame, head = self.gains
-        return -frame * self.read(observations, "frame velocity") - head * self.read(
-            observations, "head velocity"
-        )
+        velocities = [self.read(observations, f"{mass} velocity") for mass in ("frame", "head")]
+        force: Array = -frame * velocities[0] - head * velocities[1]
+        return force
 
     @classmethod
     def gain_names(cls, context: Context) -> list[str]:

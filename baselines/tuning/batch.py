@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.errors import InputError
 from panto_env.control import Task
+from panto_env.control.context import Context
 from panto_env.control.settings import RunSettings, far_enough
 from panto_env.metrics.low_pass import low_pass_sections
 from panto_env.metrics.spans import chosen_spans, within
@@ -40,7 +42,10 @@ class Forces(NamedTuple):
 
 
 def run_batch(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Forces:
-    """Run each law under each seed, at the settings' one speed."""
+    """Run each law under each seed, at the settings' one speed.
+
+    Where some laws cannot begin, their passes are as if ended early; raises InputError where none can.
+    """
     at_once = max(1, MOST_LANES // len(seeds))
     parts = [_run(settings, laws[first : first + at_once], seeds) for first in range(0, len(laws), at_once)]
     values = np.concatenate(parts)
@@ -52,23 +57,38 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
     task = Task(settings, lanes=len(laws) * len(seeds))
     task.reset(np.arange(task.lanes), lambda lane: np.random.default_rng(seeds[lane % len(seeds)]))
     context, results = task.context(0), task.results
-    for law in laws:
-        law.begin(context, len(seeds))
+    unable = _begin(laws, context, len(seeds))
     owned = [slice(k * len(seeds), (k + 1) * len(seeds)) for k in range(len(laws))]
     actions = np.zeros((task.lanes, context.actions))
     ended = np.zeros(task.lanes, dtype=np.bool_)
     early = ended.copy()
     while not ended.all():
         observations = results.observation
-        for law, its in zip(laws, owned, strict=True):
-            actions[its, 0] = law.forces(observations[its])
+        for k, (law, its) in enumerate(zip(laws, owned, strict=True)):
+            if k not in unable:
+                actions[its, 0] = law.forces(observations[its])
         actions[:, 0] /= context.force_limit
         task.step(np.nan_to_num(np.clip(actions, -1, 1)), ended if ended.any() else None)
         early |= results.terminated
         ended |= results.terminated | results.truncated
     values = _low_passed(task, settings)
     values[early] = np.nan
-    return values.reshape(len(laws), len(seeds), -1)
+    values = values.reshape(len(laws), len(seeds), -1)
+    values[list(unable)] = np.nan
+    return values
+
+
+def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
+    """Begin all laws; the places of those that cannot. Raises InputError where none can."""
+    unable: dict[int, InputError] = {}
+    for k, law in enumerate(laws):
+        try:
+            law.begin(context, lanes)
+        except InputError as error:
+            unable[k] = error
+    if len(unable) == len(laws):
+        raise unable[0]
+    return set(unable)
 
 
 def _low_passed(task: Task, settings: RunSettings) -> Array:

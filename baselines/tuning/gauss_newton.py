@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.errors import InputError
+
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]
 """Residuals, (candidates, residuals), of candidates, (candidates, gains); nan or huge where one fails."""
@@ -28,19 +30,22 @@ class Fit:
 def fit(residuals: Residuals, start: Array, steps: Array, iterations: int, ridge: float = 0.0) -> Fit:
     """Least squares from a start, (gains,): differences by ``steps``, then the best of several dampings.
 
-    Counted in ``steps`` all gains are alike: damping and ridge, the weight of (gain / step)^2 per gain, are of
-    such units. An iteration asks for 1 + gains, then for ``DAMPINGS`` candidates; of those it takes the one
-    with the least sum of squares, and ends where that is no better than before.
+    Counted in ``steps`` all gains are alike: damping and ridge, the weight of (gain / step)^2 per gain, are
+    of such units. An iteration asks for 1 + gains, then for ``DAMPINGS`` candidates; of those it takes the
+    one with the least sum of squares, and ends where that is no better than before. Raises InputError where
+    the start has no finite residuals.
     """
     gains, history, size = np.asarray(start, dtype=float), list[float](), len(start)
     for _ in range(iterations):
         values = residuals(gains + np.concatenate([np.zeros((1, size)), np.diag(steps)]))
         base = values[0]
         if not np.isfinite(base).all():
-            raise ValueError("the fit starts where a pass ends early")
+            raise InputError("The tuning cannot start: with the gains that it starts from a pass ends early.")
         cost = float(base @ base + ridge * np.sum((gains / steps) ** 2))
         history = history or [cost]
-        usable = np.isfinite(values[1:]).all(axis=1)
+        usable = np.asarray(np.isfinite(values[1:]).all(axis=1))
+        if not usable.any():
+            break
         jacobian = np.where(usable[:, None], values[1:] - base, 0.0).T
         square = jacobian.T @ jacobian + ridge * np.eye(size)
         slope = jacobian.T @ base + ridge * gains / steps
