@@ -74,6 +74,6 @@ class FittedFeedback(TunableLaw):
     @classmethod
     def gain_steps(cls, context: Context) -> Array:
         """Changes of the gains of like, small effect."""
-        return np.full(len(cls.gain_names(context)), STEP) * np.repeat(
-            [1.0, 0.5, 0.2], [2 * HARMONICS, HISTORY * len(SIGNALS), COMMANDS]
-        )
+        alike = [1.0, 0.5, 0.2]
+        counts = [2 * HARMONICS, HISTORY * len(SIGNALS), COMMANDS]
+        return np.asarray(STEP * np.repeat(alike, counts))

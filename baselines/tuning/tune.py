@@ -82,7 +82,9 @@ def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, pa
     kind, training = tunable(policy), TRAINING[:seeds]
     at_speed = settings.model_copy(update={"speed_kmh": (speed_kmh, speed_kmh)})
     fast = at_speed.model_copy(update={"accuracy": "fast"})
-    context = Task(fast, keep_samples=False).context(0)
+    task = Task(fast, keep_samples=False)
+    task.reset(0, np.random.default_rng(training[0]))
+    context = task.context(0)
     passive = run_batch(fast, [Still()], training)
     used = len(training)
 
