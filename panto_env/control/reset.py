@@ -24,7 +24,8 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
-    drawn = draw_starts(task.settings, task.speed_range, len(plant.model.droppers), lanes, of_lane)
+    droppers, supports = len(plant.model.droppers), len(plant.model.supports)
+    drawn = draw_starts(task.settings, task.speed_range, droppers, supports, lanes, of_lane)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, task.static_forces(drawn.speed))
     run_in = np.round(drawn.way / (drawn.speed * task.control_interval))
     end = task.plant_steps(drawn.speed, run_in)

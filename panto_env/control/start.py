@@ -33,25 +33,26 @@ def draw_starts(
     settings: RunSettings,
     speeds: tuple[float, float],
     droppers: int,
+    supports: int,
     lanes: Any,
     random: Callable[[int], np.random.Generator],
 ) -> Starts:
     """Draw the starts of lanes, (n,), each from its own generator, asked for only where something is random.
 
-    speeds: lowest and highest (m/s). droppers: of the line.
+    speeds: lowest and highest (m/s). droppers, supports: of the line.
     """
     low, high = speeds
     conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way = np.full(len(lanes), low), np.zeros(len(lanes))
     if not (low < high or lines_differ or scatter or run_in):
-        return Starts(speed, [draw(conditions, _UNUSED, droppers)] * len(lanes), [], way)
+        return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way)
     line, pantograph = [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
         if low < high:
             speed[k] = own.uniform(low, high)
-        line.append(draw(conditions, own, droppers))
+        line.append(draw(conditions, own, droppers, supports))
         if scatter:
             pantograph.append(with_scatter(settings.pantograph, scatter, own))
         if run_in > 0:

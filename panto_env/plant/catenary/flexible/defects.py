@@ -47,9 +47,18 @@ class StaticState:
 class DefectiveLine:
     """A line with the defects of a condition, to be solved for any scatter of its droppers' lengths."""
 
-    def __init__(self, data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> None:
-        """data: the line as designed. Raises InputError for what a line of so many spans has not."""
-        left = with_tension_left(data, condition)
+    def __init__(
+        self,
+        data: FlexibleCatenaryData,
+        spans: int,
+        condition: LineCondition,
+        tensions: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """data: the line as designed. tensions: as ``DrawnLine`` has them.
+
+        Raises InputError for what a line of so many spans has not.
+        """
+        left = with_tension_left(data, condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
         self._static = np.tile(shape.dropper_tension, spans)
         self._stiffness = np.tile(shape.dropper_stiffness, spans)
@@ -74,8 +83,9 @@ class DefectiveLine:
         self._band[0, masts] += data.steady_arm.stiffness
         self._band[0, masts + 2] += data.support.stiffness
         self._load[masts + 2] = data.support.stiffness * height
+        self._lifted, self._support_stiffness = masts + 2, data.support.stiffness
         self._band[0, [0, 2, -4, -2]] = HELD
-        self.decay = _decay(data.contact_wire)
+        self.decay = _decay(left.contact_wire)
         self._carry(data, left, own, spans)
 
     def _carry(
@@ -108,24 +118,33 @@ class DefectiveLine:
             link_gap=np.zeros((rows, droppers), dtype=real),
             rise=np.zeros((rows, len(self._unknowns), 5)),
             rise_breaks=self.breaks,
-            rise_decay=self.decay,
+            rise_decay=np.full(rows, self.decay),
         )
 
-    def write(self, line: FlexibleLine, row: int, scatter: Array | None = None) -> StaticState:
-        """Write the state under this scatter of the droppers' lengths (m) into the line's tables."""
-        state = self.solve(scatter)
+    def write(
+        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
+    ) -> StaticState:
+        """Write the state under these errors, as ``solve`` takes them, into the line's tables."""
+        state = self.solve(scatter, heights)
         line.link_static[row] = state.tension
         line.link_gap[row] = state.gap
         line.rise[row] = state.rise
+        line.rise_decay[row] = self.decay
         return state
 
-    def solve(self, scatter: Array | None = None) -> StaticState:
-        """Static state; scatter: length error of every dropper (m), added to those of the condition."""
+    def solve(self, scatter: Array | None = None, heights: Array | None = None) -> StaticState:
+        """Static state; scatter: length error of every dropper, heights: of every support's height (m), both
+        added to those of the condition.
+        """
         error = self._error if scatter is None else self._error + scatter
+        load = self._load
+        if heights is not None:
+            load = load.copy()
+            load[self._lifted] += self._support_stiffness * heights
         taut = ~self._broken
         rounds = 0
         while True:
-            change = self._solve_linear(taut, error)
+            change = self._solve_linear(taut, error, load)
             contact, messenger = change[self._ends].T
             pull = self._static + self._stiffness * (messenger - contact - error)  # were it always taut
             wrong = np.flatnonzero(~self._broken & (np.where(taut, -pull, pull) > SLIGHT))
@@ -139,11 +158,11 @@ class DefectiveLine:
         rise = np.concatenate([bare[:, :2] + self._surface, bare[:, 2:], self._bulge[:, None]], axis=1)
         return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
 
-    def _solve_linear(self, taut: Any, error: Array) -> Array:
-        """Change of all unknowns with these droppers taut, the others without tension."""
+    def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
+        """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""
         from scipy.linalg import solveh_banded  # slow to import
 
-        band, load = self._band.copy(), self._load.copy()
+        band, load = self._band.copy(), loaded.copy()
         spring = np.where(taut, self._stiffness, 0.0)
         contact, messenger = self._ends.T
         band[0, contact] += spring
