@@ -133,7 +133,7 @@ def _span_cosine(episode, own, task, now, number):
 
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, own, task, now, number):
-    return own[ROW.STRIDE] * (1.0 / episode.time_step)
+    return now[NOW.SPEED]
 
 
 @entry(CENTRED, "force deviation", 0.3, "of the nominal force")

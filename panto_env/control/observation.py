@@ -23,6 +23,7 @@ from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
+from ..plant.drift import position_after, stride_after
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading
 from ..plant.state import ROW
@@ -119,11 +120,12 @@ def add_noise(sensors, idle, readings, lane):
 
 
 @inlined
-def prepare_entries(episode, sensors, own, now, lane):
+def prepare_entries(episode, sensors, run, own, now, lane):
     """Make ready what entries of an observation look at: noise is added to the readings of a group."""
     if sensors.noise.shape[1] > 0:
         add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
-    now[NOW.SPANS] = own[ROW.STRIDE] * own[ROW.STEP] * episode.spans_per_metre
+    now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
+    now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
 
 
 @inlined

@@ -122,6 +122,12 @@ class RunSettings(Numerics):
         validate_default=True,
         description="train speed (km/h): a number, or a range of two to draw from",
     )
+    # Own choice: a driver, or cruise control, keeps within some km/h.
+    speed_drift: Annotated[float, Between(0, 20, "km/h")] = Field(
+        0.0,
+        description="rms of a slow drift of the speed about its mean, of periods of 7 to 29 s, drawn per run "
+        "(km/h)",
+    )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,

@@ -56,7 +56,9 @@ class Now(IntEnum):
     EFFORT = 3  # the reward's term
     RATE = 4  # likewise
     SPANS = 5  # travelled since the start (-)
-    READING = 6  # what the sensors read, one row per ``Reading``
+    SPEED = 6  # of the train (m/s)
+    STRIDE = 7  # mean distance covered in a plant step (m)
+    READING = 8  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):
