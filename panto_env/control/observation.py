@@ -25,7 +25,7 @@ from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
 from ..plant.drift import position_after, stride_after
 from ..plant.pantograph.schema import PantographData
-from ..plant.sensors import Reading
+from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, entries_of
 from .state import MAX_ENTRIES, NOW
@@ -126,6 +126,9 @@ def prepare_entries(episode, sensors, run, own, now, lane):
         add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
     now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
     now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
+    if episode.odometer.table.shape[1] > 0:
+        spans, speed = rows_from(now, NOW.SPANS), rows_from(now, NOW.SPEED)
+        read_odometer(episode.odometer, episode.idle, spans, speed, lane)
 
 
 @inlined

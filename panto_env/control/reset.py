@@ -38,6 +38,9 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     task.sensors.reset(lanes, samples)
     if task.keep_samples:
         task.samples.rows[lanes, 0, 0] = samples
+    if task.odometers.drawn:
+        for lane in lanes.tolist():
+            task.odometers.start(task.episode.odometer, lane, of_lane(lane), task.noise is not None)
     if task.noise is not None:
         for lane in lanes.tolist():
             task.noise.start(task.sensors, lane, of_lane(lane))

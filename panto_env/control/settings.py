@@ -137,7 +137,8 @@ class RunSettings(Numerics):
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
+        description='sensors: "ideal", "realistic", "blind", one with values as "ideal:force_noise=5", or a '
+        "table",
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",

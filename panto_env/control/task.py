@@ -26,7 +26,7 @@ from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
-from ..plant.sensors import Noise
+from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
 from .entries import ESTIMATED
@@ -102,7 +102,8 @@ class Task:
         self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
-        self.episode = new_episode(settings, plant, self.layout, self.control_steps)
+        self.odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
+        self.episode = new_episode(settings, plant, self.layout, self.control_steps, self.odometers.arrays())
         self.results = self.new_results()
         self.known_pantograph = settings.known_pantograph or settings.pantograph
         self.sensors, rms = self._sensors()
@@ -266,6 +267,8 @@ class Task:
         self._action[...] = action
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
+        if self.odometers.drawn:
+            self.odometers.prepare(self.episode.odometer, skip)
         if skip is None and results is None:
             return self._told(self._plain_step())  # the usual step, as short as it can be
         results = results or self.results
