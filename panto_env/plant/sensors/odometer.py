@@ -7,7 +7,6 @@ an error of its own, the count begins anew, so that the error is a saw-tooth. Ne
 
 from __future__ import annotations
 
-import copy
 import math
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -90,8 +89,10 @@ class Odometers:
         random: the lane's generator. shared: whether it is drawn from besides: then this takes nothing out of
         it, so that what else is drawn stays as it was.
         """
-        seeds = (copy.deepcopy(random) if shared else random).integers(0, 2**63, 4)
-        own = np.random.default_rng(seeds)
+        before = random.bit_generator.state
+        own = np.random.default_rng(random.integers(0, 2**63, 4))
+        if shared:
+            random.bit_generator.state = before
         scale, mast = own.standard_normal(2)
         arrays.table[lane] = 0.0, 0.0, self.errors.mast / self._span * mast, self.errors.scale * scale
         self._noise.start(arrays, lane, own)
