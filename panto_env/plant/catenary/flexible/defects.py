@@ -74,12 +74,12 @@ class DefectiveLine:
         self._band = np.zeros((BAND, UNKNOWNS * len(number)))
         self._load = np.zeros(UNKNOWNS * len(number))
         for w, wire in ((CONTACT, left.contact_wire), (MESSENGER, left.messenger_wire)):
-            elements = [_element(wire, length) for length in np.diff(self.breaks)]
+            shapes, stiffness = _elements(wire, np.diff(self.breaks))
             unknowns = UNKNOWNS * number[:-1, None] + 2 * w + [0, 1, 4, 5]
-            _add(self._band, unknowns, np.tile([stiffness for _, stiffness in elements], (spans, 1, 1)))
+            _add(self._band, unknowns, np.tile(stiffness, (spans, 1, 1)))
             if w == CONTACT:
                 self._unknowns = unknowns
-                self._shapes = np.tile([shapes for shapes, _ in elements], (spans, 1, 1))
+                self._shapes = np.tile(shapes, (spans, 1, 1))
         self._band[0, masts] += data.steady_arm.stiffness
         self._band[0, masts + 2] += data.support.stiffness
         self._load[masts + 2] = data.support.stiffness * height
@@ -206,23 +206,29 @@ def _decay(wire: Wire) -> float:
     return float(np.sqrt(wire.tension / max(wire.bending_stiffness, wire.tension * SHARPEST**2)))
 
 
-def _element(wire: Wire, length: float) -> tuple[Array, Array]:
-    """Shapes and stiffness, each (4, 4), of a tensioned beam (m) by height and slope of its two ends.
+def _elements(wire: Wire, lengths: Array) -> tuple[Array, Array]:
+    """Shapes and stiffness, each (n, 4, 4), of tensioned beams (m), (n,), by height and slope of their ends.
 
     Shapes are a, b, c, d of each unknown. What the ends are held by follows from T u' - EI u''' = T b
     and EI u'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
     """
     kappa = _decay(wire)
-    far = np.exp(-kappa * length)
-    ends = [[1, 0, 1, far], [0, 1, -kappa, kappa * far], [1, length, far, 1], [0, 1, -kappa * far, kappa]]
-    shapes = np.linalg.inv(np.array(ends))
-    held = wire.tension * np.array([[0, -1, 0, 0], [0, 0, -1, -far], [0, 1, 0, 0], [0, 0, far, 1]])
-    return shapes, held @ shapes
+    far, one = np.exp(-kappa * lengths), np.ones(len(lengths))
+    no = 0 * one
+    ends = [
+        [one, no, one, far],
+        [no, one, -kappa * one, kappa * far],
+        [one, lengths, far, one],
+        [no, one, -kappa * far, kappa * one],
+    ]
+    shapes = np.linalg.inv(np.moveaxis(np.array(ends), -1, 0))
+    held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])
+    return shapes, wire.tension * np.ascontiguousarray(np.moveaxis(held, -1, 0)) @ shapes
 
 
 def _bulging(wire: Wire, length: float) -> Array:
     """Load on height and slope of the two ends of a beam (m), (4,), which an even load of 2 T bulges."""
-    _, stiffness = _element(wire, length)
+    stiffness = _elements(wire, np.array([length]))[1][0]
     bending = 2 * wire.tension / _decay(wire) ** 2
     held = [-wire.tension * length, bending, -wire.tension * length, -bending]
     return np.asarray(stiffness @ [0, length, 0, -length] - held)
