@@ -123,17 +123,17 @@ def _contact_force(episode, own, task, now, number):
 
 @entry(MEASURED, "sine of span position", 1.0, "-")
 def _span_sine(episode, own, task, now, number):
-    return sine_of_turns(now[NOW.SPANS])
+    return episode.odometer.sight * sine_of_turns(now[NOW.SPANS])
 
 
 @entry(MEASURED, "cosine of span position", 1.0, "-")
 def _span_cosine(episode, own, task, now, number):
-    return cosine_of_turns(now[NOW.SPANS])
+    return episode.odometer.sight * cosine_of_turns(now[NOW.SPANS])
 
 
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, own, task, now, number):
-    return own[ROW.STRIDE] * (1.0 / episode.time_step)
+    return now[NOW.SPEED]
 
 
 @entry(CENTRED, "force deviation", 0.3, "of the nominal force")

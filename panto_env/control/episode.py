@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..backend import lane_table
 from ..base.arrays import Array, Index
 from ..plant.plant import Plant
+from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
 from .observation import Layout
 from .reward import MEAN_TIME
@@ -33,6 +34,7 @@ class Episode(NamedTuple):
     writers: Index  # (entries, 2): writer and number of each entry of the observation
     centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
+    odometer: OdometerArrays  # by which trains know where they are, and their speed
     spans_per_metre: float  # 1/m
     time_step: float  # s
     control_steps: int  # plant steps in a control step
@@ -41,7 +43,9 @@ class Episode(NamedTuple):
     head_range: float  # height of the head (m), either way, that ends an episode
 
 
-def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_steps: int) -> Episode:
+def new_episode(
+    settings: RunSettings, plant: Plant, layout: Layout, control_steps: int, odometer: OdometerArrays
+) -> Episode:
     """Of all lanes of a plant, none begun; control_steps: plant steps in a control step."""
     lanes, abreast, actuator = plant.lanes, plant.lanes_abreast, settings.actuator
     table = lane_table(TaskRow.ACTION + len(actuator.places), lanes, abreast)
@@ -59,6 +63,7 @@ def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_ste
         writers=layout.writers,
         centre=layout.centre,
         per_unit=1 / layout.scale,
+        odometer=odometer,
         spans_per_metre=1.0 / float(plant.catenary.span_length),
         time_step=plant.time_step,
         control_steps=control_steps,

@@ -87,6 +87,7 @@ def trim_as_designed(
     as_designed = {
         "line_condition": (LineCondition(),),
         "pantograph_scatter": 0.0,
+        "speed_drift": 0.0,
         "distance": None,
         "spans": None,
     }

@@ -23,8 +23,9 @@ from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.actuators import ActuatorSettings
+from ..plant.drift import position_after, stride_after
 from ..plant.pantograph.schema import PantographData
-from ..plant.sensors import Reading
+from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, entries_of
 from .state import MAX_ENTRIES, NOW
@@ -119,11 +120,15 @@ def add_noise(sensors, idle, readings, lane):
 
 
 @inlined
-def prepare_entries(episode, sensors, own, now, lane):
+def prepare_entries(episode, sensors, run, own, now, lane):
     """Make ready what entries of an observation look at: noise is added to the readings of a group."""
     if sensors.noise.shape[1] > 0:
         add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
-    now[NOW.SPANS] = own[ROW.STRIDE] * own[ROW.STEP] * episode.spans_per_metre
+    now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
+    now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
+    if episode.odometer.table.shape[1] > 0:
+        spans, speed = rows_from(now, NOW.SPANS), rows_from(now, NOW.SPEED)
+        read_odometer(episode.odometer, episode.idle, spans, speed, lane)
 
 
 @inlined

@@ -24,10 +24,12 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
-    drawn = draw_starts(task.settings, task.speed_range, len(plant.model.droppers), lanes, of_lane)
-    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, task.static_forces(drawn.speed))
+    droppers, supports = len(plant.model.droppers), len(plant.model.supports)
+    drawn = draw_starts(task.settings, task.speed_range, droppers, supports, lanes, of_lane, plant.time_step)
+    forces = task.static_forces(drawn.speed)
+    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.control_interval))
-    end = task.plant_steps(drawn.speed, run_in)
+    end = task.plant_steps(drawn.speed, run_in, drawn.drift)
     run_in = np.minimum(run_in, end // task.control_steps - 1).astype(np.int64)
     task.speed[lanes] = drawn.speed
     _begin(task, lanes, end)
@@ -36,6 +38,9 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     task.sensors.reset(lanes, samples)
     if task.keep_samples:
         task.samples.rows[lanes, 0, 0] = samples
+    if task.odometers.drawn:
+        for lane in lanes.tolist():
+            task.odometers.start(task.episode.odometer, lane, of_lane(lane), task.noise is not None)
     if task.noise is not None:
         for lane in lanes.tolist():
             task.noise.start(task.sensors, lane, of_lane(lane))
@@ -50,7 +55,9 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     start = of_lanes(run, lanes)
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
-    rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    shifted = task.plant.ahead(lanes, np.stack([start[:, Row.STEP], end], axis=1))
+    steady = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
     set_lanes(table, lanes, rows)
     task.running.peak[lanes] = -np.inf
 

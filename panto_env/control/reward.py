@@ -67,7 +67,7 @@ def compute_reward(episode, own, task, now, values):
     """
     per_step, weights, terms = 1.0 / episode.control_steps, episode.weights, rows_from(values, RESULT.TERM)
     cost, loss_steps = 0.5 * now[NOW.COST], now[NOW.LOSS_STEPS]
-    stride, per_nominal_force = own[ROW.STRIDE], 1.0 / own[ROW.NOMINAL_FORCE]
+    stride, per_nominal_force = now[NOW.STRIDE], 1.0 / own[ROW.NOMINAL_FORCE]
     change = now[NOW.SIGNED_DEVIATION] * per_step - task[TASK_ROW.MEAN_DEVIATION]
     task[TASK_ROW.MEAN_DEVIATION] += episode.mean_share * change
     mean_deviation = task[TASK_ROW.MEAN_DEVIATION] * per_nominal_force

@@ -122,6 +122,12 @@ class RunSettings(Numerics):
         validate_default=True,
         description="train speed (km/h): a number, or a range of two to draw from",
     )
+    # Own choice: a driver, or cruise control, keeps within some km/h.
+    speed_drift: Annotated[float, Between(0, 20, "km/h")] = Field(
+        0.0,
+        description="rms of a slow drift of the speed about its mean, of periods of 7 to 29 s, drawn per run "
+        "(km/h)",
+    )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
@@ -131,7 +137,8 @@ class RunSettings(Numerics):
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
+        description='sensors: "ideal", "realistic", "blind", one with values as "ideal:force_noise=5", or a '
+        "table",
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",

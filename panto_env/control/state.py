@@ -55,8 +55,10 @@ class Now(IntEnum):
     SIGNED_DEVIATION = 2  # sum of the contact force less the nominal one (N)
     EFFORT = 3  # the reward's term
     RATE = 4  # likewise
-    SPANS = 5  # travelled since the start (-)
-    READING = 6  # what the sensors read, one row per ``Reading``
+    SPANS = 5  # travelled since the line's start, as read (-)
+    SPEED = 6  # of the train, as read (m/s)
+    STRIDE = 7  # mean distance covered in a plant step (m)
+    READING = 8  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):

@@ -27,6 +27,7 @@ from ..backend import (
     width_of,
 )
 from ..plant.catenary.protocol import ending_by_wire
+from ..plant.drift import mean_stride, position_after
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import CONTACTS, PLACE, ROW, SCRATCH, SCRATCH_ROWS
 from ..plant.step import new_scratch, record_group, step_group
@@ -74,14 +75,14 @@ def end_episodes(line, wire, episode, own, task, values, flags, lane):
 
 
 @inlined
-def tell(own, told):
+def tell(run, own, told, lane):
     """Write what is told of the last sample of a group."""
     told[RESULT.CONTACT_FORCE] = own[ROW.CONTACT_FORCE]
     told[RESULT.HEAD_HEIGHT] = own[ROW.HEAD_HEIGHT]
     told[RESULT.WIRE_HEIGHT] = own[ROW.WIRE_HEIGHT]
     told[RESULT.FRAME_FORCE] = own[ROW.FRAME_FORCE]
     told[RESULT.HEAD_FORCE] = own[ROW.HEAD_FORCE]
-    told[RESULT.POSITION] = own[ROW.STEP] * own[ROW.STRIDE]
+    told[RESULT.POSITION] = position_after(run, own, own[ROW.STEP], lane)
 
 
 @inlined
@@ -97,6 +98,7 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
     ended = False
     for _ in range(episode.steps[lane]):
         begin_terms(now)
+        now[NOW.STRIDE] = mean_stride(run, own, float(episode.control_steps), lane)
         for step in range(1, episode.control_steps + 1):
             force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
             step_group(line, wire, pantographs, actuators, run, scratch, lane)
@@ -109,10 +111,10 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
         ended = end_episodes(line, wire, episode, own, task, told, flags, lane)
         if ended:
             break
-    prepare_entries(episode, sensors, own, now, lane)
+    prepare_entries(episode, sensors, run, own, now, lane)
     for k in range(entries.shape[0]):
         put_across(entries, k, lane, entry_of(episode, own, task, now, k, entry))
-    tell(own, told)
+    tell(run, own, told, lane)
     return ended
 
 
@@ -176,12 +178,12 @@ def observe_start(packed, entries, values, flags, first, last):
     for lane in range(first - first % width, last, width):
         own, task = columns(line, run.table[0], lane), columns(line, episode.table, lane)
         take_first_readings(sensors, own, rows_from(now, NOW.READING), lane)
-        prepare_entries(episode, sensors, own, now, lane)
+        prepare_entries(episode, sensors, run, own, now, lane)
         for k in range(entries.shape[0]):
             seen[k] = entry_of(episode, own, task, now, k, entry)
         for k in range(RESULT_ROWS):
             told[k] = 0.0
-        tell(own, told)
+        tell(run, own, told, lane)
         for i in range(width):
             if not episode.idle[lane + i]:
                 for k in range(RESULT_ROWS):
