@@ -11,7 +11,7 @@ from ..base.version import __version__
 from ..plant.plant import Plant
 from .settings import RunSettings
 
-NOT_OF_A_RUN = ("observation", "reward")
+NOT_OF_A_RUN = ("observation", "harmonics", "history", "reward")
 """Settings that only a policy sees."""
 
 

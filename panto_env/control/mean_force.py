@@ -29,7 +29,7 @@ MOST_RUNS = 10
 KNOT_DISTANCE = 5.0
 """Largest distance (km/h) of the speeds that a range is trimmed at. Between them the force is interpolated,
 and the mean is within some 0.3 N of its target."""
-NO_MATTER = {"observation", "reward", "actuator", "sensors", "mean_force"}
+NO_MATTER = {"observation", "harmonics", "history", "reward", "actuator", "sensors", "mean_force"}
 """Settings on which the mean force of a passive run does not depend."""
 
 PassiveMean = Callable[[float], float]

@@ -65,3 +65,20 @@ def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
         raise InputError(task.ending(lane))
     _begin(task, lanes, rows[:, TaskRow.END])
     results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
+    if task.layout.history:
+        _forget(task, lanes, rows, results)
+
+
+def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
+    """Let the history of lanes that have run in have been as what they read at the end of that.
+
+    rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
+    """
+    first = TaskRow.ACTION + len(task.actuator.places)
+    history = rows[:, first:]
+    latest = history[:, : history.shape[1] // task.layout.history]
+    begun = of_lanes(task.episode.table, lanes)
+    begun[:, first:] = np.tile(latest, task.layout.history)
+    set_lanes(task.episode.table, lanes, begun)
+    past, now = task.layout.earlier
+    results.entries[np.ix_(past, lanes)] = results.entries[np.ix_(now, lanes)]

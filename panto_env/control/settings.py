@@ -157,6 +157,12 @@ class RunSettings(Numerics):
         description='what a policy sees: "measured", "full", "centred" or "estimated": as measured, but with '
         "the contact force that a Kalman filter estimates from the pantograph's motion",
     )
+    harmonics: Annotated[int, Between(1, 14)] = Field(
+        1, description="sines and cosines of the position within the span, up to this multiple of it (-)"
+    )
+    history: Annotated[int, Between(0, 8)] = Field(
+        0, description="earlier control steps whose readings and actions are observed, too (-)"
+    )
     estimator: Annotated[EstimatorSettings, BeforeValidator(_estimator)] = Field(
         "usual",
         validate_default=True,

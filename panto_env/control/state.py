@@ -7,9 +7,6 @@ from enum import IntEnum
 from ..backend import constants
 from ..plant.sensors import Reading
 
-MAX_ENTRIES = 32
-"""Entries of an observation at most."""
-
 
 class Term(IntEnum):
     """Terms of the reward, each summed over one control step and not weighted."""
@@ -44,7 +41,8 @@ class TaskRow(IntEnum):
     ALL_COST = FILTER_STATE + 12  # sum of the cost function's term (N m)
     SQUARED_EFFORT = FILTER_STATE + 13  # sum over both places (N^2)
     SQUARED_CHANGE = FILTER_STATE + 14  # sum of the actuator forces' changes from step to step (N^2)
-    ACTION = FILTER_STATE + 15  # the present one, -1..1, one row per entry
+    ACTION = FILTER_STATE + 15  # the present one, -1..1, one row per entry; then the observation's history:
+    # readings and actions of the latest control step, of the one before that, ...
 
 
 class Now(IntEnum):

@@ -28,7 +28,7 @@ from ..plant.plant import Plant
 from ..plant.sensors import Noise
 from ..plant.state import Row
 from .context import Context
-from .entries import ESTIMATED
+from .entries import ESTIMATED, Asked
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
@@ -95,7 +95,8 @@ class Task:
                 f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
                 f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
             )
-        self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
+        asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
+        self.layout = layout(settings.observation, asked)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
         self.episode = new_episode(settings, plant, self.layout, self.control_steps)

@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.arguments import table, takes
-from ..control.entries import CENTRED
+from ..control.entries import CENTRED, Asked
 from ..control.observation import BOUND, layout
 from ..control.settings import default, read_settings
 from ..metrics.trajectory import Trajectory
@@ -225,7 +225,7 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
 def _observation_table(kind: str) -> str:
     """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, actuator, pantograph).entries
+    entries = layout(kind, Asked(actuator, pantograph)).entries
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
         for k, each in enumerate(entries)
