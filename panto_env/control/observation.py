@@ -40,6 +40,7 @@ class Layout:
     entries: tuple[Entry, ...]
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
+    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that readings count from
 
     @property
     def scale(self) -> Array:
@@ -91,6 +92,8 @@ class Layout:
         return entry.centre + shift + float(observation[place]) * entry.scale
 
 
+OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "normalise")
+"""Settings of a run that decide what a policy sees, and nothing else."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
 

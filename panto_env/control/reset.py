@@ -50,6 +50,10 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     start = of_lanes(run, lanes)
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
+    nominal = start[:, Row.NOMINAL_FORCE]
+    target, spread = task.targets(task.speed[lanes], nominal)
+    rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
+    rows[:, TaskRow.PER_SPREAD] = 1 / spread
     rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
     set_lanes(table, lanes, rows)
     task.running.peak[lanes] = -np.inf

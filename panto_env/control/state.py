@@ -16,6 +16,7 @@ class Term(IntEnum):
     EFFORT = 2  # -
     RATE = 3  # -
     MEAN_FORCE = 4  # -
+    LOW_PASSED = 5  # -
 
 
 TERMS = tuple(term.name.lower() for term in Term)
@@ -30,8 +31,10 @@ class TaskRow(IntEnum):
     ENDING = 2  # why it ended early, an ``Ending``
     LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
     MEAN_DEVIATION = 4  # running mean of the contact force less the nominal one (N)
+    TARGET_SHIFT = 5  # force that the reward counts from, less the nominal one (N)
+    PER_SPREAD = 6  # for a squared deviation from it of 1 (1/N)
     # Running figures.
-    FILTER_STATE = 5  # of EN 50317's filter, two rows for each of three sections
+    FILTER_STATE = 7  # of EN 50317's filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6
     DEVIATION = FILTER_STATE + 7  # sum of the filtered contact force less the nominal one (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum (N^2)
@@ -53,8 +56,10 @@ class Now(IntEnum):
     SIGNED_DEVIATION = 2  # sum of the contact force less the nominal one (N)
     EFFORT = 3  # the reward's term
     RATE = 4  # likewise
-    SPANS = 5  # travelled since the start (-)
-    READING = 6  # what the sensors read, one row per ``Reading``
+    DEVIATION_BEFORE = 5  # running figure of that name as the control step begins (N)
+    SQUARED_BEFORE = 6  # likewise (N^2)
+    SPANS = 7  # travelled since the start (-)
+    READING = 8  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):

@@ -96,7 +96,7 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
     take_action(line, episode, task, now, scratch, lane)
     ended = False
     for _ in range(episode.steps[lane]):
-        begin_terms(now)
+        begin_terms(task, now)
         for step in range(1, episode.control_steps + 1):
             force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
             step_group(line, wire, pantographs, actuators, run, scratch, lane)

@@ -71,7 +71,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Minus the cost function CF over the control step (relative to the nominal force) and minus the
     share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
     effort and rate of the action and for the mean force have weight 0 but in `Pantograph-v0`. A `reward` of
-    your own takes the place of all its weights. `info["reward_terms"]` holds the unweighted terms:
+    your own takes the place of all its weights. `reward="agent"` is what the benchmark measures: the squared
+    deviation of the low-passed contact force from the passive run's mean, over its variance there. `info["reward_terms"]` holds the unweighted terms:
     over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
 
     ## Starting State
@@ -174,7 +175,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task.step(checked(action, self._shape))
         terminated, truncated = self._flags.tolist()
         values = self._values.tolist()
-        reward, cost_function, contact_loss, effort, rate, mean_force = values[:CONTACT_FORCE]
+        reward, cost_function, contact_loss, effort, rate, mean_force, low_passed = values[:CONTACT_FORCE]
         contact_force, head, wire, frame_force, head_force, position = values[CONTACT_FORCE:]
         info: dict[str, Any] = {
             "contact_force": contact_force,
@@ -190,6 +191,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 "effort": effort,
                 "rate": rate,
                 "mean_force": mean_force,
+                "low_passed": low_passed,
             },
             "figures": FIGURES_TO_COME.copy(),
         }
