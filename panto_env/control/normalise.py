@@ -1,4 +1,4 @@
-"""An observation counted from what a passive run reads: each entry has a mean near 0 and a spread near 1 there.
+"""An observation counted from what a passive run reads: entries then have a mean near 0 and a spread near 1.
 
 The mean of a reading changes with the speed, nearly in proportion where the uplift does: what an entry is
 counted from is linear in it. The scale is one for all speeds, so that a swing twice as large is seen as such.

@@ -1,4 +1,4 @@
-"""What a passive run of line and pantograph as designed reads, by speed: the mean and the spread of each reading.
+"""What a passive run of line and pantograph as designed reads, by speed: means and spreads.
 
 Agents' observations and rewards may be counted from it. What is found is kept on disk, under a hash of the
 sources and of all that the runs are made of.

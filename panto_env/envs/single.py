@@ -72,8 +72,9 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
     effort and rate of the action and for the mean force have weight 0 but in `Pantograph-v0`. A `reward` of
     your own takes the place of all its weights. `reward="agent"` is what the benchmark measures: the squared
-    deviation of the low-passed contact force from the passive run's mean, over its variance there. `info["reward_terms"]` holds the unweighted terms:
-    over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
+    deviation of the low-passed contact force from the passive run's mean, over its variance there; with it go
+    terms that hold the mean and keep the action from chattering. `info["reward_terms"]` holds the unweighted
+    terms: over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
 
     ## Starting State
     At the start of the line, at rest under the nominal force; with `run_in`, so many spans later at most.
