@@ -34,7 +34,7 @@ def make_lanes(training: Training) -> Any:
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:
-    """Seeds of the lanes, all for training: others for another seed of a training, and after so many steps."""
+    """Seeds of the lanes, all for training: others for a training of another seed, or after more steps."""
     places = len(TRAINING) - training.lanes + 1
     first = TRAINING[(training.seed * training.lanes + steps) % places]
     seeds = range(first, first + training.lanes)
