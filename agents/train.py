@@ -107,6 +107,8 @@ class Run:
             return
         self.model.set_logger(configure(str(self.folder.tensorboard), ["tensorboard"]))
         stack.callback(self.model.logger.close)
+        if self.model.num_timesteps == 0 and (self.training.start_from or self.training.residual_of):
+            self.evaluate()  # what it begins as may be hard to better
         # Evaluations come first, so that no checkpoint is newer than the table of evaluations.
         callbacks: list[Any] = [
             EpisodeLog(LOGGED_FIGURES),

@@ -499,6 +499,7 @@ class TestStart:
         assert told["policy"] == linear
         assert told["rms"] > 0.1
         assert told["error"] < 0.1 * told["rms"]
+        assert rows(folder)[0]["steps"] == "0"  # what it begins as is judged, and kept if it stays the best
 
     def test_an_agent_does_what_it_has_cloned(self, linear, tmp_path):
         cloning = {"steps": 10_000, "batch_size": 128}
