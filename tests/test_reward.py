@@ -176,17 +176,6 @@ def test_running_mean_counts_from_the_passive_mean_too():
     assert -0.002 < sums["passive"] <= 0.0
 
 
-def test_running_mean_has_its_time_constant():
-    weights = {"cost_function": 0.0, "contact_loss": 0.0, "mean_force": 2.0, "mean_time": 0.4}
-    env = gymnasium.make(NAME, reward=weights, speed_kmh=300).unwrapped
-    rewards, _, _ = play(env, np.full((80, 1), 0.3))
-    run, mean, expected = env.trajectory, 0.0, []
-    for step in run.contact_force.reshape(len(rewards), -1).mean(axis=1):
-        mean += (1 - np.exp(-0.01 / 0.4)) * (step / run.nominal_force - 1 - mean)
-        expected.append(-2.0 * mean**2)
-    assert rewards == pytest.approx(expected, rel=1e-9)
-
-
 def test_presets_of_the_reward():
     pushes = np.full((30, 1), 0.5)
     usual, preset, other = (

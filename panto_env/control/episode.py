@@ -13,6 +13,7 @@ from ..base.arrays import Array, Index
 from ..plant.plant import Plant
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
 from .observation import READINGS, Layout
+from .reward import MEAN_TIME
 from .settings import RunSettings
 from .state import RESULT_ROWS, Flag, Result, TaskRow
 
@@ -66,7 +67,7 @@ def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_ste
         spans_per_metre=1.0 / float(plant.catenary.span_length),
         time_step=plant.time_step,
         control_steps=control_steps,
-        mean_share=1 - math.exp(-settings.control_interval / settings.reward.mean_time),
+        mean_share=1 - math.exp(-settings.control_interval / MEAN_TIME),
         loss_limit=round(LOSS_TIME / plant.time_step),
         head_range=HEAD_RANGE,
     )
