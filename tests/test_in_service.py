@@ -198,7 +198,9 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_keeps_the_rule(tmp_path
         environment = usual["environment"] | {"reward": reward}
         training = parse_training(usual | {"environment": environment}, name)
         folder = train(training, tmp_path / name, progress=False)
-        pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), 2).run(str(folder.path / "model.zip"))
+        pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), range(2)).run(
+            str(folder.path / "model.zip")
+        )
         means.append(np.mean([pair.policy.mean for pair in pairs]))
         verdicts.append(verdict(pairs))
     (ratio, qualified), (_, without_qualified) = verdicts

@@ -147,7 +147,7 @@ class _CommandRecorder:
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self.name = policy, name
-        self.observation = wishes(policy).get("observation")
+        vars(self).update(wishes(policy))
         self._actions: list[Array] = []
 
     def reset(self, context: Context) -> None:

@@ -55,6 +55,10 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     start = of_lanes(run, lanes)
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
+    nominal = start[:, Row.NOMINAL_FORCE]
+    target, spread = task.targets(task.speed[lanes], nominal)
+    rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
+    rows[:, TaskRow.PER_SPREAD] = 1 / spread
     shifted = task.plant.ahead(lanes, np.stack([start[:, Row.STEP], end], axis=1))
     steady = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
     rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
@@ -72,3 +76,20 @@ def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
         raise InputError(task.ending(lane))
     _begin(task, lanes, rows[:, TaskRow.END])
     results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
+    if task.layout.history:
+        _forget(task, lanes, rows, results)
+
+
+def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
+    """Let the history of lanes that have run in have been as what they read at the end of that.
+
+    rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
+    """
+    first = TaskRow.ACTION + len(task.actuator.places)
+    history = rows[:, first:]
+    latest = history[:, : history.shape[1] // task.layout.history]
+    begun = of_lanes(task.episode.table, lanes)
+    begun[:, first:] = np.tile(latest, task.layout.history)
+    set_lanes(task.episode.table, lanes, begun)
+    past, now = task.layout.earlier
+    results.entries[np.ix_(past, lanes)] = results.entries[np.ix_(now, lanes)]

@@ -29,12 +29,14 @@ from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
-from .entries import ESTIMATED
+from .entries import ESTIMATED, Asked
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
+from .normalise import normalised
 from .observation import layout
+from .passive_run import LOW_PASSED, PassiveRun, passive_run
 from .record import ending, refuse_divergence, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
@@ -99,13 +101,21 @@ class Task:
                 f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
                 f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
             )
-        self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
+        asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
+        self.layout = layout(settings.observation, asked)
+        self.known_pantograph = settings.known_pantograph or settings.pantograph
+        if settings.normalise is not None:
+            known = settings.model_copy(update={"pantograph": self.known_pantograph})
+            speeds = self.check_speeds(settings.normalise)
+            self.layout = normalised(self.layout, passive_run(known, speeds, passive_pass))
+        self.passive: PassiveRun | None = None  # that the reward counts from
+        if settings.reward.target == "passive":
+            self.passive = passive_run(settings, self.speed_range, passive_pass)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
         self.odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
         self.episode = new_episode(settings, plant, self.layout, self.control_steps, self.odometers.arrays())
         self.results = self.new_results()
-        self.known_pantograph = settings.known_pantograph or settings.pantograph
         self.sensors, rms = self._sensors()
         self.noise = None if rms is None else Noise(rms, lanes)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
@@ -229,6 +239,15 @@ class Task:
         if self.trim is None:
             self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
+
+    def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
+
+        Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        """
+        if self.passive is None:
+            return nominal, nominal
+        return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -372,6 +391,14 @@ class Task:
     def ending(self, lane: int) -> str:
         """Where and why a lane's run ended early, as a sentence; empty where it did not."""
         return ending(self, lane)
+
+
+def passive_pass(settings: RunSettings) -> Trajectory:
+    """Record of a pass without a policy, under seed 0."""
+    task = Task(settings)
+    task.reset(0, np.random.default_rng(0))
+    task.run_passively()
+    return task.trajectory(0, last=True)
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
