@@ -1,1 +1,1 @@
-"""The bound: the steadiest contact force that an actuator can reach on a line that it knows, ahead of time."""
+"""The bound: the steadiest contact force that an actuator reaches on a line that it knows beforehand."""

@@ -89,7 +89,9 @@ class _Group:
         self._samples = Samples(
             rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))
         )
-        self._plant.advance_passively(self._first, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0))))
+        self._plant.advance_passively(
+            self._first, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0)))
+        )
         moving = self._plant.model.wire, self._plant.actuators, self._plant.run
         self._moving = list(_arrays(moving))
         self._start = [(array, array.copy()) for array in self._moving]
@@ -112,7 +114,9 @@ class _Group:
         reach = []  # of each push, samples that it is followed over
         for first in range(0, len(pushes), lanes):
             block = pushes[first : first + lanes]
-            self._advance(np.broadcast_to(commands[now : block[0][0]], (lanes, *commands[now : block[0][0]].shape)))
+            self._advance(
+                np.broadcast_to(commands[now : block[0][0]], (lanes, *commands[now : block[0][0]].shape))
+            )
             now, last = block[0][0], min(end, block[-1][0] + steps)
             here = [(array, array.copy()) for array in self._moving]
             pushed = np.repeat(commands[None, now:last], lanes, axis=0)

@@ -13,7 +13,7 @@ from panto_env.base.errors import InputError
 from panto_env.control import passive_mean, trim_of_pass
 from panto_env.control.extent import whole_steps
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.low_pass import low_pass, low_pass_sections
+from panto_env.metrics.low_pass import low_pass_sections
 from panto_env.metrics.spans import SpanChoice, limits
 
 from ..benchmark.controls import Tape
@@ -21,11 +21,11 @@ from .knots import Knots, without_limits
 from .lanes import Stretch
 
 LEAD = 2.0
-"""Time (s) before the evaluated spans from which on the actuator may push: the passive motion has to be met."""
-MEMORY = 4.0
+"""Time (s) before the evaluated spans from which on the actuator may push: their start has to be met."""
+MEMORY = 3.0
 """Time (s) after which the contact force has forgotten a push, as far as the search needs to know."""
-PUSH = 2.0
-"""Change of a knot (N) from which the response is taken: of the size of the search's last steps."""
+PUSH = 5.0
+"""Change of a knot (N) from which the response is taken: smaller ones see droppers go slack one by one."""
 RESOLUTION = 0.01
 """Of the filtered force in the least squares (s): it has little above 20 Hz."""
 
@@ -42,16 +42,14 @@ class Problem:
         if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
             raise InputError("An oracle takes one speed, without run_in and without pantograph_scatter.")
         self.given, self.seed, self.settings = dict(given), seed, settings
-        self.passive = passive = simulate(
-            **self.given, seed=seed, record_droppers=False, evaluated=spans
-        )
+        self.passive = passive = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
         if passive.terminated:
             raise InputError(f"There is no oracle where the passive run has no figures. {passive.ending}")
         covered = passive.spans(spans)
         inside = np.flatnonzero(passive.inside(spans))
         self.spans = covered
         self.figures = passive.summary(spans)
-        self._chosen = spans
+        self.chosen = spans
         self.places = len(settings.actuator.places)
         self.interval = settings.control_interval
         self.steps = whole_steps(self.interval, passive.time_step)
@@ -95,19 +93,17 @@ class Problem:
         """Samples of the least squares, counted from the first knot's."""
         return self._inside[:: self.every]
 
-    def replay(self, knots: Array) -> Trajectory:
-        """The whole pass as ``simulate`` runs it under the commands for knots, (count, places)."""
-        tape = self.tape(self.knots.commands(knots))
-        return simulate(
-            **self.given, policy=tape, seed=self.seed, record_droppers=False, evaluated=self._chosen
-        )
-
-    def tape(self, commands: Array) -> Tape:
-        """Commands (N), (count, places), as a policy that plays them where they belong."""
+    def replay(self, commands: Array) -> Trajectory:
+        """The whole pass as ``simulate`` runs it under commands (N), (count, places)."""
         rest = np.zeros((self.begin, self.places))
-        tape = Tape(np.concatenate([rest, commands / self.knots.limit, np.zeros((1, self.places))]))
-        tape.name = "oracle"
-        return tape
+        actions = np.concatenate([rest, commands / self.knots.limit, np.zeros((1, self.places))])
+        return simulate(
+            **self.given,
+            policy=Tape(actions),
+            seed=self.seed,
+            record_droppers=False,
+            evaluated=self.chosen,
+        )
 
     def _filtered(self, force: Array) -> Array:
         from scipy.signal import sosfilt  # slow to import

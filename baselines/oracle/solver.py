@@ -1,9 +1,10 @@
 """Gauss-Newton on the knots, within the actuator's limits and at the passive run's mean force.
 
-Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum of
-squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato et
-al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What is found is
-a local optimum that is reached: a bound on what control can be asked for, not a proof that nothing is better.
+Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
+of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
+et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
+is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that nothing
+is better.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 MEAN_WEIGHT = 2.0
 """Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
 MEAN_STIFFNESS = 1e3
-"""Weight of the squared error of the mean against σ squared in a step: it leaves some hundredths of a newton."""
-WORTH, ENOUGH = 1e-2, 1e-3
+"""Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
+WORTH, ENOUGH = 2e-2, 2e-3
 """Relative gains of an iteration: below the first the response is taken anew, with a new one and below the
 second the search ends."""
-MOST_ITERATIONS = 25
+MOST_ITERATIONS = 12
 OSQP = {"verbose": False, "eps_abs": 1e-4, "eps_rel": 1e-4, "max_iter": 10_000}
 
 
@@ -93,7 +94,9 @@ def descend(
         model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
         steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
-        tried = knots + np.array([share * step for step in steps for share in SHARES]).reshape(-1, *knots.shape)
+        tried = knots + np.array([share * step for step in steps for share in SHARES]).reshape(
+            -1, *knots.shape
+        )
         forces = problem.forces(tried)
         merits = [merit(problem, each) for each in forces]
         best = int(np.argmin(merits))
@@ -123,7 +126,7 @@ def merit(problem: Problem, force: Array) -> float:
 
 
 class Model(NamedTuple):
-    """The sum of squares of the filtered force about its mean, and of a wrong mean, as a quadratic of a step."""
+    """Sum of squares of the filtered force about its mean, and of a wrong mean, as a quadratic of a step."""
 
     square: Array  # (directions, directions)
     slope: Array  # (directions,)
@@ -167,7 +170,7 @@ class Model(NamedTuple):
 
 
 def corrected(response: Array, step: Array, change: Array) -> Array:
-    """The response, changed as little as it can be to give the change, (rows,) (N), that a step, flat (N), made.
+    """The response, changed as little as can be to give the change, (rows,) (N), of a step, flat (N).
 
     Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
     """
@@ -182,6 +185,8 @@ def of_all_places(limits: Limits, places: int) -> Limits:
     )
 
 
-def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float, damping: float = 0.0) -> Iteration:
+def _iteration(
+    problem: Problem, number: int, knots: Array, force: Array, share: float, damping: float = 0.0
+) -> Iteration:
     at_limits = problem.knots.at_limits(knots)
     return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)
