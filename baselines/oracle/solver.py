@@ -3,15 +3,15 @@
 Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
 of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
 et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
-is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that nothing
-is better.
+is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that there is
+nothing better.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csc_matrix, eye_array, kron
@@ -30,7 +30,9 @@ DAMPING = 0.1
 """Weight of the step's own size at first, over the mean square of the response to one knot."""
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Of the last one, that are tried in each iteration: what the model says of large steps is not so."""
-MEAN_WEIGHT = 2.0
+MEAN_TOLERANCE = 5e-4
+"""Largest difference of the mean force from the passive run's at the end of a search, as a share of it."""
+MEAN_WEIGHT = 4.0
 """Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
 MEAN_STIFFNESS = 1e3
 """Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
@@ -82,6 +84,7 @@ def descend(
 
     basis: (knots of all places, directions), where only some combinations are looked at. progress: called
     with each iteration. The merit, σ and a weighted error of the mean, falls from iteration to iteration.
+    Where the mean is not met after so many iterations, up to as many more follow.
     """
     limits = of_all_places(problem.knots.limits(problem.count), problem.places)
     force, damping = problem.forces(knots[None])[0], DAMPING
@@ -89,7 +92,7 @@ def descend(
     if progress is not None:
         progress(start, found[-1])
     response, fresh = problem.response(knots), True
-    while len(found) <= iterations:
+    while len(found) <= iterations or (_off(problem, force) and len(found) <= 2 * iterations):
         before = merit(problem, force)
         model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
@@ -112,7 +115,7 @@ def descend(
         if progress is not None:
             progress(start, found[-1])
         gain = (before - merit(problem, force)) / before
-        if gain < ENOUGH and fresh:
+        if gain < ENOUGH and fresh and not _off(problem, force):
             break
         fresh = gain < WORTH
         if fresh:
@@ -123,6 +126,12 @@ def descend(
 def merit(problem: Problem, force: Array) -> float:
     """What may not grow (N): σ of a filtered force, (samples,), and the weighted error of its mean."""
     return float(force.std() + MEAN_WEIGHT * abs(force.mean() - problem.figures.mean))
+
+
+def _off(problem: Problem, force: Array) -> bool:
+    """Whether the mean of a filtered force, (samples,) (N), is not yet that of the passive run."""
+    wanted = problem.figures.mean
+    return abs(float(force.mean()) - wanted) > MEAN_TOLERANCE * wanted
 
 
 class Model(NamedTuple):
@@ -154,17 +163,15 @@ class Model(NamedTuple):
 
         Raises InputError where OSQP finds none.
         """
-        import osqp  # an extra
-
         now = limits.matrix @ knots
         matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
         square = self.square + damping * self.size * np.eye(len(self.square))
         scale = 1.0 / float(np.diag(square).max())
-        solver = osqp.OSQP()
+        solver = quadratic_solver()
         quadratic = csc_matrix(np.triu(scale * square))
         solver.setup(quadratic, scale * self.slope, matrix, limits.low - now, limits.high - now, **OSQP)
-        answer = solver.solve()
-        if not np.isfinite(answer.x).all():
+        answer = solver.solve(raise_error=False)
+        if answer.x is None or not np.isfinite(answer.x).all():
             raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
         return np.asarray(answer.x if self.basis is None else self.basis @ answer.x)
 
@@ -175,6 +182,17 @@ def corrected(response: Array, step: Array, change: Array) -> Array:
     Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
     """
     return np.asarray(response + np.outer(change - response @ step, step) / (step @ step))
+
+
+def quadratic_solver() -> Any:
+    """A solver of OSQP's. Raises InputError where OSQP, an extra, is not installed."""
+    try:
+        import osqp
+    except ImportError as error:
+        raise InputError(
+            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with the extra 'oracle'."
+        ) from error
+    return osqp.OSQP()
 
 
 def of_all_places(limits: Limits, places: int) -> Limits:
