@@ -156,7 +156,7 @@ class Programs:
             try:
                 import osqp
             except ImportError as error:
-                raise InputError("mpc needs osqp: install panto-env with its extra 'mpc'.") from error
+                raise InputError("mpc needs osqp: install panto-env with its extra 'control'.") from error
             limits = np.vstack([np.eye(HORIZON), np.eye(HORIZON) - np.eye(HORIZON, k=-1)])
             columns = np.arange(HORIZON)
             rows = np.concatenate([columns[: k + 1] for k in columns])
