@@ -3,8 +3,8 @@
 Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
 of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
 et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
-is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that there is
-nothing better.
+is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that
+there is nothing better.
 """
 
 from __future__ import annotations
@@ -190,7 +190,8 @@ def quadratic_solver() -> Any:
         import osqp
     except ImportError as error:
         raise InputError(
-            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with the extra 'oracle'."
+            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with its extra "
+            "'control'."
         ) from error
     return osqp.OSQP()
 
