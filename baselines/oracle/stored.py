@@ -26,6 +26,7 @@ MATTER = (
     "speed_kmh",
     "actuator",
     "line_condition",
+    "speed_drift",
     "mean_force",
     "run_in",
     "pantograph_scatter",
@@ -44,7 +45,15 @@ def fingerprint(given: Mapping[str, Any]) -> str:
 
     Raises InputError for a value that is not valid.
     """
-    plain = run_settings(given).model_dump(mode="json", include=set(MATTER), serialize_as_any=True)
+    settings = run_settings(given)
+    # Without defaults: a setting that is new in a later version, and off, changes no oracle. But a kind is one.
+    plain = settings.model_dump(
+        mode="json", include=set(MATTER), serialize_as_any=True, exclude_defaults=True
+    )
+    for name in ("catenary", "pantograph"):
+        for words in ("description", "sources"):
+            plain[name].pop(words, None)
+    plain["kinds"] = [settings.catenary.kind, settings.actuator.kind]
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
