@@ -53,7 +53,7 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     for name in ("catenary", "pantograph"):
         for words in ("description", "sources"):
             plain[name].pop(words, None)
-    plain["kinds"] = [settings.catenary.kind, settings.actuator.kind]
+    plain["kinds"] = [type(one).__name__ for one in (settings.catenary, settings.actuator)]
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
