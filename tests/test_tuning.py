@@ -76,6 +76,13 @@ def test_periodic_force_is_its_fourier_series_ahead_by_the_lead() -> None:
         assert policy.act(seen(angle=angle)[0])[0] == pytest.approx(expected / CONTEXT.force_limit, abs=1e-6)
 
 
+def test_without_the_place_within_the_span_there_is_no_series() -> None:
+    policy = Periodic(gains=[1.0] * 2 * HARMONICS)
+    policy.reset(CONTEXT)
+    with pytest.raises(InputError, match="needs the place within the span"):
+        policy.forces(seen(sine_of_span_position=0.0, cosine_of_span_position=0.0))
+
+
 def test_fitted_feedback_adds_past_signals_and_commands_to_the_series() -> None:
     gains = np.zeros(2 * HARMONICS + HISTORY * len(SIGNALS) + COMMANDS)
     gains[0] = 7.0  # of the first cosine

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 
 from .gains import Source, find_gains
@@ -52,9 +53,17 @@ class LanesLaw(ABC):
         return entry.centre + observations[:, place].astype(float) * entry.scale
 
     def span_angle(self, observations: Observations, lead: float = 0.0) -> Array:
-        """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on."""
+        """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on.
+
+        Raises InputError where the observation does not tell it: both sine and cosine are 0.
+        """
         sine = self.read(observations, "sine of span position")
         cosine = self.read(observations, "cosine of span position")
+        if (sine**2 + cosine**2 < 0.5).any():
+            raise InputError(
+                "It needs the place within the span, which these sensors do not tell; take skyhook or "
+                "h-infinity."
+            )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.span_length
         angle: Array = np.arctan2(sine, cosine) + ahead
         return angle

@@ -174,5 +174,7 @@ class Programs:
             )
         else:
             self._solver.update(Px=packed, q=slope, l=low, u=high)
-        best: Array = self._solver.solve().x
+        best: Array = self._solver.solve(raise_error=False).x
+        if not np.isfinite(best).all():
+            raise InputError("mpc's quadratic program was not solved; take a larger effort.")
         return best

@@ -47,8 +47,8 @@ def cost_function(force: Array, nominal_force: float, stride: float | Array) -> 
     drifts.
     """
     deviation = np.abs(force - nominal_force)
-    pairs = deviation[:-1] + deviation[1:]
-    return float(stride / 2 * pairs.sum() if np.ndim(stride) == 0 else np.sum(stride / 2 * pairs))
+    pairs, half = deviation[:-1] + deviation[1:], stride / 2
+    return float(half * pairs.sum() if np.ndim(stride) == 0 else np.sum(half * pairs))
 
 
 def contact_loss(force: Array) -> float:
