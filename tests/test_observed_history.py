@@ -27,7 +27,7 @@ def play(env, steps, seed=0):
 
 @pytest.mark.parametrize("name", [NAME, LIGHT])
 def test_harmonics_are_sines_and_cosines_of_the_place_in_the_span(name):
-    env = gymnasium.make(name, harmonics=14, run_in=0.0, speed_kmh=287.0).unwrapped
+    env = gymnasium.make(name, harmonics=14, run_in=0.0, speed_kmh=287.0, sensors="ideal").unwrapped
     seen, _ = play(env, 40)
     layout, turns = env.context.layout, np.arange(41) * 0.01 * 287 / 3.6 / env.context.span_length
     for k in range(1, 15):
