@@ -46,7 +46,7 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     Raises InputError for a value that is not valid.
     """
     settings = run_settings(given)
-    # Without defaults: a setting that is new in a later version, and off, changes no oracle. But a kind is one.
+    # Without defaults: a setting that is new in a later version, and off, changes no oracle; a kind does.
     plain = settings.model_dump(
         mode="json", include=set(MATTER), serialize_as_any=True, exclude_defaults=True
     )
