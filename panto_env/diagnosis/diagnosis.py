@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..base.arrays import Array
+from ..catalog import load_pantograph
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 from .features import Sort
 from .healthy import Healthy
 from .kinds import Answer, Classifier, trained
@@ -67,14 +70,17 @@ def diagnose(
     false_alarms: float = FALSE_ALARMS,
     classifier: Classifier | None = None,
     seed: int = 0,
+    pantograph: str | Path | PantographData | None = None,
 ) -> Diagnosis:
     """Hold one pass over a line, or the mean of several, against healthy passes over it at the same speed.
 
     false_alarms: per km of healthy line, by which the threshold is set. classifier: of the kinds, by default
-    the one that comes with the project. seed: of the noise of the estimated forces. Raises InputError where
-    passes are too few or too short, or cannot be compared.
+    the one that comes with the project. seed: of the noise of the sensors that forces are estimated from.
+    pantograph: of all passes, as the estimator knows it; by default that of the catalogue which each names.
+    Raises InputError where passes are too few or too short, cannot be compared, or cannot be a pantograph's.
     """
-    passes, reference = side_by_side(runs, healthy, seed)
+    known = None if pantograph is None else load_pantograph(pantograph)
+    passes, reference = side_by_side(runs, healthy, seed, known)
     return judge(passes, Healthy.of(reference), false_alarms, classifier)
 
 

@@ -13,6 +13,7 @@ from ..base.errors import InputError
 from ..metrics.low_pass import CUTOFF
 from ..metrics.spans import FIRST_SETTLED, last_whole_span
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 from .force import estimated_force
 
 STEP = 0.5
@@ -64,12 +65,15 @@ class Passes:
 
 
 def side_by_side(
-    runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed: int = 0
+    runs: Sequence[Trajectory],
+    healthy: Sequence[Trajectory],
+    seed: int = 0,
+    pantograph: PantographData | None = None,
 ) -> tuple[Passes, Passes]:
     """The runs to be judged, and the healthy ones, from the tenth span on: before, their start is felt.
 
-    seed: of the noise of the estimates. Raises InputError where they are too few or too short, are not of one
-    line and speed, hold what is no number, or one stands there twice.
+    seed: of the sensors' noise; pantograph: as ``estimated_force`` takes it. Raises InputError where runs are
+    too few or too short, are not of one line and speed, cannot be a pantograph's, or one stands there twice.
     """
     if len(healthy) < FEWEST:
         raise InputError(
@@ -78,12 +82,13 @@ def side_by_side(
         )
     everything = [*runs, *healthy]
     for run in everything:
-        _check(run)
+        if run.terminated:
+            raise InputError(f"{run.ending} A run that ended early cannot be judged.")
     first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))
     for run in everything:
         _check_alike(run, first, speed)
     for k, run in enumerate(everything):
-        if any(np.array_equal(run.contact_force, other.contact_force) for other in everything[:k]):
+        if any(np.array_equal(run.head, other.head) for other in everything[:k]):
             raise InputError("One run stands there twice, which says nothing new; give each once.")
     span = first.span_length
     last = min(last_whole_span(run.distance - END, span) for run in everything)
@@ -96,8 +101,11 @@ def side_by_side(
     per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)
     step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
     places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
-    random = np.random.default_rng(seed)
-    force = np.array([np.interp(places, run.position, estimated_force(run, random)) for run in everything])
+    seeds = np.random.default_rng(seed).integers(2**63, size=len(everything)).tolist()
+    forces = [estimated_force(*each, pantograph) for each in zip(everything, seeds, strict=True)]
+    force = np.array(
+        [np.interp(places, run.position, each) for run, each in zip(everything, forces, strict=True)]
+    )
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
     if not len(droppers):
         raise InputError(
@@ -105,14 +113,6 @@ def side_by_side(
         )
     facts = (start, step, per_span, droppers, first.catenary, speed / 3.6, first.line.wave_speed)
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
-
-
-def _check(run: Trajectory) -> None:
-    """Raise InputError for a run that can't be judged by itself."""
-    if run.terminated:
-        raise InputError(f"{run.ending} A run that ended early cannot be judged.")
-    if not (np.isfinite(run.contact_force).all() and np.isfinite(run.position).all()):
-        raise InputError("The contact force or the position of a run is no number somewhere; leave it out.")
 
 
 def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:
