@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
-from panto_env.diagnosis import diagnose, estimated_force
+from panto_env.diagnosis import diagnose
 from panto_env.diagnosis.cases import BROKEN, TENSION, Defect, Track, draw_defect, drive
 from panto_env.diagnosis.diagnosis import judge
 from panto_env.diagnosis.features import OFFSETS, Sort, candidates, features
@@ -21,7 +21,6 @@ from panto_env.diagnosis.passes import Passes, side_by_side
 from panto_env.diagnosis.places import Evidence, regions
 from panto_env.diagnosis.threshold import threshold
 from panto_env.diagnosis.training import NEAR, examples, fit, save
-from panto_env.metrics.low_pass import low_pass_in_place
 from panto_env.studies.paper2.diagnosis_cases import within_interval
 from panto_env.terminal import console
 
@@ -42,16 +41,6 @@ def made_up(count, random, spans=SPANS):
 @pytest.fixture(scope="module")
 def learned():
     return Healthy.of(made_up(10, np.random.default_rng(1)))
-
-
-def test_estimate_is_the_force_to_20_hz_with_noise_in_the_same_band():
-    run = simulate(distance=600.0, spans=20)
-    estimate = estimated_force(run, np.random.default_rng(0))
-    noise = estimate - low_pass_in_place(run.contact_force, run.time_step)
-    assert noise.std() == pytest.approx(3.0, rel=0.1)
-    power, frequency = np.abs(np.fft.rfft(noise)) ** 2, np.fft.rfftfreq(len(noise), run.time_step)
-    assert power[frequency > 22].sum() < 0.01 * power.sum()
-    assert not np.array_equal(estimate, estimated_force(run, np.random.default_rng(1)))
 
 
 def test_patterns_of_passes_are_taken_out_and_the_rest_is_as_large_as_it_was_made(learned):
@@ -256,9 +245,6 @@ def test_runs_that_say_too_little_are_refused(healthy_runs):
         diagnose(healthy_runs[:1], healthy_runs[1:3])
     with pytest.raises(InputError, match="One run stands there twice"):
         diagnose(healthy_runs[:1], healthy_runs[:4])
-    broken = replace(healthy_runs[0], contact_force=np.full_like(healthy_runs[0].contact_force, np.nan))
-    with pytest.raises(InputError, match="no number somewhere; leave it out"):
-        diagnose([broken], healthy_runs[1:])
     short = simulate(TRACK.catenary, "dsa250", 220.0, distance=600.0, spans=20)
     with pytest.raises(
         InputError, match=r"ends at 600.1 m, but a run's start is felt up to span 9, .* 610 m"

@@ -19,14 +19,14 @@ from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 
 RATE = 500.0
-"""Samples of a sensor per second, own choice: as many as a fast simulation has; 20 Hz is what is looked at."""
+"""Samples of a sensor per second, own choice: as many as a fast simulation has, to look at 20 Hz."""
 ESTIMATOR = EstimatorSettings(observation="displacements", gain="steady", lag=0.1)
 """Displacements are what is cheap to measure, and a diagnosis can wait. The gain is steady because the first
 spans, where it would learn, are not judged."""
 FEWEST = 20
 """Samples below which a record has no time step to speak of."""
-DRIFT = 0.01
-"""Relative difference up to which positions go at the run's speed."""
+EVEN = 0.01
+"""Relative difference up to which clock and positions are as a run states."""
 
 
 def known_pantograph(run: Trajectory) -> PantographData:
@@ -39,53 +39,56 @@ def known_pantograph(run: Trajectory) -> PantographData:
         return load_pantograph(name)
     except InputError as error:
         raise InputError(
-            f"A run's pantograph '{name}' is not in the catalogue, and without its masses and springs no "
-            "force can be estimated; give its TOML file with --pantograph."
+            f"Its pantograph '{name}' is not in the catalogue, and without its masses and springs no force "
+            "can be estimated; give its TOML file with --pantograph."
         ) from error
 
 
-def check_record(run: Trajectory, pantograph: PantographData) -> None:
-    """Raise InputError for a run of whose motion no force can be estimated, with the likely mistake.
-
-    Its samples are looked at before noise is added: noise would hide that a sensor stands still.
-    """
+def check_clock(run: Trajectory) -> None:
+    """Raise InputError unless time and position go in equal steps, as large as the run states."""
     step = equal_step(run.time, FEWEST, "to estimate a force")
+    if not abs(step / run.time_step - 1) <= EVEN:
+        raise InputError(
+            f"Samples are {step:.4g} s apart, not {run.time_step:.4g} s as the run states: is its time in s?"
+        )
     if not np.isfinite(run.position).all():
-        raise InputError("The position of a run is no number somewhere; leave it out.")
-    stride = run.speed_kmh / 3.6 * step
-    if np.abs(np.diff(run.position) / stride - 1).max() > DRIFT:
+        raise InputError("Its position is no number somewhere; leave the run out.")
+    if not np.abs(np.diff(run.position) / run.stride - 1).max() <= EVEN:
         mean = float(np.ptp(run.position) / np.ptp(run.time)) * 3.6
         raise InputError(
-            f"A run's positions go at {mean:.4g} km/h in the mean, and not evenly at the {run.speed_kmh:.4g} "
-            "km/h that it states; leave it out."
+            f"Its positions go at {mean:.4g} km/h in the mean, not evenly at the {run.speed_kmh:.4g} km/h "
+            "that it states; leave the run out."
         )
-    check_motion(
-        Motion(
-            time_step=step,
-            head=run.head,
-            frame=run.frame,
-            head_velocity=None,
-            frame_velocity=None,
-            frame_force=run.frame_force,
-            head_force=run.head_force,
-            lift=run.nominal_force,
-            speed=run.speed_kmh / 3.6,
-            span_length=run.span_length,
-            start=float(run.time[0]),
-        ),
-        pantograph,
-    )
 
 
 def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | None = None) -> Array:
     """Contact force (N), (n,), of a run's samples, to 20 Hz, as a smoother on the train estimates it.
 
     Sensors show displacements of head and frame with the noise of ``measure``. seed: of that; pantograph: as
-    the estimator knows it, by default that of the catalogue which the run names. Raises InputError where no
-    force can be estimated.
+    the estimator knows it, by default that of the catalogue which the run names. Raises InputError, with the
+    likely mistake, where no force can be estimated.
     """
     known = known_pantograph(run) if pantograph is None else pantograph
-    check_record(run, known)
-    motion = replace(measure(run, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
+    check_motion(_as_recorded(run), known)  # before there is noise, which would hide a dead sensor
+    none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
+    seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
+    motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
     force = estimate(motion, known, ESTIMATOR).force
     return low_pass_in_place(np.interp(run.time, motion.time, force), run.time_step)
+
+
+def _as_recorded(run: Trajectory) -> Motion:
+    """A run's own samples, of displacements alone."""
+    return Motion(
+        time_step=run.time_step,
+        head=run.head,
+        frame=run.frame,
+        head_velocity=None,
+        frame_velocity=None,
+        frame_force=run.frame_force,
+        head_force=run.head_force,
+        lift=run.nominal_force,
+        speed=run.speed_kmh / 3.6,
+        span_length=run.span_length,
+        start=float(run.time[0]),
+    )

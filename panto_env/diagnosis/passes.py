@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..metrics.low_pass import CUTOFF
 from ..metrics.spans import FIRST_SETTLED, last_whole_span
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
-from .force import estimated_force
+from .force import check_clock, estimated_force
 
 STEP = 0.5
 """Distance of the places at which forces are looked at (m), at most."""
@@ -81,9 +82,13 @@ def side_by_side(
             "give more with --healthy."
         )
     everything = [*runs, *healthy]
-    for run in everything:
+    names = [f"Run {k + 1}" for k in range(len(runs))]
+    names += [f"Healthy run {k + 1}" for k in range(len(healthy))]
+    for name, run in zip(names, everything, strict=True):
         if run.terminated:
             raise InputError(f"{run.ending} A run that ended early cannot be judged.")
+        with _named(name):
+            check_clock(run)
     first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))
     for run in everything:
         _check_alike(run, first, speed)
@@ -101,11 +106,12 @@ def side_by_side(
     per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)
     step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
     places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
-    seeds = np.random.default_rng(seed).integers(2**63, size=len(everything)).tolist()
-    forces = [estimated_force(*each, pantograph) for each in zip(everything, seeds, strict=True)]
-    force = np.array(
-        [np.interp(places, run.position, each) for run, each in zip(everything, forces, strict=True)]
-    )
+    force = np.zeros((len(everything), len(places)))
+    random = np.random.default_rng(seed)
+    for own, name, run in zip(force, names, everything, strict=True):
+        with _named(name):
+            estimate = estimated_force(run, int(random.integers(2**63)), pantograph)
+        own[:] = np.interp(places, run.position, estimate)
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
     if not len(droppers):
         raise InputError(
@@ -113,6 +119,15 @@ def side_by_side(
         )
     facts = (start, step, per_span, droppers, first.catenary, speed / 3.6, first.line.wave_speed)
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
+
+
+@contextmanager
+def _named(run: str) -> Iterator[None]:
+    """Say which run it is that an InputError is about."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{run}: {error}") from error
 
 
 def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:

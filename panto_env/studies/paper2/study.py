@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from ..study import Outcome, Report
-from . import closed_loop, estimated_force, head_motors, rig
+from . import closed_loop, diagnosis, estimated_force, head_motors, rig
 
-PARTS = (rig, estimated_force, head_motors, closed_loop)
+PARTS = (rig, estimated_force, diagnosis, head_motors, closed_loop)
 
 
 def run(report: Report) -> Outcome:
