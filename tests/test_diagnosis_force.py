@@ -11,6 +11,9 @@ from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose, estimated_force
 from panto_env.diagnosis.cases import Track, drive
+from panto_env.diagnosis.force import ESTIMATOR, RATE
+from panto_env.estimation.estimate import estimate
+from panto_env.estimation.motion import measure
 from panto_env.metrics.low_pass import low_pass_in_place
 
 TRACK = Track("en50318-2002", "dsa250", 220.0, seed=32)
@@ -51,6 +54,16 @@ def test_displacements_and_forces_are_all_that_is_looked_at(runs):
     none = np.full(len(runs[0].time), np.nan)
     blind = replace(runs[0], head_velocity=none, frame_velocity=none, contact_force=none, wire=none)
     assert np.array_equal(estimated_force(runs[0], 0), estimated_force(blind, 0))
+
+
+def test_it_is_the_estimator_s_own(runs):
+    """Step by step what ``estimate`` gives of the same motion, less what that thinks of it."""
+    none = np.zeros(len(runs[0].time))
+    blind = replace(runs[0], head_velocity=none, frame_velocity=none)
+    motion = replace(measure(blind, rate=RATE, seed=5), head_velocity=None, frame_velocity=None)
+    force = estimate(motion, load_pantograph("dsa250"), ESTIMATOR).force
+    expected = low_pass_in_place(np.interp(runs[0].time, motion.time, force), runs[0].time_step)
+    assert np.array_equal(estimated_force(runs[0], 5), expected)
 
 
 def with_value(run, name, place, value):

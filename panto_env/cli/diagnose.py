@@ -22,7 +22,7 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             metavar="RUN...",
-            help="Healthy runs over the same line at the same speed, three or more; better six or more.",
+            help="Healthy runs over the same line at the same speed, three or more; better ten or more.",
         ),
     ] = None,
     again: Annotated[

@@ -10,10 +10,11 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from ..catalog import load_pantograph
-from ..estimation.estimate import estimate
+from ..estimation.estimate import filter_motion, gains_of, model_of
 from ..estimation.motion import Motion, measure
 from ..estimation.plausibility import check_motion
 from ..estimation.settings import EstimatorSettings
+from ..estimation.smoother import smooth_force
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
@@ -73,7 +74,9 @@ def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | Non
     none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
     seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
     motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
-    force = estimate(motion, known, ESTIMATOR).force
+    model = model_of(motion, known, ESTIMATOR)
+    filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
+    force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
     return low_pass_in_place(np.interp(run.time, motion.time, force), run.time_step)
 
 
