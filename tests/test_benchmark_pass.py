@@ -58,7 +58,7 @@ def test_rate_of_action_is_that_of_the_possible_commands_within_the_spans():
     given = settings(
         actuator={"place": "both", "force_limit": 50.0}, line_condition="new", control_interval=INTERVAL
     )
-    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0)
+    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0).row
     asked = 50.0 * np.clip(np.random.default_rng(0).normal(0, 1, (200, 2)), -1, 1)
     # A span of 50 m takes 0.6 s, 30 commands: those of spans 2 and 3 are the 31st to the 90th.
     changes = np.diff(asked[30:90], axis=0) / INTERVAL
@@ -76,14 +76,14 @@ def test_a_pass_that_ends_early_has_no_figures():
             return -np.ones(1)
 
     given = settings(actuator={"force_limit": 1000.0}, line_condition="new")
-    row = run_pass(given, LINE, (2, 3), Down(), SPEED_KMH, seed=0)
+    row = run_pass(given, LINE, (2, 3), Down(), SPEED_KMH, seed=0).row
     assert row.terminated
     assert np.isnan([*row.figures.as_dict().values(), row.action_rate, row.power, row.pressed_std]).all()
 
 
 def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
     given = settings(line_condition="new")
-    row = run_pass(given, LINE, (2, 3), "p:gain=0.5", SPEED_KMH, seed=0)
+    row = run_pass(given, LINE, (2, 3), "p:gain=0.5", SPEED_KMH, seed=0).row
     arguments = {"distance": 160.0, "line_condition": "new", "control_interval": 0.01}
     passive = simulate(LINE.catenary, LINE.pantograph, SPEED_KMH, **arguments)
     force = load_pantograph(LINE.pantograph).static_force
@@ -99,13 +99,13 @@ def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
     expected = np.interp(row.figures.mean, [one.mean for one in pressed], [one.std for one in pressed])
     assert row.pressed_std == pytest.approx(expected, rel=0.01)
     assert row.pressed_std != pytest.approx(passive.summary((2, 3)).std, rel=1e-3)
-    own = run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0)
+    own = run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0).row
     assert (own.pressed_std, own.pressed_cost_function) == (own.figures.std, own.figures.cost_function)
 
 
 def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
     given = settings(actuator={"force_limit": 50.0}, line_condition="new", control_interval=INTERVAL)
-    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0)
+    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0).row
     plan = np.random.default_rng(0).normal(0, 1, (200, 1))
     assert row.saturation == pytest.approx(np.mean(np.abs(plan[30:90]) > 0.999))
     run, _ = drive(given, LINE, Shouting(), SPEED_KMH, seed=0)

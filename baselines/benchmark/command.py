@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from panto_env.analysis.options import with_settings
+from panto_env.base.files import PAGES
 from panto_env.terminal import Json, Plot, counting, print_json, writable
 
 from .run import SUFFIXES, run
@@ -41,6 +42,10 @@ def benchmark(
         ),
     ] = None,
     plot: Plot = None,
+    html: Annotated[
+        str | None,
+        typer.Option(help="Page to write, as `panto report` does.", callback=writable(PAGES)),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Compare policies on the same lines, at the same speeds, under the same seeds.
@@ -52,6 +57,8 @@ def benchmark(
 
     from panto_env.analysis.plots import save
 
+    from ..report.page import save as save_page
+    from ..report.result import parse_result
     from .plot import plot as draw
     from .report import WIDTH, tables
 
@@ -69,6 +76,8 @@ def benchmark(
         outcome.save(output)
     if plot is not None:
         save(draw(outcome), plot)
+    if html is not None:
+        save_page([parse_result(outcome.as_dict(), "the outcome")], html)
     if json:
         print_json(outcome.as_dict())
         return

@@ -23,6 +23,7 @@ from .overall import Standing, standings
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
 from .statistics import Cell, compare
+from .trace import Trace
 
 SUFFIXES = (".json", *TABLES)
 """Of the file that an outcome is saved to."""
@@ -37,6 +38,7 @@ class Benchmark:
     rows: tuple[Row, ...]  # one per pass, in the order of lines, speeds, policies and seeds
     cells: tuple[Cell, ...]  # one per policy, line and speed
     standings: tuple[Standing, ...]  # one per policy that runs on every line
+    traces: tuple[Trace, ...]  # of the first seed's passes, but for those that ended early
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, ready for JSON: nan becomes None."""
@@ -48,6 +50,7 @@ class Benchmark:
                 "standings": [asdict(each) for each in self.standings],
                 "cells": [asdict(cell) for cell in self.cells],
                 "rows": [row.as_dict() for row in self.rows],
+                "traces": [asdict(each) for each in self.traces],
             }
         )
         return table
@@ -75,24 +78,26 @@ def run(
     workers = cores() if workers is None else workers
     if workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
-    passes = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
-    check_passes(passes * len(settings.seeds), "This benchmark")
+    count = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
+    check_passes(count * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy_of(policy))
     spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
     jobs = [
-        partial(run_pass, settings, line, covered, policy, speed, seed)
+        partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == settings.seeds[0])
         for line, covered in zip(settings.lines, spans, strict=True)
         for speed in line.speeds_kmh
         for policy in settings.policies_on(line)
         for seed in settings.seeds
     ]
     if workers == 1:
-        rows = one_by_one(jobs, progress=progress)
+        passes = one_by_one(jobs, progress=progress)
     else:
-        rows = in_processes(jobs, workers=workers, progress=progress)
+        passes = in_processes(jobs, workers=workers, progress=progress)
+    rows = tuple(each.row for each in passes)
+    traces = tuple(each.trace for each in passes if each.trace is not None)
     cells = compare(rows)
-    return Benchmark(settings, spans, tuple(rows), cells, standings(rows, cells))
+    return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
 
 
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

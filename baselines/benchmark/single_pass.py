@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from panto_env.policies import Policy, find_policy, wishes
 from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
 from .pressed import NONE, Pressed, power, pressed_passive
 from .settings import REFERENCE, BenchmarkSettings, Line
+from .trace import Trace, trace
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,13 @@ class Row:
         return first | self.figures.as_dict() | last
 
 
+class Pass(NamedTuple):
+    """What is kept of one pass."""
+
+    row: Row
+    trace: Trace | None  # None where none was asked for, or the pass ended early
+
+
 def run_pass(
     settings: BenchmarkSettings,
     line: Line,
@@ -60,8 +68,12 @@ def run_pass(
     policy: str,
     speed_kmh: float,
     seed: int,
-) -> Row:
+    *,
+    traced: bool = False,
+) -> Pass:
     """Run one pass; its figures cover ``spans``, first and last, counted from 1.
+
+    traced: whether what a page draws of it is kept too.
 
     Raises InputError, naming the policy, if the policy fails.
     """
@@ -81,7 +93,7 @@ def run_pass(
             pressed = pressed_passive(run, spans, arguments)
         else:
             pressed = Pressed(figures.std, figures.cost_function)
-    return Row(
+    row = Row(
         policy=policy,
         catenary=line.catenary,
         pantograph=line.pantograph,
@@ -96,6 +108,8 @@ def run_pass(
         pressed_std=pressed.std,
         pressed_cost_function=pressed.cost_function,
     )
+    kept = traced and not run.terminated
+    return Pass(row, trace(run, spans, policy, line) if kept else None)
 
 
 def drive(

@@ -41,6 +41,8 @@ TABLES = (".csv", ".parquet")
 """Suffixes of files that hold rows."""
 PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of files that a plot can be written to."""
+PAGES = (".html",)
+"""Suffixes of files that a page can be written to."""
 
 
 def check_output(path: str | Path, suffixes: Sequence[str]) -> None:

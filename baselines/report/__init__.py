@@ -1,0 +1,1 @@
+"""Pages of HTML from results that have been written to files."""

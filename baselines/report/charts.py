@@ -1,0 +1,156 @@
+"""Where everything in a chart lies. Templates write it as SVG, so that nothing here is markup."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+WIDTH, HEIGHT = 420.0, 230.0
+LEFT, RIGHT, TOP, BOTTOM = 44.0, 8.0, 10.0, 38.0
+"""Of a chart and the margins about its axes, in units of its view box."""
+TICKS = 5
+LETTER, LINE = 6.0, 12.0
+"""About the width and height of a label's letters."""
+
+
+class Tick(NamedTuple):
+    """A mark of an axis."""
+
+    at: float
+    text: str
+
+
+class Curve(NamedTuple):
+    """One policy's line, as the points of a polyline."""
+
+    policy: str
+    points: str
+
+
+class Dot(NamedTuple):
+    """One policy's point, with the label beside it, "" where there is no room."""
+
+    policy: str
+    x: float
+    y: float
+    label: str
+    before: bool  # whether the label stands before the point, not behind
+    hollow: bool  # disqualified
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart in units of its view box."""
+
+    title: str
+    x_label: str
+    y_label: str
+    x_ticks: list[Tick]
+    y_ticks: list[Tick]
+    curves: list[Curve]
+    dots: list[Dot]
+    supports: list[float]  # x of vertical lines
+    level: float | None  # y of a dotted line
+
+
+class Scale(NamedTuple):
+    """From a quantity to a place along an axis."""
+
+    lowest: float
+    highest: float
+    begin: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        share = (value - self.lowest) / (self.highest - self.lowest)
+        return round(self.begin + share * (self.end - self.begin), 1)
+
+
+class Line(NamedTuple):
+    """What a policy's curve is drawn from."""
+
+    policy: str
+    x: Sequence[float]
+    y: Sequence[float]
+
+
+class Point(NamedTuple):
+    """What a policy's dot is drawn from."""
+
+    policy: str
+    x: float
+    y: float
+    hollow: bool
+
+
+def curves(
+    title: str,
+    labels: tuple[str, str],
+    lines: Sequence[Line],
+    *,
+    supports: Sequence[float] = (),
+    level: float | None = None,
+    from_zero: bool = False,
+) -> Chart:
+    """A chart of lines over the same range, of at least one; labels: of x and y, with units."""
+    x = Scale(min(min(line.x) for line in lines), max(max(line.x) for line in lines), LEFT, WIDTH - RIGHT)
+    values = [value for line in lines for value in line.y]
+    values += [0.0] * from_zero + ([] if level is None else [level])
+    y_ticks, y = _axis(min(values), max(values), HEIGHT - BOTTOM, TOP)
+    drawn = [
+        Curve(line.policy, " ".join(f"{x(a):g},{y(b):g}" for a, b in zip(line.x, line.y, strict=True)))
+        for line in lines
+    ]
+    ticks = [Tick(x(value), f"{value:g}") for value in _nice(x.lowest, x.highest) if value <= x.highest]
+    return Chart(
+        title=title,
+        x_label=labels[0],
+        y_label=labels[1],
+        x_ticks=[tick for tick in ticks if tick.at >= LEFT],
+        y_ticks=y_ticks,
+        curves=drawn,
+        dots=[],
+        supports=[x(each) for each in supports],
+        level=None if level is None else y(level),
+    )
+
+
+def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart | None:
+    """A chart of one point per policy, labelled where there is room; None where no point is a number."""
+    known = [point for point in points if math.isfinite(point.x) and math.isfinite(point.y)]
+    if not known:
+        return None
+    x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
+    y_ticks, y = _axis(
+        min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP
+    )
+    taken: list[tuple[float, float, float]] = []
+    drawn = []
+    for policy, across, up, hollow in known:
+        at, height, width = x(across), y(up), LETTER * len(policy)
+        before = at + 6 + width > WIDTH
+        begin = at - 6 - width if before else at + 6
+        room = begin >= LEFT and not any(
+            abs(height - other) < LINE and begin < right and begin + width > left
+            for left, right, other in taken
+        )
+        if room:
+            taken.append((begin, begin + width, height))
+        drawn.append(Dot(policy, at, height, policy if room else "", before, hollow))
+    return Chart(title, *labels, x_ticks, y_ticks, [], drawn, [], None)
+
+
+def _axis(lowest: float, highest: float, begin: float, end: float) -> tuple[list[Tick], Scale]:
+    """Ticks at round values that enclose a range, and the axis from the first of them to the last."""
+    values = _nice(lowest, highest)
+    scale = Scale(values[0], values[-1], begin, end)
+    return [Tick(scale(value), f"{value:g}") for value in values], scale
+
+
+def _nice(lowest: float, highest: float) -> list[float]:
+    from matplotlib.ticker import MaxNLocator  # slow to import
+
+    values = MaxNLocator(TICKS, steps=[1, 2, 2.5, 5, 10]).tick_values(lowest, highest)
+    return [round(float(value), 10) for value in values]

@@ -1,0 +1,50 @@
+"""One page of HTML that needs nothing beside itself, the same bytes for the same results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from panto_env.base.files import PAGES, check_output, write_whole
+
+from ..benchmark.report import LEGEND
+from .charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH
+from .result import Result
+from .tables import BAR
+from .track import track
+
+
+def page(results: Sequence[Result]) -> str:
+    """The page of one track or several.
+
+    Everything that comes from a result is escaped, a policy's name too: a result may be anyone's.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    environment = Environment(
+        loader=PackageLoader("panto_baselines.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("page.html.jinja").render(
+        tracks=[track(result) for result in results],
+        legend=LEGEND,
+        box={
+            "width": WIDTH,
+            "height": HEIGHT,
+            "left": LEFT,
+            "right": WIDTH - RIGHT,
+            "top": TOP,
+            "bottom": HEIGHT - BOTTOM,
+        },
+        bar=BAR,
+    )
+
+
+def save(results: Sequence[Result], path: str | Path) -> None:
+    """Write the page, whole or not at all. Raises InputError for a name that is not a page's."""
+    check_output(path, PAGES)
+    with write_whole(path) as temporary:
+        temporary.write_text(page(results), encoding="utf-8")

@@ -1,0 +1,161 @@
+"""Results of `panto benchmark` as its JSON holds them, read back: whatever else a file says is refused."""
+
+from __future__ import annotations
+
+import json
+from math import isfinite, nan
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from panto_env.base.errors import InputError
+
+Number = Annotated[
+    float,
+    BeforeValidator(lambda value: nan if value is None else value),
+    AfterValidator(lambda value: value if isfinite(value) else nan),
+]
+"""A figure; what is none, null in JSON, is nan."""
+Series = Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
+Interval = tuple[FiniteFloat, FiniteFloat] | None
+
+
+class Place(NamedTuple):
+    """A line, the pantograph on it, and its speed (km/h)."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+
+
+class Part(BaseModel):
+    """A table of the file, whose other keys a page has no use for."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class AtPlace(Part):
+    """What belongs to one policy on one line at one speed."""
+
+    policy: str
+    catenary: str
+    pantograph: str
+    speed_kmh: FiniteFloat
+
+    @property
+    def place(self) -> Place:
+        """Where it belongs."""
+        return Place(self.catenary, self.pantograph, self.speed_kmh)
+
+
+class Cell(AtPlace):
+    """As ``benchmark.statistics.Cell``."""
+
+    seeds: int
+    nominal_force: FiniteFloat
+    figures: dict[str, Number]
+    change: Number
+    interval: Interval
+    cost_change: Number
+    mean_change: Number
+    improved: Number
+    disqualified: str
+    rank: int | None
+    oracle_share: float | None = None  # of what an oracle gains; None where no oracle was run
+
+
+class Trace(AtPlace):
+    """As ``benchmark.trace.Trace``."""
+
+    seed: int
+    position: Series
+    force: Series
+    frequency: Series
+    amplitude: Series
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Self:
+        for along, values in ((self.position, self.force), (self.frequency, self.amplitude)):
+            if len(along) != len(values) or not along[0] < along[-1]:
+                raise ValueError("must have as many values as places, which rise")
+        return self
+
+
+class Standing(Part):
+    """As ``benchmark.overall.Standing``."""
+
+    policy: str
+    change: Number
+    interval: Interval
+    worst: Number
+    worst_at: str
+    improved: Number
+    effort: Number
+    power: Number
+    saturation: Number
+    better_than: dict[str, Number]
+    disqualified: str
+    rank: int | None
+    oracle_share: float | None = None
+
+
+class Result(Part):
+    """One track: everything that a page shows of it."""
+
+    version: str
+    settings: dict[str, Any]
+    spans: tuple[tuple[int, int], ...]
+    standings: tuple[Standing, ...]
+    cells: tuple[Cell, ...]
+    traces: tuple[Trace, ...] = ()  # none in files of before they were kept
+
+    @property
+    def title(self) -> str:
+        """What the benchmark's settings call it."""
+        return str(self.settings.get("title", "benchmark"))
+
+    @property
+    def policies(self) -> list[str]:
+        """All that ran, in the order of the settings."""
+        return list(dict.fromkeys(cell.policy for cell in self.cells))
+
+    @property
+    def places(self) -> list[Place]:
+        """Lines and speeds, in the order of the settings."""
+        return list(dict.fromkeys(cell.place for cell in self.cells))
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
+            raise ValueError("must have cells, and spans of each of their lines")
+        if not {one.policy for one in (*self.standings, *self.traces)} <= set(self.policies):
+            raise ValueError("must have a cell of every policy")
+        return self
+
+
+def read_result(path: str | Path) -> Result:
+    """The result in a JSON file. Raises InputError, in one sentence, where it holds none."""
+    try:
+        table = json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
+    except OSError as error:
+        raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
+    except (ValueError, RecursionError) as error:  # no UTF-8, no JSON, or nested without end
+        raise InputError(
+            f"{path} is not JSON; give what `panto benchmark --output RESULT.json` wrote."
+        ) from error
+    return parse_result(table, str(path))
+
+
+def parse_result(table: Any, name: str) -> Result:
+    """The result in plain data, called ``name`` in the InputError that is raised where it holds none."""
+    try:
+        return Result.model_validate(table)
+    except ValidationError as error:
+        place = ".".join(map(str, error.errors()[0]["loc"]))
+        where = f"'{place}' is missing or wrong" if place else "its parts do not fit together"
+        raise InputError(
+            f"{name} is no result of `panto benchmark --output RESULT.json`: {where}; run the benchmark anew."
+        ) from error

@@ -1,0 +1,177 @@
+"""Tables of a page, as what their cells say and how they sort: the leaderboard, and one per line and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Generic, NamedTuple, TypeVar
+
+from panto_env.metrics.labels import LABELS
+from panto_env.terminal import number
+
+from ..benchmark.report import FIGURES, OWN_LABELS
+from .charts import Scale
+from .result import Cell, Result, Standing
+
+BAR = 96.0
+"""Width of the picture of an interval, in units of its view box."""
+R = TypeVar("R", Standing, Cell)
+
+
+class Bar(NamedTuple):
+    """A change and its interval, as places along a picture ``BAR`` wide; no interval: low = high."""
+
+    zero: float
+    low: float
+    high: float
+    at: float
+
+
+class Entry(NamedTuple):
+    """One cell of a table."""
+
+    text: str
+    key: str = ""  # what it sorts by: a number, or a text; "" comes last
+    note: str = ""
+    bar: Bar | None = None
+
+
+class Column(NamedTuple, Generic[R]):
+    """One column: its heading, and what it says of a row."""
+
+    heading: str
+    entry: Callable[[R], Entry]
+
+
+class Row(NamedTuple):
+    """One policy's row."""
+
+    policy: str
+    disqualified: str
+    best: bool
+    entries: list[Entry]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that sorts; its second column is the policy, the heading of a row."""
+
+    caption: str
+    headings: list[str]
+    rows: list[Row]
+
+
+def leaderboard(result: Result) -> Table:
+    """All policies that ran everywhere, over all lines, speeds and seeds."""
+    moved = {
+        policy: max(_of(result, policy), key=lambda cell: _size(cell.mean_change))
+        for policy in result.policies
+    }
+    columns: list[Column[Standing]] = [
+        *_first_columns(result.standings),
+        Column("worst cell, Δσ (%)", lambda one: _figure(one.worst, 1, f"at {one.worst_at}")),
+        Column("passes improved", lambda one: _share(one.improved)),
+        Column("effort (N)", lambda one: _figure(one.effort, 1)),
+        Column("power (W)", lambda one: _figure(one.power, 1)),
+        Column("at limit", lambda one: _share(one.saturation)),
+        Column("largest ΔF_m (%)", lambda one: _signed(moved[one.policy].mean_change, 1)),
+    ]
+    return _table("All lines, speeds and seeds", columns, result.standings)
+
+
+def table_of_cells(cells: Sequence[Cell], caption: str) -> Table:
+    """All policies on one line at one speed."""
+    columns: list[Column[Cell]] = [
+        *_first_columns(cells),
+        Column("passes improved", lambda one: _share(one.improved)),
+        Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
+        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
+        *(_of_figure(name, decimals) for name, decimals in FIGURES.items()),
+    ]
+    return _table(caption, columns, cells)
+
+
+def _first_columns(rows: Sequence[R]) -> list[Column[R]]:
+    """Rank, policy, what is ranked, and the share of the oracle's gain where there was an oracle."""
+    scale = _scale(rows)
+    columns: list[Column[R]] = [
+        Column("rank", lambda one: Entry("–") if one.rank is None else Entry(str(one.rank), str(one.rank))),
+        Column("policy", lambda one: Entry(one.policy, one.policy)),
+        Column("Δσ (%)", lambda one: _change(one, scale)),
+    ]
+    if any(one.oracle_share is not None for one in rows):
+        columns.append(Column("of the oracle's gain", lambda one: _share(one.oracle_share)))
+    return columns
+
+
+def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Table:
+    """By rank, the best first; those disqualified at the end, in the order of the file."""
+    ranked = sorted(rows, key=lambda one: (one.rank is None, one.rank or 0))
+    return Table(
+        caption=caption,
+        headings=[column.heading for column in columns],
+        rows=[
+            Row(one.policy, one.disqualified, one.rank == 1, [column.entry(one) for column in columns])
+            for one in ranked
+        ],
+    )
+
+
+def _of(result: Result, policy: str) -> list[Cell]:
+    return [cell for cell in result.cells if cell.policy == policy]
+
+
+def _size(value: float) -> float:
+    return abs(value) if isfinite(value) else 0.0
+
+
+def _of_figure(name: str, decimals: int) -> Column[Cell]:
+    label = (LABELS | OWN_LABELS)[name]
+    return Column(
+        label.short_heading.removesuffix(" (-)"),
+        lambda cell: _figure(label.scale * cell.figures.get(name, nan), decimals),
+    )
+
+
+def _figure(value: float, decimals: int, note: str = "") -> Entry:
+    return Entry(number(value, decimals), _key(value), note)
+
+
+def _signed(value: float, decimals: int) -> Entry:
+    return Entry(signed(value, decimals), _key(value))
+
+
+def signed(value: float, decimals: int) -> str:
+    """A change with its sign, which one that is rounded to nothing has not; a dash where there is none."""
+    if not isfinite(value):
+        return "–"
+    text = f"{value:+.{decimals}f}"
+    return text[1:] if float(text) == 0 else text
+
+
+def _share(value: float | None) -> Entry:
+    if value is None or not isfinite(value):
+        return Entry("–")
+    return Entry(f"{100 * value:.0f} %", _key(value))
+
+
+def _key(value: float) -> str:
+    return f"{value:.9g}" if isfinite(value) else ""
+
+
+def _change(one: Standing | Cell, scale: Scale) -> Entry:
+    if not isfinite(one.change):
+        return Entry("–")
+    low, high = one.interval or (one.change, one.change)
+    note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
+    places = (scale(min(max(value, scale.lowest), scale.highest)) for value in (0.0, low, high, one.change))
+    return Entry(signed(one.change, 1), _key(one.change), note, Bar(*places))
+
+
+def _scale(rows: Sequence[Standing | Cell]) -> Scale:
+    """Of the pictures of intervals: that of the policies that qualify, so that others can't flatten them."""
+    shown = [one for one in rows if not one.disqualified] or rows
+    ends = [end for one in shown for end in (one.change, *(one.interval or ())) if isfinite(end)]
+    lowest, highest = min([-1.0, *ends]), max([1.0, *ends])
+    return Scale(lowest, highest, 4.0, BAR - 4.0)

@@ -1,0 +1,189 @@
+"""What a page shows of one track: its tables, heat map, pairs, charts, and a section for each policy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import isfinite, nan
+
+from ..benchmark.settings import REFERENCE
+from .charts import Chart, Line, Point, curves, dots
+from .descriptions import what_is
+from .result import Cell, Place, Result, Trace
+from .tables import Table, leaderboard, signed, table_of_cells
+from .toml import as_toml
+
+STRONGEST = 0.6
+"""Opacity of a heat map's strongest colour: text on it stays legible."""
+
+
+@dataclass(frozen=True)
+class Shade:
+    """A coloured cell of a table: a text, and how strongly it is better (-1) or worse (1) than nothing."""
+
+    text: str
+    strength: float
+    disqualified: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Its colour's name."""
+        return "better" if self.strength < 0 else "worse"
+
+    @property
+    def opacity(self) -> float:
+        """That of its colour."""
+        return round(STRONGEST * min(abs(self.strength), 1.0), 3)
+
+
+@dataclass(frozen=True)
+class Section:
+    """One line at one speed."""
+
+    place: Place
+    title: str
+    table: Table
+    charts: list[Chart]
+
+
+@dataclass(frozen=True)
+class About:
+    """One policy: what it is, how it stands, where it is worst."""
+
+    name: str
+    text: str
+    rank: int | None
+    worst: Cell
+    disqualified: list[Cell]
+    everywhere: bool
+
+
+@dataclass(frozen=True)
+class Track:
+    """All that is shown of one result."""
+
+    result: Result
+    settings: str  # as TOML
+    numbers: dict[str, int]  # of policies, for their colours
+    shown_first: set[str]  # policies whose traces are shown to begin with
+    leaderboard: Table
+    lines: list[tuple[Place, int]]  # the first place of each line, and at how many speeds it is run
+    heat: dict[str, list[Shade | None]]  # by policy, over all places
+    pairs: dict[str, list[Shade | None]]  # by policy, over all others
+    overview: Chart | None
+    sections: list[Section]
+    policies: list[About]
+
+
+def track(result: Result) -> Track:
+    """What is shown of a result."""
+    ranked = sorted((one for one in result.standings if one.rank), key=lambda one: one.rank or 0)
+    first = {REFERENCE, *(one.policy for one in ranked[:3])}
+    return Track(
+        result=result,
+        settings=as_toml(result.settings),
+        numbers={policy: number for number, policy in enumerate(result.policies)},
+        shown_first=first if len(ranked) > 2 else set(result.policies[:4]) | first,
+        leaderboard=leaderboard(result),
+        lines=[
+            (places[0], len(places))
+            for places in (list(own) for _, own in groupby(result.places, key=lambda place: place[:2]))
+        ],
+        heat=_heat(result),
+        pairs=_pairs(result),
+        overview=dots(
+            "Δσ over effort, all lines and speeds",
+            ("effort, mean over lines and speeds (N)", "Δσ (%)"),
+            [Point(one.policy, one.effort, one.change, bool(one.disqualified)) for one in result.standings],
+        ),
+        sections=[_section(result, place) for place in result.places],
+        policies=[_about(result, policy) for policy in result.policies],
+    )
+
+
+def _heat(result: Result) -> dict[str, list[Shade | None]]:
+    """Changes of σ; the strongest colour is the largest change of a policy that qualifies there."""
+    cells = {(cell.policy, cell.place): cell for cell in result.cells}
+    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change) and not cell.disqualified]
+    largest = max([1.0, *sizes])
+    return {
+        policy: [_shade(cells.get((policy, place)), largest) for place in result.places]
+        for policy in result.policies
+    }
+
+
+def _shade(cell: Cell | None, largest: float) -> Shade | None:
+    if cell is None:
+        return None
+    strength = cell.change / largest if isfinite(cell.change) else 0.0
+    return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
+
+
+def _pairs(result: Result) -> dict[str, list[Shade | None]]:
+    """Share of passes in which the row's policy has the smaller change of σ than the column's."""
+    table: dict[str, list[Shade | None]] = {}
+    for one in result.standings:
+        shares = [one.better_than.get(other.policy, nan) for other in result.standings]
+        table[one.policy] = [
+            Shade(f"{100 * share:.0f} %", 1 - 2 * share) if isfinite(share) else None for share in shares
+        ]
+    return table
+
+
+def _section(result: Result, place: Place) -> Section:
+    cells = [cell for cell in result.cells if cell.place == place]
+    title = f"{place.pantograph} on {place.catenary} at {place.speed_kmh:g} km/h"
+    first, last = result.spans[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
+    count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
+    points = [
+        Point(cell.policy, cell.figures.get("effort", nan), cell.figures.get("std", nan), bool(cell.disqualified))
+        for cell in cells
+    ]
+    over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
+    traces = [trace for trace in result.traces if trace.place == place]
+    return Section(
+        place=place,
+        title=title,
+        table=table_of_cells(cells, f"{title}: spans {first}–{last}, {count}"),
+        charts=[
+            *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
+            *([over_effort] if over_effort else []),
+        ],
+    )
+
+
+def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> list[Chart]:
+    """Force along the spans, and its spectrum."""
+    first, last = spans
+    begin, end = traces[0].position[0], traces[0].position[-1]
+    span_length = (end - begin) / (last - first + 1)
+    inner = [begin + k * span_length for k in range(last - first + 2)]
+    return [
+        curves(
+            f"Contact force, seed {traces[0].seed}; dotted: nominal force",
+            ("position (m); vertical lines: supports", "force to 20 Hz (N)"),
+            [Line(one.policy, one.position, one.force) for one in traces],
+            supports=inner,
+            level=nominal,
+        ),
+        curves(
+            f"Spectrum of the contact force, seed {traces[0].seed}",
+            ("frequency (Hz)", "amplitude (N)"),
+            [Line(one.policy, one.frequency, one.amplitude) for one in traces],
+            from_zero=True,
+        ),
+    ]
+
+
+def _about(result: Result, policy: str) -> About:
+    own = [cell for cell in result.cells if cell.policy == policy]
+    standing = next((one for one in result.standings if one.policy == policy), None)
+    return About(
+        name=policy,
+        text=what_is(policy),
+        rank=None if standing is None else standing.rank,
+        worst=max(own, key=lambda cell: cell.change if isfinite(cell.change) else -float("inf")),
+        disqualified=[cell for cell in own if cell.disqualified],
+        everywhere=standing is not None,
+    )
