@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_every_file_has_a_name_and_one_kind():
-    kinds = names("training"), names("benchmark")
-    assert sorted(kinds[0] + kinds[1]) == sorted(path.stem for path in FOLDER.glob("*.toml"))
+    kinds = names("training"), names("benchmark"), names("oracle")
+    assert sorted(kinds[0] + kinds[1] + kinds[2]) == sorted(path.stem for path in FOLDER.glob("*.toml"))
     assert {"ppo", "sac"} <= set(kinds[0])
     assert {"benchmark", "benchmark-realistic"} <= set(kinds[1])
 
