@@ -241,6 +241,8 @@ def test_share_is_of_exactly_these_settings():
         {"speed_kmh": 301},
         {"actuator": "realistic:delay=0.006"},
         {"actuator": "realistic:place=head"},
+        {"actuator": "ideal"},
+        {"actuator": {"kind": "motor", "place": "frame"}},
         {"line_condition": "new"},
         {"control_interval": 0.02},
         {"pantograph": "dsa380"},

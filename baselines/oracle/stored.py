@@ -42,9 +42,14 @@ MATTER = (
 def fingerprint(given: Mapping[str, Any]) -> str:
     """Hash of all that an oracle depends on but spans and seed, of settings of a run by name.
 
-    Raises InputError for a value that is not valid.
+    Values at their defaults are left out, so that a setting that is new and off changes nothing. Raises
+    InputError for a value that is not valid.
     """
-    plain = run_settings(given).model_dump(mode="json", include=set(MATTER), serialize_as_any=True)
+    settings = run_settings(given)
+    plain = settings.model_dump(
+        mode="json", include=set(MATTER), exclude_defaults=True, serialize_as_any=True
+    )
+    plain["kinds"] = [type(each).__name__ for each in (settings.catenary, settings.actuator)]
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
