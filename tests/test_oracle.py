@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -14,7 +15,7 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
-from panto_baselines.oracle import command, problem, search, solver, stored
+from panto_baselines.oracle import command, problem, report, search, solver, stored
 from panto_baselines.oracle.knots import Knots
 from panto_baselines.oracle.problem import Problem
 from panto_baselines.oracle.search import find, noise
@@ -23,6 +24,7 @@ from panto_baselines.oracle.solver import descend
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import actuator_settings
+from tests.pages import check_page, tables_of
 
 SHORT: dict[str, Any] = {"line_condition": "fair", "actuator": "realistic", "speed_kmh": 300.0}
 SPANS = (2, 2)
@@ -240,6 +242,8 @@ def test_share_is_of_exactly_these_settings():
         {"speed_kmh": 301},
         {"actuator": "realistic:delay=0.006"},
         {"actuator": "realistic:place=head"},
+        {"actuator": "ideal"},
+        {"actuator": {"kind": "motor", "place": "frame"}},
         {"line_condition": "new"},
         {"control_interval": 0.02},
         {"pantograph": "dsa380"},
@@ -261,7 +265,7 @@ def called(*arguments: str) -> Any:
 
 
 def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(solver, "MOST_ITERATIONS", 1)
+    monkeypatch.setattr(search, "descend", partial(descend, iterations=3))
     file, picture = tmp_path / "o.json", tmp_path / "o.png"
     result = called(
         "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
@@ -278,6 +282,13 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     again = simulate(**given, seed=1, distance=None).summary((2, 2))
     assert cell["passes"][1]["passive"]["std"] == again.std
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_stored_oracles_are_printed_as_the_page_shows_them():
+    table = report.stored_table(stored.load())
+    assert len(tables_of("oracle.md")[table.title][1]) == len(table.rows)
+    check_page("oracle.md", {table.title: table})
+    assert "Stored oracles" in called("--stored").output
 
 
 def test_a_file_s_cells_are_replaced_by_one_on_the_command_line():

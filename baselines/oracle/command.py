@@ -38,6 +38,9 @@ def oracle(
     output: Annotated[
         str | None, typer.Option(help="File to write: everything as .json.", callback=writable((".json",)))
     ] = None,
+    known: Annotated[
+        bool, typer.Option("--stored", help="Print the stored oracles, and search for none.")
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -53,7 +56,11 @@ def oracle(
     from .problem import Problem
     from .search import find
     from .settings import oracle_settings
-    from .stored import as_data, save
+    from .stored import as_data, load, save
+
+    if known:
+        print_table(report.stored_table(load()))
+        return
 
     changes: dict[str, Any] = {
         "seeds": seed or None,

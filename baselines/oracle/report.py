@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
 from panto_env.base.table import Table
 from panto_env.metrics.spans import in_words
+from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
 from .search import Oracle
@@ -83,6 +84,30 @@ def summary(oracles: Sequence[Oracle]) -> Table:
         "CL (%)",
     )
     return Table("Oracles", headings, rows)
+
+
+def stored_table(data: Mapping[str, Any]) -> Table:
+    """What a file of ``stored.save`` holds, one row for each cell."""
+    rows = []
+    for cell in data["cells"]:
+        passes, actuator = cell["passes"], actuator_settings(cell["actuator"])
+        preset = next(
+            (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]
+        )
+        changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
+        rows.append(
+            (
+                cell["catenary"],
+                f"{preset}, {actuator.place}",
+                number(cell["speed_kmh"], 0),
+                number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
+                number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
+                number(100 * (cell["ratio"] - 1), 1),
+                f"{min(changes):.1f} to {max(changes):.1f}",
+            )
+        )
+    headings = ("line", "actuator", "km/h", "passive σ (N)", "oracle σ (N)", "change (%)", "by seed (%)")
+    return Table("Stored oracles", headings, rows, text_columns=2)
 
 
 def plot(oracle: Oracle) -> Figure:

@@ -32,7 +32,7 @@ DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Of the last one, that are tried in each iteration: what the model says of large steps is not so."""
 MEAN_TOLERANCE = 5e-4
 """Largest difference of the mean force from the passive run's at the end of a search, as a share of it."""
-MEAN_WEIGHT = 4.0
+MEAN_WEIGHT = 2.0
 """Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
 MEAN_STIFFNESS = 1e3
 """Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
@@ -92,7 +92,7 @@ def descend(
     if progress is not None:
         progress(start, found[-1])
     response, fresh = problem.response(knots), True
-    while len(found) <= iterations or (_off(problem, force) and len(found) <= 2 * iterations):
+    while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
         before = merit(problem, force)
         model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
@@ -115,7 +115,7 @@ def descend(
         if progress is not None:
             progress(start, found[-1])
         gain = (before - merit(problem, force)) / before
-        if gain < ENOUGH and fresh and not _off(problem, force):
+        if gain < ENOUGH and fresh and _mean_met(problem, force):
             break
         fresh = gain < WORTH
         if fresh:
@@ -128,10 +128,10 @@ def merit(problem: Problem, force: Array) -> float:
     return float(force.std() + MEAN_WEIGHT * abs(force.mean() - problem.figures.mean))
 
 
-def _off(problem: Problem, force: Array) -> bool:
-    """Whether the mean of a filtered force, (samples,) (N), is not yet that of the passive run."""
+def _mean_met(problem: Problem, force: Array) -> bool:
+    """Whether the mean of a filtered force, (samples,) (N), is that of the passive run."""
     wanted = problem.figures.mean
-    return abs(float(force.mean()) - wanted) > MEAN_TOLERANCE * wanted
+    return abs(float(force.mean()) - wanted) <= MEAN_TOLERANCE * wanted
 
 
 class Model(NamedTuple):

@@ -43,7 +43,8 @@ MATTER = (
 def fingerprint(given: Mapping[str, Any]) -> str:
     """Hash of all that an oracle depends on but spans and seed, of settings of a run by name.
 
-    Raises InputError for a value that is not valid.
+    Values at their defaults are left out, so that a setting that is new and off changes nothing. Raises
+    InputError for a value that is not valid.
     """
     settings = run_settings(given)
     # Without defaults: a setting that is new in a later version, and off, changes no oracle; a kind does.

@@ -123,9 +123,7 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
     if not known:
         return None
     x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
-    y_ticks, y = _axis(
-        min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP
-    )
+    y_ticks, y = _axis(min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP)
     taken: list[tuple[float, float, float]] = []
     drawn = []
     for policy, across, up, hollow in known:

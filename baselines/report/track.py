@@ -137,7 +137,12 @@ def _section(result: Result, place: Place) -> Section:
     first, last = result.spans[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
     count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
     points = [
-        Point(cell.policy, cell.figures.get("effort", nan), cell.figures.get("std", nan), bool(cell.disqualified))
+        Point(
+            cell.policy,
+            cell.figures.get("effort", nan),
+            cell.figures.get("std", nan),
+            bool(cell.disqualified),
+        )
         for cell in cells
     ]
     over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
