@@ -35,7 +35,7 @@ def test_commands_take_names_and_paths(tmp_path, monkeypatch):
 
 
 def test_unknown_names_are_refused_with_those_that_are_known():
-    with pytest.raises(InputError, match=r"training file pp0 does not .* did you mean 'ppo'\? known are agent-"):
+    with pytest.raises(InputError, match=r"training file pp0 .* did you mean 'ppo'\? known are agent-"):
         load_training("pp0")
     with pytest.raises(InputError, match=r"benchmark file ppo does not exist; .* known are benchmark, "):
         load_benchmark("ppo")
