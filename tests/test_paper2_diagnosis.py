@@ -21,7 +21,8 @@ def case(kind="", severity=0.0, detected=False, others=0, passes=1, located=None
 
 def test_what_is_judged_was_not_trained_on():
     assert not set(judged.SPEEDS_KMH) & set(SPEEDS_KMH)
-    assert not set(judged.SEEDS) & set(SEEDS)
+    tracks = study.tracks()
+    assert len({track.seed for track in tracks} - set(SEEDS)) == len(tracks)
     assert judged.PANTOGRAPH != PANTOGRAPH
     assert len(set(judged.LINES) - set(LINES)) == 2
 

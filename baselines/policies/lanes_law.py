@@ -47,7 +47,7 @@ class LanesLaw(ABC):
         """Physical values of an entry, (lanes,). Raises InputError where there is none of this name."""
         layout = self.context.layout
         place = self._places.get(name)
-        if place is None:  # of another kind of observation, or an error
+        if place is None or layout.entries[place].slope:  # another kind, normalised, or an error
             return np.array([layout.read(each, name) for each in observations])
         entry = layout.entries[place]
         return entry.centre + observations[:, place].astype(float) * entry.scale

@@ -18,7 +18,7 @@ from .healthy import Healthy
 from .kinds import Answer, Classifier, trained
 from .passes import Passes, side_by_side
 from .places import Evidence, regions
-from .threshold import ENOUGH, FALSE_ALARMS, threshold
+from .threshold import ENOUGH, FALSE_ALARMS, cautious_threshold
 
 ENOUGH_PASSES = 10
 """Healthy passes from which on how they differ is well known: with fewer, what a pantograph unlike all of
@@ -94,7 +94,7 @@ def judge(
     classifier: Classifier | None = None,
 ) -> Diagnosis:
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
-    limit = threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
+    limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
     evidence, levels = healthy.weigh(passes, limit)
     asked = classifier or trained()
     found = [

@@ -64,8 +64,13 @@ EXAMPLE = Track("ln2", PANTOGRAPH, 260.0, seed=41)
 
 
 def tracks(seeds: Sequence[int] = SEEDS, lines: Sequence[str] = LINES) -> list[Track]:
-    """All tracks that are judged."""
-    return [Track(line, PANTOGRAPH, speed, seed) for line in lines for speed in SPEEDS_KMH for seed in seeds]
+    """All tracks that are judged, each with pantographs of its own: those of one seed would be the same."""
+    kinds = [(line, speed) for line in lines for speed in SPEEDS_KMH]
+    return [
+        Track(line, PANTOGRAPH, speed, 100 * (k + 1) + seed)
+        for k, (line, speed) in enumerate(kinds)
+        for seed in seeds
+    ]
 
 
 def all_cases(
