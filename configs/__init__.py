@@ -17,11 +17,15 @@ KINDS: dict[Kind, str] = {"training": "algorithm", "benchmark": "lines", "oracle
 
 def names(kind: Kind) -> list[str]:
     """Names of the files of a kind that come with the project."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml") if KINDS[kind] in read_toml(path))
+    found = (path for path in FOLDER.rglob("*.toml") if KINDS[kind] in read_toml(path))
+    return sorted(path.relative_to(FOLDER).with_suffix("").as_posix() for path in found)
 
 
 def find(source: str | Path, kind: Kind) -> Path:
-    """The file of a path, or of a name here: "ppo" is ppo.toml. Raises InputError where there is none."""
+    """The file of a path, or of a name here: "ppo" is ppo.toml, "benchmark/known-line" one in a folder.
+
+    Raises InputError where there is none.
+    """
     path = Path(source)
     if path.is_file():
         return path

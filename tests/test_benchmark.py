@@ -20,6 +20,7 @@ from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
+from panto_env.policies import find_policy
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 P = "p:gain=0.1"
@@ -201,6 +202,14 @@ def test_shipped_benchmarks_load(path: Path) -> None:
     assert len(loaded.policies) >= 4
     assert len(loaded.seeds) >= 5
     assert {line.catenary for line in loaded.lines} >= {"en50318-2002", "shinkansen-simple"}
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
+def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
+    track = load_benchmark(f"benchmark/{path.stem}")
+    assert track.title != BenchmarkSettings().title
+    for policy in track.policies:
+        find_policy(policy)
 
 
 @pytest.mark.parametrize(

@@ -110,6 +110,7 @@ def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
         "pantograph_scatter": settings.pantograph_scatter,
+        "speed_drift": settings.speed_drift,
         "distance": line.distance,
         "control_interval": settings.control_interval,
     }

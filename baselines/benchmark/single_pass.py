@@ -140,6 +140,7 @@ def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: 
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
         "pantograph_scatter": settings.pantograph_scatter,
+        "speed_drift": settings.speed_drift,
         "control_interval": settings.control_interval,
         "distance": line.distance,
         "record_droppers": False,
