@@ -114,14 +114,19 @@ def load(path: Path = RESULTS) -> dict[str, Any]:
     return data
 
 
-def stored_ratio(given: Mapping[str, Any], path: Path = RESULTS) -> float | None:
+def stored_ratio(
+    given: Mapping[str, Any], path: Path = RESULTS, spans: tuple[int, int] | None = None
+) -> float | None:
     """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
 
     None where there is none of exactly this line, pantograph, speed, actuator, condition of the line, control
-    interval and computation; what is sensed does not matter. Its spans stand in the file.
+    interval and computation, nor, where spans are named, of these; what is sensed does not matter.
     """
     wanted = fingerprint(given)
-    return next((float(cell["ratio"]) for cell in load(path)["cells"] if cell["fingerprint"] == wanted), None)
+    for cell in load(path)["cells"]:
+        if cell["fingerprint"] == wanted and spans in (None, tuple(cell["spans"])):
+            return float(cell["ratio"])
+    return None
 
 
 def share_of_oracle(
