@@ -19,7 +19,7 @@ from panto_env.diagnosis.healthy import FLOOR, Healthy, _whiten
 from panto_env.diagnosis.kinds import KINDS, TRAINED, Classifier, trained
 from panto_env.diagnosis.passes import Passes, side_by_side
 from panto_env.diagnosis.places import Evidence, regions
-from panto_env.diagnosis.threshold import threshold
+from panto_env.diagnosis.threshold import cautious_threshold, threshold
 from panto_env.diagnosis.training import NEAR, examples, fit, save
 from panto_env.studies.paper2.diagnosis_cases import within_interval
 from panto_env.terminal import console
@@ -84,6 +84,24 @@ def test_threshold_has_the_false_alarms_that_it_is_asked_for(rate):
     level = threshold(seen, PER_SPAN, SPAN, rate)
     measured = (largest[20:] > level).sum() / (largest[20:].size * SPAN / 1e3)
     assert 0.5 * rate < measured < 2 * rate
+
+
+def test_threshold_reckons_with_few_passes_that_differ():
+    """Made-up scores, some of whose passes lie far above others: further passes beyond it, over 150 lines."""
+    random, wanted = np.random.default_rng(1), 0.1
+    plain, cautious = [], []
+    for _ in range(150):
+        log = random.exponential(0.3, (45, 1)) + random.gumbel(0, 0.3, (45, 15))
+        seen, later = np.exp(log[:5]), np.exp(log[5:])
+        for found, limit in ((plain, threshold), (cautious, cautious_threshold)):
+            found.append((later > limit(seen, 1, SPAN, wanted)).mean() / (SPAN / 1e3))
+    assert np.mean(plain) > 1.5 * wanted
+    assert 0.4 * wanted < np.mean(cautious) < 1.3 * wanted
+
+
+def test_threshold_of_passes_that_do_not_differ_is_left_as_it_is():
+    seen = np.exp(np.random.default_rng(2).gumbel(0, 0.3, (12, 200)))
+    assert 1 <= cautious_threshold(seen, 1, SPAN) / threshold(seen, 1, SPAN) < 1.02
 
 
 def test_a_bump_is_found_where_it_is_and_a_healthy_pass_has_none(learned):

@@ -28,8 +28,7 @@ def threshold(scores: Array, per_span: int, span: float, false_alarms: float = F
 
     maxima = np.log(scores.reshape(-1, per_span).max(axis=1))
     place, scale = gumbel_r.fit(maxima)
-    exceeded = -math.expm1(-false_alarms * span / 1e3)  # in a span, where alarms are Poisson's
-    return float(np.exp(gumbel_r.isf(exceeded, place, scale)))
+    return float(np.exp(gumbel_r.isf(_in_a_span(false_alarms, span), place, scale)))
 
 
 def cautious_threshold(
@@ -45,8 +44,13 @@ def cautious_threshold(
 
     maxima = np.log(scores.reshape(len(scores), -1, per_span).max(axis=2))
     passes, middle = len(maxima), float(maxima.mean())
-    exceeded = -math.expm1(-false_alarms * span / 1e3)
+    exceeded = _in_a_span(false_alarms, span)
     longer = t.isf(exceeded, passes - 1) / norm.isf(exceeded) * math.sqrt(1 + 1 / passes)
     between = min(1.0, float(maxima.mean(axis=1).var(ddof=1) / maxima.var()))
     way = math.log(threshold(scores, per_span, span, false_alarms)) - middle
     return math.exp(middle + way * math.sqrt(1 + between * (max(1.0, longer) ** 2 - 1)))
+
+
+def _in_a_span(false_alarms: float, span: float) -> float:
+    """Probability of an alarm in a span (m), where so many per kilometre are Poisson's."""
+    return -math.expm1(-false_alarms * span / 1e3)

@@ -45,10 +45,10 @@ def _settled_weights(model: Model, gains: Gains, lag: int) -> Array:
     """What each of the next innovations adds to the force, (lag + 1, m), with the last of the gains (N)."""
     gain, innovation = gains.gain[-1], gains.innovation[-1]
     left = model.transition @ (np.eye(len(model.force)) - gain @ model.observed)
-    seen, weights = gains.force[-1], []
+    ahead, weights = gains.force[-1], []
     for _ in range(lag + 1):
-        weights.append(np.linalg.solve(innovation, model.observed @ seen))
-        seen = left @ seen
+        weights.append(np.linalg.solve(innovation, model.observed @ ahead))
+        ahead = left @ ahead
     return np.array(weights)
 
 
