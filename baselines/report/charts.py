@@ -64,6 +64,7 @@ class Scale(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
+        """Place of a value, rounded to a tenth."""
         share = (value - self.lowest) / (self.highest - self.lowest)
         return round(self.begin + share * (self.end - self.begin), 1)
 

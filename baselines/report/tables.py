@@ -1,4 +1,4 @@
-"""Tables of a page, as what their cells say and how they sort: the leaderboard, and one per line and speed."""
+"""Tables of a page, as what their cells say and how they sort: leaderboard, and one per line and speed."""
 
 from __future__ import annotations
 
