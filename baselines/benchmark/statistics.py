@@ -58,7 +58,7 @@ class Cell:
     @property
     def oracle_share(self) -> float | None:
         """Share of what a stored oracle gains; None where none is stored."""
-        return None if self.oracle is None else self.change / self.oracle
+        return None if self.oracle is None else self.change / self.oracle + 0.0  # no minus zero
 
 
 def interquartile_mean(values: Array) -> float:
