@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from panto_env.base.settings import Positive, Settings
 
 from .actor import Actor
+
+if TYPE_CHECKING:
+    from .cloning_settings import Cloning, CloningError
+    from .demonstrations import Demonstrations
 
 Count = Annotated[int, Field(gt=0, strict=True)]
 MOST_KEPT = 50_000_000
@@ -35,6 +39,10 @@ class Algorithm(Settings, ABC):
     @abstractmethod
     def actor(self, model: Any) -> Actor:
         """The learner's deterministic policy."""
+
+    @abstractmethod
+    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
+        """Bring a new learner to do what a policy has shown."""
 
     def check(self, lanes: int, total_steps: int) -> None:
         """Raise InputError where the hyperparameters do not fit this number of lanes and steps."""

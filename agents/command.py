@@ -103,6 +103,7 @@ def evaluate(
 
     Options that are left out are as in the model's training.
     """
+    from panto_baselines.benchmark.seeds import TEST, check_seeds
     from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy
 
@@ -115,7 +116,9 @@ def evaluate(
     environment = environment | settings
     chosen = speed or speeds(environment)
     check_passes(2 * seeds * len(chosen), "This evaluation")
-    comparison = Comparison(arguments(environment), chosen, seeds, settings.get("distance"))
+    judged_on = range(TEST.start, TEST.start + seeds)
+    check_seeds(judged_on, "test")
+    comparison = Comparison(arguments(environment), chosen, judged_on, settings.get("distance"))
     with progress_console.status("running"):
         pairs = comparison.run(driver)
     if plot is not None:

@@ -86,7 +86,7 @@ class Comparison:
 
     arguments: Mapping[str, Any]
     speeds_kmh: Sequence[float]
-    seeds: int
+    seeds: Sequence[int]
     distance: float | None = None  # of a pass (m), by default until its start has died out and on
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
 
@@ -98,9 +98,7 @@ class Comparison:
 
     def run(self, policy: Any) -> list[Pair]:
         """Pairs at every speed and seed. Raises InputError where the policy does not fit the task."""
-        return [
-            pair(*self.passes(policy, speed, seed)) for speed in self.speeds_kmh for seed in range(self.seeds)
-        ]
+        return [pair(*self.passes(policy, speed, seed)) for speed in self.speeds_kmh for seed in self.seeds]
 
     def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
         """Records of one pass under the policy and of the same pass without."""

@@ -7,14 +7,17 @@ from typing import Any
 import gymnasium
 from stable_baselines3.common.vec_env import VecMonitor
 
+from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env.envs import PantographVectorEnv
 
+from .base_policy import PolicyLanes
+from .residual import ResidualVecEnv
 from .settings import Training
 from .vec_env import PantographVecEnv
 
 
 def make_lanes(training: Training) -> Any:
-    """``VecEnv`` of the training's lanes; the learner seeds lane i with seed + i.
+    """``VecEnv`` of the training's lanes, in which its base policy acts, too, if it has one.
 
     Raises InputError where the environment's arguments are not valid.
     """
@@ -23,4 +26,17 @@ def make_lanes(training: Training) -> Any:
         training.environment["id"], num_envs=training.lanes, autoreset_mode="SameStep", **arguments
     )
     assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
-    return VecMonitor(PantographVecEnv(native))
+    lanes: Any = PantographVecEnv(native)
+    if training.residual_of is not None:
+        base = PolicyLanes(training.residual_of, native.task)
+        lanes = ResidualVecEnv(lanes, base, training.residual_share)
+    return VecMonitor(lanes)
+
+
+def lane_seeds(training: Training, steps: int = 0) -> range:
+    """Seeds of the lanes, all for training: others for a training of another seed, or after more steps."""
+    places = len(TRAINING) - training.lanes + 1
+    first = TRAINING[(training.seed * training.lanes + steps) % places]
+    seeds = range(first, first + training.lanes)
+    check_seeds(seeds, "training")
+    return seeds

@@ -22,6 +22,7 @@ from panto_env.base.files import write_whole
 from panto_env.base.settings import Settings
 from panto_env.base.version import __version__
 from panto_env.control.context import Context
+from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
 
@@ -35,6 +36,9 @@ class Needs(Settings):
     """What a policy was trained with and needs in every task that it runs in."""
 
     observation: str  # kind of the layout
+    harmonics: int = 1  # of the position within the span
+    history: int = 0  # earlier control steps that are observed
+    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that readings count from
     entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
     channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
     force_limit: float  # N
@@ -43,9 +47,18 @@ class Needs(Settings):
     @classmethod
     def of(cls, context: Context) -> Needs:
         """What an episode offers a policy."""
+        layout = context.layout
+        # What readings are counted from is then that of each line: the policy is meant to take it so.
+        names = (*(name for name, _, _ in READING_ENTRIES), "speed") if layout.normalise else ()
         return cls(
-            observation=context.layout.kind,
-            entries=tuple((entry.name, entry.centre, entry.scale) for entry in context.layout.entries),
+            observation=layout.kind,
+            harmonics=layout.harmonics,
+            history=layout.history,
+            normalise=layout.normalise,
+            entries=tuple(
+                (entry.name, 0.0, 1.0) if present(entry) in names else (entry.name, entry.centre, entry.scale)
+                for entry in layout.entries
+            ),
             channels=context.channels,
             force_limit=context.force_limit,
             control_interval=context.control_interval,
@@ -63,6 +76,8 @@ class Facts(Settings):
     updates: int  # of the networks, as Stable-Baselines3 counts them
     environment: dict[str, Any]  # that it was trained in: id and arguments
     needs: Needs
+    residual_of: str | None = None  # policy that its action is added to
+    residual_share: float = 1.0  # to which share
     ratio: float | None = None  # when last evaluated: mean of sigma over that of the passive pantograph
     qualified: bool = False  # when last evaluated: whether the mean force kept within its range
     activation: Literal["tanh", "relu"]

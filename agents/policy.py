@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control.context import Context
+from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_env.policies import Policy, find_policy
 
 from .actor import Actor
 from .model_file import Facts, Needs, read_model
+from .residual_policy import Residual
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by what its actions drive."""
@@ -22,20 +25,25 @@ class TrainedPolicy:
 
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
         """path: of the model file, for messages of errors."""
-        self.path, self.facts, self._actor = path, facts, actor
-        self.observation = facts.needs.observation
+        self.path, self.facts = path, facts
+        self._policy: Policy = actor
+        if facts.residual_of is not None:
+            self._policy = Residual(find_policy(facts.residual_of), actor, facts.residual_share)
+        needs = facts.needs
+        self.observation, self.harmonics, self.history = needs.observation, needs.harmonics, needs.history
+        self.normalise = needs.normalise
 
     def reset(self, context: Context) -> None:
         """Raises InputError where the episode's observation, actuator or control interval differs."""
         needs, offered = self.facts.needs, Needs.of(context)
-        if offered == needs:
-            return
-        difference = _first_difference(needs, offered)
-        raise InputError(f"The model {self.path} does not fit this task: {difference}.")
+        if offered != needs:
+            difference = _first_difference(needs, offered)
+            raise InputError(f"The model {self.path} does not fit this task: {difference}.")
+        self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
-        return self._actor.act(observation)
+        return self._policy.act(observation)
 
 
 def load(path: str | Path) -> TrainedPolicy:
@@ -45,11 +53,10 @@ def load(path: str | Path) -> TrainedPolicy:
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
     """The first property that differs, and what to do about it."""
-    if needs.observation != offered.observation:
-        return (
-            f"it was trained with observation='{needs.observation}', this is "
-            f"'{offered.observation}'; set it so"
-        )
+    for name in OBSERVATION_SETTINGS:
+        needed, here = getattr(needs, name), getattr(offered, name)
+        if needed != here:
+            return f"it was trained with {name}={needed!r}, this is {here!r}; set it so"
     if needs.channels != offered.channels:
         needed, here = PLACES[needs.channels], PLACES[offered.channels]
         return (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
@@ -11,6 +11,10 @@ from panto_env.base.settings import NonNegative, Positive
 
 from .actor import Actor
 from .algorithm import MOST_KEPT, Algorithm, Count, Share
+
+if TYPE_CHECKING:
+    from .cloning_settings import Cloning, CloningError
+    from .demonstrations import Demonstrations
 
 
 class PPO(Algorithm):
@@ -61,6 +65,27 @@ class PPO(Algorithm):
             seed=seed,
             device="cpu",
         )
+
+    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
+        """Bring actor and critic of a new learner to what a policy has shown, and to what came of it."""
+        from .cloning import clone, regress
+        from .demonstrations import returns
+
+        policy = model.policy
+
+        def mean(observations: Any) -> Any:
+            return policy.get_distribution(observations).distribution.mean
+
+        extractor, values = policy.mlp_extractor, policy.value_net
+        own = [*extractor.policy_net.parameters(), *policy.action_net.parameters()]
+        told = clone(mean, own, shown, cloning)
+        # A critic that knows nothing would lead the actor astray in its first updates.
+        sums, known = returns(shown, self.gamma)
+        if known.any():
+            values.bias.data.fill_(float(sums[known].mean()))
+            own = [*extractor.value_net.parameters(), *values.parameters()]
+            regress(policy.predict_values, own, shown.observations[known], sums[known][:, None], cloning)
+        return told
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mean of the action, clipped."""

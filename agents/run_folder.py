@@ -30,6 +30,7 @@ class RunFolder:
         self.settings = self.path / "settings.json"
         self.model = self.path / "model.zip"  # at the end of the training
         self.best = self.path / "best.zip"  # at the best evaluation
+        self.cloning = self.path / "cloning.json"  # how near the start came to another policy, if asked for
         self.evaluations = self.path / "evaluations.csv"
         self.tensorboard = self.path / "tensorboard"
         self.checkpoints = self.path / "checkpoints"
@@ -83,6 +84,12 @@ class RunFolder:
         make_folder(self.checkpoints)
         with write_whole(self.settings) as temporary:
             temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
+
+    def note_cloning(self, policy: str, told: Any) -> None:
+        """Write how far the agent is from the policy that it starts from (``CloningError``)."""
+        with write_whole(self.cloning) as temporary:
+            text = json.dumps({"policy": policy} | told.model_dump(), indent=1)
+            temporary.write_text(text + "\n", encoding="utf-8")
 
     def checkpoint(self, steps: int) -> Path:
         """Path of the checkpoint at ``steps``."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -11,6 +11,10 @@ from panto_env.base.settings import NonNegative
 
 from .actor import Actor
 from .algorithm import MOST_KEPT, Algorithm, Count, Share
+
+if TYPE_CHECKING:
+    from .cloning_settings import Cloning, CloningError
+    from .demonstrations import Demonstrations
 
 
 class SAC(Algorithm):
@@ -57,6 +61,30 @@ class SAC(Algorithm):
             seed=seed,
             device="cpu",
         )
+
+    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
+        """Bring a new learner's actor to what a policy has shown, and remember it, instead of random actions.
+
+        The critics learn from what is remembered, as from all that follows.
+        """
+        from .cloning import clone
+
+        def mode(observations: Any) -> Any:
+            return model.actor(observations, deterministic=True)
+
+        own = [*model.actor.latent_pi.parameters(), *model.actor.mu.parameters()]
+        told = clone(mode, own, shown, cloning)
+        for step in range(len(shown.rewards)):
+            model.replay_buffer.add(
+                shown.observations[step],
+                shown.following[step],
+                shown.taken[step],
+                shown.rewards[step],
+                shown.ended[step],
+                [{"TimeLimit.truncated": bool(cut)} for cut in shown.ended[step] & ~shown.terminated[step]],
+            )
+        model.learning_starts = 0
+        return told
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mode of the action, squashed by tanh."""

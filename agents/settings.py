@@ -17,7 +17,9 @@ from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
 
-from .algorithm import Algorithm, Count
+from .algorithm import Algorithm, Count, Share
+from .base_policy import check_wishes
+from .cloning_settings import Cloning
 from .ppo import PPO
 from .sac import SAC
 
@@ -35,7 +37,7 @@ class Evaluation(Settings):
     speeds_kmh: tuple[Positive, ...] | None = Field(
         None, description="speeds (km/h); the ends and the middle of the training's by default"
     )
-    seeds: Count = Field(1, description="runs at each speed, with seeds 0, 1, ...")
+    seeds: Count = Field(1, description="runs at each speed, with seeds for selection: 1000, 1001, ...")
 
 
 class Training(Settings):
@@ -50,6 +52,14 @@ class Training(Settings):
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
     evaluation: Evaluation
+    start_from: str | None = Field(
+        None, description="policy whose actions the agent learns before it learns from rewards"
+    )
+    cloning: Cloning = Field(Cloning(), description="how it learns them")
+    residual_of: str | None = Field(None, description="policy that the agent's action is added to")
+    residual_share: Share = Field(
+        0.3, description="of the actuator's force limit that the agent may add to that policy's action"
+    )
     hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
 
     @property
@@ -102,13 +112,19 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         if not isinstance(algorithm, str) or algorithm not in ALGORITHMS:
             raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
         algorithm_type = ALGORITHMS[algorithm]
-        for key, expected in (("hyperparameters", algorithm_type), ("evaluation", Evaluation)):
+        known: dict[str, type[Settings]] = {
+            "hyperparameters": algorithm_type,
+            "evaluation": Evaluation,
+            "cloning": Cloning,
+        }
+        for key, expected in known.items():
             if isinstance(table.get(key), Mapping):
                 _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")
         hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training.lanes, training.total_steps)
         _check_environment(training)
+        _check_policies(training)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removesuffix('.')}.") from error
     return training
@@ -116,11 +132,21 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
 
 def _check_environment(training: Training) -> None:
     try:
-        task = Task(run_settings(training.arguments))
+        settings = run_settings(training.arguments)
+        task = Task(settings)
         for speed in training.evaluation.speeds_kmh or ():
             task.check_speeds(speed)
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
+
+
+def _check_policies(training: Training) -> None:
+    if training.start_from is not None and training.residual_of is not None:
+        raise InputError("start_from and residual_of exclude each other: one that adds starts with nothing")
+    settings = run_settings(training.arguments)
+    for name in (training.start_from, training.residual_of):
+        if name is not None:
+            check_wishes(name, settings)
 
 
 def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:

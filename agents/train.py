@@ -12,13 +12,18 @@ import torch
 from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 
+from panto_baselines.benchmark.seeds import SELECTION, check_seeds
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.policies import find_policy
 
+from .base_policy import PolicyLanes
 from .callbacks import EpisodeLog, EveryNSteps, ProgressBar
+from .demonstrations import demonstrate
 from .evaluation import Comparison, Pair, verdict
-from .lanes import make_lanes
+from .lanes import lane_seeds, make_lanes
 from .model_file import Facts, Needs, read_model, restore, write_model
+from .residual_policy import Residual
 from .run_folder import RunFolder
 from .settings import Training
 
@@ -45,6 +50,7 @@ def train(
             run.restore()
         else:
             run.folder.begin(training)
+        run.begin_with_policy()
         run.learn(stack, progress)
     return run.folder
 
@@ -59,7 +65,10 @@ class Run:
         self.pairs: list[Pair] = []  # of the last evaluation
         self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
-        self._comparison = Comparison(training.arguments, training.speeds_kmh, training.evaluation.seeds)
+        chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
+        check_seeds(chosen_by, "selection")
+        self._comparison = Comparison(training.arguments, training.speeds_kmh, chosen_by)
+        self._seed_lanes()
 
     def restore(self) -> None:
         """Load the newest undamaged checkpoint, if there is one."""
@@ -68,10 +77,28 @@ class Run:
             restore(newest, self.model)
             # Otherwise lanes and exploration would repeat the random numbers of the first part.
             self.model.set_random_seed(self.training.seed + self.model.num_timesteps)
+            self._seed_lanes()
         if self.folder.best.is_file():
             facts, _ = read_model(self.folder.best)
             self._best_score = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
         self.folder.drop_evaluations_after(self.model.num_timesteps)
+
+    def _seed_lanes(self) -> None:
+        """Give the lanes seeds that are for training: the learner would number them from its own."""
+        self.model.get_env().seed(lane_seeds(self.training, self.model.num_timesteps)[0])
+
+    def begin_with_policy(self) -> None:
+        """Bring the new learner to do what the policy does that it is to start from; note the error."""
+        training, name = self.training, self.training.start_from
+        if name is None or self.model.num_timesteps > 0:
+            return
+        native, steps = self.model.get_env().unwrapped.env, training.cloning.steps
+        seeds = lane_seeds(training)
+        policy = PolicyLanes(name, native.task)
+        shown = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
+        told = training.hyperparameters.begin_with(self.model, shown, training.cloning)
+        self.folder.note_cloning(name, told)
+        self._seed_lanes()
 
     def learn(self, stack: ExitStack, progress: bool) -> None:
         """Learn the remaining steps, and write the final model."""
@@ -80,6 +107,8 @@ class Run:
             return
         self.model.set_logger(configure(str(self.folder.tensorboard), ["tensorboard"]))
         stack.callback(self.model.logger.close)
+        if self.model.num_timesteps == 0 and (self.training.start_from or self.training.residual_of):
+            self.evaluate()  # what it begins as may be hard to better
         # Evaluations come first, so that no checkpoint is newer than the table of evaluations.
         callbacks: list[Any] = [
             EpisodeLog(LOGGED_FIGURES),
@@ -101,7 +130,7 @@ class Run:
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph; note it in table and log; keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        self.pairs = self._comparison.run(self.training.hyperparameters.actor(self.model))
+        self.pairs = self._comparison.run(self._policy())
         ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)
@@ -113,6 +142,12 @@ class Run:
         if (qualified, -ratio) > self._best_score or not self.folder.best.is_file():
             self._best_score = (qualified, -ratio)
             self._save(self.folder.best)
+
+    def _policy(self) -> Any:
+        """The policy as it is now, as its model file would have it."""
+        actor = self.training.hyperparameters.actor(self.model)
+        base = self.training.residual_of
+        return actor if base is None else Residual(find_policy(base), actor, self.training.residual_share)
 
     def checkpoint(self) -> None:
         """Write a checkpoint and remove the oldest one."""
@@ -130,6 +165,8 @@ class Run:
             updates=self.model._n_updates,
             environment=self.training.environment,
             needs=self._needs,
+            residual_of=self.training.residual_of,
+            residual_share=self.training.residual_share,
             ratio=ratio if math.isfinite(ratio) else None,
             qualified=qualified,
             activation=actor.activation,

@@ -1,4 +1,4 @@
-"""Trainings and benchmarks that come with the project; commands take them by name or any file by its path."""
+"""Trainings, benchmarks and oracles of the project; commands take them by name, any file by its path."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
 
 FOLDER = Path(__file__).parent
-KINDS = {"training": "algorithm", "benchmark": "lines"}
+Kind = Literal["training", "benchmark", "oracle"]
+KINDS: dict[Kind, str] = {"training": "algorithm", "benchmark": "lines", "oracle": "cells"}
 """A key that every file of a kind has."""
 
 
-def names(kind: Literal["training", "benchmark"]) -> list[str]:
+def names(kind: Kind) -> list[str]:
     """Names of the files of a kind that come with the project."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml") if KINDS[kind] in read_toml(path))
+    found = (path for path in FOLDER.rglob("*.toml") if KINDS[kind] in read_toml(path))
+    return sorted(path.relative_to(FOLDER).with_suffix("").as_posix() for path in found)
 
 
-def find(source: str | Path, kind: Literal["training", "benchmark"]) -> Path:
-    """The file of a path, or of a name here: "ppo" is ppo.toml. Raises InputError where there is none."""
+def find(source: str | Path, kind: Kind) -> Path:
+    """The file of a path, or of a name here: "ppo" is ppo.toml, "benchmark/known-line" one in a folder.
+
+    Raises InputError where there is none.
+    """
     path = Path(source)
     if path.is_file():
         return path

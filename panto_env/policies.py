@@ -19,12 +19,14 @@ from .base.errors import InputError
 from .base.inline import parse_inline
 from .base.names import suggest
 from .control.context import Context
+from .control.observation import OBSERVATION_SETTINGS
 
 
 class Policy(Protocol):
     """Anything with these two methods. It sees observations, never the environment.
 
-    It may have an attribute ``observation``: the kind that it sees, unless a run is told another.
+    It may have attributes ``observation``, ``harmonics``, ``history`` and ``normalise``: what it sees, unless
+    a run is told another.
     """
 
     def reset(self, context: Context) -> None:
@@ -69,8 +71,8 @@ def find_policy(source: Any) -> Policy:
 
 def wishes(policy: Any) -> dict[str, Any]:
     """Settings that a policy asks for, by name, where a run is not told others."""
-    observation = getattr(policy, "observation", None)
-    return {} if observation is None else {"observation": observation}
+    asked = {name: getattr(policy, name, None) for name in OBSERVATION_SETTINGS}
+    return {name: value for name, value in asked.items() if value is not None}
 
 
 def with_parameters(source: str, parameters: str) -> str:

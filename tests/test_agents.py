@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,14 @@ pytest.importorskip("stable_baselines3")
 import stable_baselines3
 
 from panto_agents import command, train
+from panto_agents.demonstrations import Demonstrations, returns
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
+from panto_agents.lanes import lane_seeds
 from panto_agents.model_file import read_model
-from panto_agents.policy import load
+from panto_agents.policy import TrainedPolicy, load
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
+from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env import InputError, simulate
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -401,7 +405,7 @@ def test_a_run_that_ends_early_does_not_qualify():
             return -np.ones(1)
 
     line = {"actuator": {"force_limit": 400.0}}
-    (pair,) = Comparison(line, (300.0,), 1).run(Down())
+    (pair,) = Comparison(line, (300.0,), range(1)).run(Down())
     assert pair.terminated
     assert not pair.qualified
     assert pair.ratio == np.inf
@@ -416,3 +420,165 @@ def test_lanes_are_seeded_one_by_one():
     speeds = [env.reset(seed=7 + lane)[1]["speed_kmh"] for lane in range(2)]
     assert [info["speed_kmh"] for info in lanes.unwrapped.reset_infos] == speeds
     lanes.close()
+
+
+class TestSeeds:
+    def test_of_lanes_are_for_training(self):
+        for seed, lanes in ((0, 2), (1, 256), (10**9, 65_536)):
+            training = settings("ppo", seed=seed, lanes=lanes, hyperparameters={"batch_size": 64 * 8})
+            for steps in (0, 10**8):
+                seeds = lane_seeds(training, steps)
+                assert len(seeds) == lanes
+                assert seeds[0] in TRAINING
+                assert seeds[-1] in TRAINING
+        one, other = (lane_seeds(settings("ppo", seed=seed)) for seed in (0, 1))
+        assert not set(one) & set(other)
+
+    @pytest.mark.parametrize("kind", ["ppo", "sac"])
+    def test_lanes_run_under_them(self, kind, tmp_path):
+        training = settings(kind)
+        run = train.Run(training, RunFolder(tmp_path), train.make_lanes(training))
+        run.model._setup_learn(1)
+        native = run.model.get_env().unwrapped.env
+        assert native.np_random_seed == tuple(lane_seeds(training))
+
+    def test_a_model_is_chosen_by_seeds_for_selection(self, finished):
+        assert {row["seed"] for row in rows(finished)} == {"1000"}
+
+    @pytest.mark.parametrize(
+        ("seeds", "purpose", "message"),
+        [
+            (range(999, 1001), "test", "Seeds for test are 0 to 999, not 1000"),
+            (range(5, 6), "training", "Seeds for training are 2,000 to 999,999, not 5"),
+            (range(1999, 2001), "selection", "Seeds for selection are 1,000 to 1,999"),
+        ],
+    )
+    def test_of_another_purpose_are_refused(self, seeds, purpose, message):
+        with pytest.raises(InputError, match=message):
+            check_seeds(seeds, purpose)
+
+    def test_more_of_an_evaluation_than_there_are_is_refused(self, tmp_path):
+        training = settings("ppo", evaluation={"interval_steps": 128, "seeds": 1001})
+        with pytest.raises(InputError, match="Seeds for selection"):
+            train.train(training, tmp_path / "run", progress=False)
+
+
+SEEING = {"harmonics": 2, "history": 1, "normalise": 300, "reward": "agent", "actuator": "realistic"}
+
+
+@pytest.fixture
+def linear(tmp_path):
+    """A policy that is linear in what it sees, as ``find_policy`` takes it."""
+    path = tmp_path / "linear.py"
+    path.write_text(
+        "import numpy as np\n"
+        "WANTED = 'sine of span position', 'frame velocity'\n"
+        "class Linear:\n"
+        "    def reset(self, context):\n"
+        "        self.context = context\n"
+        "    def act(self, seen):\n"
+        "        names = [entry.name for entry in self.context.layout.entries]\n"
+        "        sine, velocity = (seen[names.index(each)] for each in WANTED)\n"
+        "        return np.array([0.3 * sine - 0.1 * velocity])\n"
+    )
+    return f"{path}:Linear"
+
+
+class TestStart:
+    @pytest.mark.parametrize("kind", ["ppo", "sac"])
+    def test_cloning_comes_near_a_linear_policy(self, kind, linear, tmp_path):
+        training = settings(
+            kind,
+            environment=LINE | SEEING,
+            start_from=linear,
+            cloning={"steps": 4000, "batch_size": 128, "learning_rate": 3e-3},
+            hyperparameters=SMALL[kind] | {"net_arch": [32]},
+        )
+        folder = train.train(training, tmp_path / "run", progress=False)
+        told = json.loads(folder.cloning.read_text())
+        assert told["policy"] == linear
+        assert told["rms"] > 0.1
+        assert told["error"] < 0.1 * told["rms"]
+        assert rows(folder)[0]["steps"] == "0"  # what it begins as is judged, and kept if it stays the best
+
+    def test_an_agent_does_what_it_has_cloned(self, linear, tmp_path):
+        cloning = {"steps": 10_000, "batch_size": 128}
+        training = settings("ppo", environment=LINE | SEEING, start_from=linear, cloning=cloning)
+        run = train.Run(training, RunFolder(tmp_path / "run"), train.make_lanes(training))
+        run.folder.begin(training)
+        run.begin_with_policy()
+        actor, (name, _, cls) = training.hyperparameters.actor(run.model), linear.rpartition(":")
+        own, theirs = (
+            simulate(**training.arguments | {"distance": 500.0}, policy=policy, seed=2)
+            for policy in (actor, f"{name}:{cls}")
+        )
+        difference = own.frame_force - theirs.frame_force
+        assert np.sqrt(np.mean(difference**2)) < 0.15 * np.sqrt(np.mean(theirs.frame_force**2))
+
+    def test_what_the_critic_learns_are_discounted_sums(self):
+        rewards = np.array([[1.0, 2.0, 4.0, 8.0, 16.0, 32.0]], dtype=np.float32).T
+        terminated, ended = np.zeros((2, 6, 1), dtype=bool)
+        terminated[2] = ended[2] = ended[4] = True
+        shown = Demonstrations(*[rewards] * 3, rewards, terminated, ended, rewards)
+        sums, known = returns(shown, 0.5)
+        assert sums[:, 0].tolist() == [1 + 1 + 1, 2 + 2, 4, 8 + 8, 16, 32]
+        assert known[:, 0].tolist() == [True, True, True, False, False, False]
+
+    def test_a_policy_that_asks_for_another_observation_is_refused(self, finished):
+        with pytest.raises(InputError, match="asks for history = 0, and the environment has 2; set it so"):
+            settings("ppo", residual_of=str(finished.model), environment=LINE | {"history": 2})
+        with pytest.raises(InputError, match="did you mean 'fb"):
+            settings("ppo", start_from="fb+fff")
+        with pytest.raises(InputError, match="start_from and residual_of exclude each other"):
+            settings("ppo", start_from="pd", residual_of="pd")
+        with pytest.raises(InputError, match=r"unknown key 'epoch' in \[cloning\]"):
+            settings("ppo", start_from="pd", cloning={"epoch": 3})
+
+
+@pytest.fixture(scope="module")
+def added(tmp_path_factory):
+    """A finished training of an agent that adds to fb+ff; read only."""
+    training = settings("ppo", residual_of="fb+ff", environment=LINE | SEEING)
+    return train.train(training, tmp_path_factory.mktemp("runs") / "added", progress=False)
+
+
+class TestResidual:
+    def test_with_a_network_of_zeros_it_is_its_base_bit_for_bit(self, added):
+        facts, actor = read_model(added.model)
+        assert facts.residual_of == "fb+ff"
+        still = [np.zeros_like(each) for each in (actor.weights[-1], actor.biases[-1])]
+        zeros = replace(actor, weights=(*actor.weights[:-1], still[0]), biases=(*actor.biases[:-1], still[1]))
+        given = settings("ppo", environment=LINE | SEEING).arguments | {"distance": 500.0}
+        ours, theirs, trained = (
+            simulate(**given, policy=policy, seed=3).contact_force
+            for policy in (TrainedPolicy(added.model, facts, zeros), "fb+ff", str(added.model))
+        )
+        np.testing.assert_array_equal(ours, theirs)
+        assert not np.array_equal(trained, theirs)
+
+    def test_lanes_add_as_the_policy_does(self, added):
+        """An episode of a training lane under the trained network is the policy's, bit for bit."""
+        _, actor = read_model(added.model)
+        training = settings("ppo", residual_of="fb+ff", environment=LINE | SEEING, lanes=2)
+        lanes, policy = train.make_lanes(training), load(added.model)
+        lanes.seed(2000)
+        seen = lanes.reset()
+        single = gymnasium.make(
+            f"panto_env:{LINE['id']}", **{k: v for k, v in (LINE | SEEING).items() if k != "id"}
+        )
+        observation, _ = single.reset(seed=2001)
+        policy.reset(single.unwrapped.context)
+        for _ in range(50):
+            np.testing.assert_array_equal(seen[1], observation)
+            seen, *_ = lanes.step(np.array([actor.act(each) for each in seen]))
+            observation, *_ = single.step(policy.act(observation))
+
+    def test_takes_part_in_the_benchmark_and_asks_for_what_it_sees(self, added):
+        from panto_baselines.benchmark.run import run
+        from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+
+        line = Line(catenary="periodic-stiffness", pantograph="three-mass", speeds_kmh=(300.0,), spans=(3, 5))
+        path = str(added.best)
+        given = {"policies": (path, f"blind of {path}"), "lines": (line,), "seeds": (0,)}
+        outcome = run(BenchmarkSettings(**given, actuator="realistic"), workers=1)
+        assert outcome.cells[1].figures["effort"] > 0

@@ -22,6 +22,7 @@ from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
+from panto_env.policies import find_policy
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 P = "p:gain=0.1"
@@ -203,6 +204,14 @@ def test_shipped_benchmarks_load(path: Path) -> None:
     assert len(loaded.policies) >= 4
     assert len(loaded.seeds) >= 5
     assert {line.catenary for line in loaded.lines} >= {"en50318-2002", "shinkansen-simple"}
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
+def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
+    track = load_benchmark(f"benchmark/{path.stem}")
+    assert track.title != BenchmarkSettings().title
+    for policy in track.policies:
+        find_policy(policy)
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ def run(**given):
         {"line_condition": "worn"},
         {"control_interval": INTERVAL},
         {"pantograph_scatter": 0.1},
+        {"speed_drift": 1.0},
     ],
     ids=lambda setting: next(iter(setting)),
 )

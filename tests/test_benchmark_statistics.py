@@ -161,3 +161,20 @@ def test_who_does_not_qualify_in_one_cell_has_no_standing():
     passive, a = standings(rows, statistics.compare(rows))
     assert (passive.rank, a.rank) == (1, None)
     assert a.disqualified.startswith("hard at 300 km/h: it moves the mean force by -9.1 %")
+
+
+def test_share_of_a_stored_oracle():
+    rows = [
+        row(line="easy"),
+        row(line="hard"),
+        row("a", line="easy", std=0.8),
+        row("a", line="hard", std=0.9),
+    ]
+    cells = statistics.compare(rows, {("easy", "pantograph", 300.0): -40.0})
+    found = {(cell.policy, cell.catenary): cell.oracle_share for cell in cells}
+    assert found["a", "easy"] == pytest.approx(0.5)
+    assert found["passive", "easy"] == 0.0
+    assert found["a", "hard"] is None
+    assert [each.oracle_share for each in standings(rows, cells)] == [None, None]
+    both = {(line, "pantograph", 300.0): -40.0 for line in ("easy", "hard")}
+    assert standings(rows, statistics.compare(rows, both))[1].oracle_share == pytest.approx(0.375)

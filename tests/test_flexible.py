@@ -79,7 +79,7 @@ def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
     contact = data.contact_wire.model_copy(update={"bending_stiffness": 5e4})
     damped = data.model_copy(update={"damping": Rayleigh(alpha=alpha, beta=beta), "contact_wire": contact})
     line = constants_of(damped, 3, Numerics(spacing=1.1, time_step=step, window=0, precision="double"))
-    wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[CONTACT].copy()
+    wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[0, CONTACT].copy()
     stencil[4] = 0.0  # the quieting load
     shape = np.sin(wavenumber * line.spacing * window_nodes(line.rows))
     u, d, amplitude, inner = shape.copy(), np.zeros(len(shape)), [], slice(PAD, -PAD)
@@ -120,7 +120,7 @@ def energy(line, wire, step):
     for w in range(2):
         mass = step**2 / line.mobility[w, 10, 0]  # of a node; all are alike on this line
         total += mass * (move[w, 3:-2] ** 2).sum() / (2 * step**2)
-        near, far = line.stencil[w, :2]
+        near, far = line.stencil[0, w, :2]
         u = old[w]
         pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
         total -= (now[w, 2:-2] * pull).sum() * mass / (2 * step**2)

@@ -51,7 +51,14 @@ def test_every_info_has_the_same_keys(name):
     env = gymnasium.make(name, **LIVELY)
     _, info = env.reset(seed=0)
     wanted, ended = keys(info), False
-    assert set(wanted["reward_terms"]) == {"cost_function", "contact_loss", "effort", "rate", "mean_force"}
+    assert set(wanted["reward_terms"]) == {
+        "cost_function",
+        "contact_loss",
+        "effort",
+        "rate",
+        "mean_force",
+        "low_passed",
+    }
     run_in = IDS[name].get("run_in", 0.0) * 60
     assert 0 <= info["position"] <= run_in
     assert info["reward_terms"]["effort"] == 0.0

@@ -59,10 +59,11 @@ def test_the_line_is_another_one_too():
 
 def test_entries_have_a_mean_near_0_and_a_spread_near_1():
     env = gymnasium.make(NAME)
-    seen = np.concatenate([play(env, seed=seed)[0] for seed in range(6)])
+    seen = np.concatenate([play(env, seed=seed)[0] for seed in range(12)])
     entries = env.unwrapped.context.layout.entries
     for entry, values in zip(entries, seen.T, strict=True):
-        assert abs(values.mean()) < 0.3, entry.name
+        # What tension a line has moves all of it up or down, by about a centimetre, a scale of both heights.
+        assert abs(values.mean()) < (0.6 if "displacement" in entry.name else 0.3), entry.name
         if entry.name not in ("nominal force", "last frame action"):  # which a passive run never changes
             assert 0.5 < values.std() < 1.5, entry.name
     assert {"force deviation", "nominal force", "speed"} <= {entry.name for entry in entries}
@@ -197,7 +198,9 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_keeps_the_rule(tmp_path
         environment = usual["environment"] | {"reward": reward}
         training = parse_training(usual | {"environment": environment}, name)
         folder = train(training, tmp_path / name, progress=False)
-        pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), 2).run(str(folder.path / "model.zip"))
+        pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), range(2)).run(
+            str(folder.path / "model.zip")
+        )
         means.append(np.mean([pair.policy.mean for pair in pairs]))
         verdicts.append(verdict(pairs))
     (ratio, qualified), (_, without_qualified) = verdicts

@@ -1,4 +1,4 @@
-"""The study of what diagnosis finds: its counting on made-up cases, and, slowly, the bars themselves."""
+"""The study of what diagnosis finds: its counting on made-up cases. Its bars are in ``test_paper2``."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ def case(kind="", severity=0.0, detected=False, others=0, passes=1, located=None
 
 def test_what_is_judged_was_not_trained_on():
     assert not set(judged.SPEEDS_KMH) & set(SPEEDS_KMH)
-    assert not set(judged.SEEDS) & set(SEEDS)
+    tracks = study.tracks()
+    assert len({track.seed for track in tracks} - set(SEEDS)) == len(tracks)
     assert judged.PANTOGRAPH != PANTOGRAPH
     assert len(set(judged.LINES) - set(LINES)) == 2
 
@@ -83,11 +84,3 @@ def test_a_defect_is_drawn_where_it_says_it_is():
             assert defect.position == pytest.approx(at)
     spot = draw_defect(TRACK, "hard spot", 2.0, 14, random)
     assert 13 * 60 <= spot.position <= 14 * 60
-
-
-@pytest.mark.slow
-def test_broken_droppers_meet_the_bar_at_speeds_not_trained_on():
-    """95 % within a dropper interval, no more than one false alarm in 10 km; minutes on all cores."""
-    cases = study.all_cases()
-    for comparison in study.comparisons(cases):
-        assert comparison.agrees, comparison

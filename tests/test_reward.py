@@ -3,6 +3,10 @@
 import gymnasium
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt, sosfilt_zi
+
+from panto_env import InputError, simulate
+from panto_env.control.reward import REWARDS
 
 NAME = "panto_env:PantographStiffness-v0"
 WEIGHTS = {"cost_function": 0.7, "contact_loss": 3.0, "effort": 0.2, "rate": 0.4}
@@ -130,3 +134,66 @@ def test_vector_environment_counts_changes_of_action_in_each_lane():
         before, ended = actions, terminated | truncated
         ends += ended.sum()
     assert ends >= 6
+
+
+@pytest.mark.parametrize("target", ["nominal", "passive"])
+def test_term_of_the_low_passed_force_is_scipy_s(target):
+    """Behind a Butterworth filter of sixth order at 20 Hz, settled at the first sample."""
+    weights = {"cost_function": 0.0, "contact_loss": 0.0, "low_passed": 0.5, "target": target}
+    given = {"reward": weights, "speed_kmh": 300, "pantograph": "identified-2dof"}
+    env = gymnasium.make(NAME, **given).unwrapped
+    env.reset(seed=0)
+    rewards, told, ended = [], [], False
+    random = np.random.default_rng(0)
+    while not ended:
+        _, reward, *ends, info = env.step(random.uniform(-0.3, 0.3, 1))
+        rewards.append(reward)
+        told.append(info["reward_terms"]["low_passed"])
+        ended = any(ends)
+    run = env.trajectory
+    sections = butter(6, 20, fs=1 / run.time_step, output="sos")
+    force = run.contact_force
+    filtered, _ = sosfilt(sections, force, zi=sosfilt_zi(sections) * force[0])
+    aim = scale = run.nominal_force
+    if target == "passive":
+        passive = simulate("periodic-stiffness", "identified-2dof", 300.0).summary()
+        aim, scale = passive.mean, passive.std
+        assert aim < 0.9 * run.nominal_force  # a spring pulls back
+    expected = (((filtered - aim) / scale) ** 2).reshape(len(rewards), -1).mean(axis=1)
+    assert told == pytest.approx(expected, rel=1e-6)
+    assert rewards == pytest.approx(-0.5 * expected, rel=1e-6)
+
+
+def test_running_mean_counts_from_the_passive_mean_too():
+    weights = {"cost_function": 0.0, "contact_loss": 0.0, "mean_force": 1.0}
+    given = {"speed_kmh": 300, "pantograph": "identified-2dof", "distance": 300.0}
+    sums = {}
+    for target in ("nominal", "passive"):
+        env = gymnasium.make(NAME, reward=weights | {"target": target}, **given).unwrapped
+        env.reset(seed=0)
+        sums[target] = np.mean([env.step([0.0])[1] for _ in range(300)][100:])
+    assert sums["nominal"] < -0.01
+    assert -0.002 < sums["passive"] <= 0.0
+
+
+def test_presets_of_the_reward():
+    pushes = np.full((30, 1), 0.5)
+    usual, preset, other = (
+        play(gymnasium.make(NAME, reward=reward).unwrapped, pushes)[0].tolist()
+        for reward in (None, "paper1", "paper1:effort=0.1")
+    )
+    assert usual == preset != other
+    assert REWARDS["agent"].low_passed > 0
+    with pytest.raises(InputError, match="reward must be 'paper1' or 'agent'"):
+        gymnasium.make(NAME, reward="papr1")
+
+
+def test_early_end_is_no_way_out_of_the_low_passed_term():
+    given = {"actuator": {"force_limit": 400.0}, "distance": 400.5, "reward": "agent:mean_force=0,rate=0"}
+    env = gymnasium.make(NAME, **given).unwrapped
+    rewards, _, (terminated, _) = play(env, np.full((1000, 1), -1.0))
+    assert terminated
+    steps = np.ceil(400.5 / (env.trajectory.speed_kmh / 3.6 * 0.01)) - len(rewards)
+    passive = simulate("periodic-stiffness", "three-mass", 300.0).summary()
+    charge = steps * (1.0 + (passive.mean / passive.std) ** 2)
+    assert rewards[-1] == pytest.approx(rewards[-2] - charge, rel=0.02)

@@ -38,7 +38,7 @@ class Blind:
     def __init__(self, policy: Policy) -> None:
         """policy: that is shown it."""
         self._policy = policy
-        self.observation = wishes(policy).get("observation")
+        vars(self).update(wishes(policy))
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""

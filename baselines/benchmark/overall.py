@@ -15,12 +15,10 @@ from .statistics import (
     TRIM,
     Array,
     Cell,
+    Place,
     interquartile_mean,
     relative_changes,
 )
-
-Place = tuple[str, str, float]
-"""Line, pantograph and speed (km/h) of a cell."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,7 @@ class Standing:
     effort: float  # rms actuator force, mean over cells (N)
     power: float  # mechanical power, mean over cells (W)
     saturation: float  # share of control steps at the actuator's limit, mean over cells
+    oracle_share: float | None  # of what stored oracles gain, mean over cells; None: one has none
     better_than: Mapping[str, float]  # by other policy: share of passes with a smaller change than it
     disqualified: str  # the reason, or "" if it qualifies in every cell
     rank: int | None  # by ``change``, from 1
@@ -80,6 +79,7 @@ def _standing(policy: str, changes: Mapping[str, Mapping[Place, Array]], cells: 
         effort=mean("effort"),
         power=mean("power"),
         saturation=mean("saturation"),
+        oracle_share=_oracle_share(own),
         better_than={
             other: float(np.mean([np.mean(by_place[place] < found[place]) for place in by_place]))
             for other, found in changes.items()
@@ -88,6 +88,11 @@ def _standing(policy: str, changes: Mapping[str, Mapping[Place, Array]], cells: 
         disqualified=f"{_where(reasons[0])}: {reasons[0].disqualified}" if reasons else "",
         rank=None,
     )
+
+
+def _oracle_share(cells: Sequence[Cell]) -> float | None:
+    shares = [cell.oracle_share for cell in cells if cell.oracle_share is not None]
+    return float(np.mean(shares)) if len(shares) == len(cells) else None
 
 
 def _where(cell: Cell) -> str:

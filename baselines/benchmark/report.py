@@ -60,7 +60,7 @@ def _overall(outcome: Benchmark) -> Table:
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("policy", overflow="fold")
     best = next((each for each in outcome.standings if each.rank == 1), None)
-    headings = ["rank", "Δσ (%)", "worst cell (%)", "passes improved", "power (W)", "at limit"]
+    headings = ["rank", "Δσ (%)", "worst cell (%)", "passes improved", "of oracle", "power (W)", "at limit"]
     for heading in [*headings, *(["beaten by the first in"] if best else [])]:
         table.add_column(heading, justify="right")
     for each in outcome.standings:
@@ -70,6 +70,7 @@ def _overall(outcome: Benchmark) -> Table:
             f"{number(each.change, 1)}{low_high}",
             f"{number(each.worst, 1)} at {each.worst_at}",
             _share(each.improved),
+            "–" if each.oracle_share is None else _share(each.oracle_share),
             number(each.power, 1),
             number(each.saturation, 2),
         ]
@@ -114,6 +115,9 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
             if cell.disqualified:
                 sentence = f"{cell.policy} at {speed:g} km/h is disqualified: {cell.disqualified}."
                 disqualifications.append(Text(sentence, style="red"))
+            if cell.policy == REFERENCE and cell.oracle is not None:
+                row = ["", "oracle", "", "", f"{cell.oracle:+.1f}"]
+                table.add_row(*row, *[""] * (len(table.columns) - len(row)), style="dim")
         table.add_section()
     return [table, *disqualifications]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -18,11 +19,12 @@ from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
 from panto_env.policies import find_policy
 
+from ..oracle.stored import stored_ratio
 from .controls import policy_of
 from .overall import Standing, standings
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, run_pass
-from .statistics import Cell, compare
+from .statistics import Cell, Place, compare
 from .trace import Trace
 
 SUFFIXES = (".json", *TABLES)
@@ -48,7 +50,7 @@ class Benchmark:
                 "settings": self.settings.model_dump(mode="json"),
                 "spans": self.spans,
                 "standings": [asdict(each) for each in self.standings],
-                "cells": [asdict(cell) for cell in self.cells],
+                "cells": [asdict(cell) | {"oracle_share": cell.oracle_share} for cell in self.cells],
                 "rows": [row.as_dict() for row in self.rows],
                 "traces": [asdict(each) for each in self.traces],
             }
@@ -96,23 +98,39 @@ def run(
         passes = in_processes(jobs, workers=workers, progress=progress)
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows)
+    cells = compare(rows, _bounds(settings, spans))
     return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
 
 
-def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
-    """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
-    given = {
+def _bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
+    """Change of sigma (%) of the stored oracles of exactly these cells, as far as there are any."""
+    found = {}
+    for line, covered in zip(settings.lines, spans, strict=True):
+        for speed in line.speeds_kmh:
+            ratio = stored_ratio(_given(settings, line) | {"speed_kmh": speed}, spans=covered)
+            if ratio is not None:
+                found[line.catenary, line.pantograph, speed] = 100 * (ratio - 1)
+    return found
+
+
+def _given(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
+    """Settings of the runs along a line, by name, but for the speed."""
+    return {
         "catenary": line.catenary,
         "pantograph": line.pantograph,
-        "speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh)),
         "actuator": settings.actuator,
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
         "pantograph_scatter": settings.pantograph_scatter,
+        "speed_drift": settings.speed_drift,
         "distance": line.distance,
         "control_interval": settings.control_interval,
     }
+
+
+def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
+    """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
+    given = _given(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))
     last = last_whole_span(task.distance, task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SETTLED, last)

@@ -21,6 +21,6 @@ def check_seeds(seeds: Iterable[int], purpose: Purpose) -> None:
     wrong = next((seed for seed in seeds if seed not in own), None)
     if wrong is not None:
         raise InputError(
-            f"Seed {wrong} is not for {purpose}: its seeds are {own.start} to {own.stop - 1}, the others are "
-            "kept for other purposes, so that nothing is judged on what it has seen."
+            f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {wrong}: what a policy learns from, is "
+            "chosen by and is judged on must differ."
         )

@@ -93,6 +93,9 @@ class BenchmarkSettings(Settings):
     pantograph_scatter: Annotated[float, Field(ge=0, le=0.3)] = Field(
         default("pantograph_scatter"), description=description("pantograph_scatter")
     )
+    speed_drift: Annotated[float, Field(ge=0, le=10)] = Field(
+        default("speed_drift"), description=description("speed_drift")
+    )
     control_interval: Positive = Field(
         default("control_interval"), description=description("control_interval")
     )

@@ -140,6 +140,7 @@ def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: 
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
         "pantograph_scatter": settings.pantograph_scatter,
+        "speed_drift": settings.speed_drift,
         "control_interval": settings.control_interval,
         "distance": line.distance,
         "record_droppers": False,
@@ -161,7 +162,7 @@ class _CommandRecorder:
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self.name = policy, name
-        self.observation = wishes(policy).get("observation")
+        vars(self).update(wishes(policy))
         self._actions: list[Array] = []
 
     def reset(self, context: Context) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,10 @@ RESAMPLES = 9999
 CONFIDENCE = 0.95
 MOVED = 0.015
 """Share by which a policy may move the mean force from that of its own passive run."""
+
+
+Place = tuple[str, str, float]
+"""Line, pantograph and speed (km/h) of a cell."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,16 @@ class Cell:
     mean_change: float  # of the mean force against the passive pantograph (%)
     improved: float  # share of passes with a smaller sigma than the pressed passive pantograph's
     spread: float  # standard deviation of sigma over the seeds, over its mean (%)
+    oracle: (
+        float | None
+    )  # change of sigma that a stored oracle reaches in this cell (%); None: none is stored
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
+
+    @property
+    def oracle_share(self) -> float | None:
+        """Share of what a stored oracle gains; None where none is stored."""
+        return None if self.oracle is None else self.change / self.oracle + 0.0  # no minus zero
 
 
 def interquartile_mean(values: Array) -> float:
@@ -75,26 +88,33 @@ def mean_range(passive: float) -> tuple[float, float]:
     return passive * (1 - MOVED), passive * (1 + MOVED)
 
 
-def compare(rows: Sequence[Row]) -> tuple[Cell, ...]:
-    """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference."""
-    groups: dict[tuple[str, str, float], dict[str, list[Row]]] = {}
+def compare(rows: Sequence[Row], oracles: Mapping[Place, float] = MappingProxyType({})) -> tuple[Cell, ...]:
+    """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference.
+
+    oracles: change of sigma (%) of stored oracles, where there are any.
+    """
+    groups: dict[Place, dict[str, list[Row]]] = {}
     for row in rows:
         group = groups.setdefault((row.catenary, row.pantograph, row.speed_kmh), {})
         group.setdefault(row.policy, []).append(row)
-    return tuple(cell for rows_of_policies in groups.values() for cell in _ranked_cells(rows_of_policies))
+    return tuple(
+        cell
+        for place, rows_of_policies in groups.items()
+        for cell in _ranked_cells(rows_of_policies, oracles.get(place))
+    )
 
 
-def _ranked_cells(rows_of_policies: dict[str, list[Row]]) -> list[Cell]:
+def _ranked_cells(rows_of_policies: dict[str, list[Row]], oracle: float | None) -> list[Cell]:
     """Cells of all policies on one line at one speed."""
     passive_rows = rows_of_policies[REFERENCE]
-    cells = [_cell(rows, passive_rows) for rows in rows_of_policies.values()]
+    cells = [_cell(rows, passive_rows, oracle) for rows in rows_of_policies.values()]
     changes = sorted(cell.change for cell in cells if not cell.disqualified)
     return [
         cell if cell.disqualified else replace(cell, rank=1 + changes.index(cell.change)) for cell in cells
     ]
 
 
-def _cell(rows: list[Row], passive_rows: list[Row]) -> Cell:
+def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cell:
     """Cell of one policy on one line at one speed; its rank is still missing."""
     first = rows[0]
     tables = [row.as_dict() for row in rows]
@@ -122,6 +142,7 @@ def _cell(rows: list[Row], passive_rows: list[Row]) -> Cell:
         cost_change=100 * interquartile_mean(costs),
         mean_change=100 * mean_change,
         improved=float("nan") if np.isnan(changes).any() else float(np.mean(changes < 0)),
+        oracle=oracle,
         spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
         disqualified=_disqualification(rows, passive_rows, mean_change),
         rank=None,

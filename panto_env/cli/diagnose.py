@@ -22,7 +22,7 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             metavar="RUN...",
-            help="Healthy runs over the same line at the same speed, three or more; better six or more.",
+            help="Healthy runs over the same line at the same speed, three or more; better ten or more.",
         ),
     ] = None,
     again: Annotated[
@@ -32,14 +32,22 @@ def diagnose(
     false_alarms: Annotated[
         float | None, typer.Option(help="False alarms per km that set the threshold. Default: 0.1.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the noise of the estimated forces.")] = 0,
+    pantograph: Annotated[
+        str | None,
+        typer.Option(
+            help="As the estimator knows it: a name of the catalogue or a TOML file. Default: the one of the "
+            "catalogue that a run names."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Say whether a line is healthy, and if not, where and of which kind its defects are.
 
     The force is held against that of healthy runs, place by place, from the tenth span on. It is not taken
-    as simulated, but as an estimator on the train would give it: up to 20 Hz, with noise.
+    as simulated, but as an estimator on the train finds it, up to 20 Hz, from displacements of collector head
+    and frame with noise, and from the pantograph as designed.
     """
     from ..diagnosis import diagnose as judge
     from ..diagnosis.tables import findings_table, verdict
@@ -57,7 +65,7 @@ def diagnose(
     with progress_console.status("reading and judging"):
         runs = [Trajectory.load(path) for path in (run, *(again or []))]
         reference = [Trajectory.load(path) for path in (*healthy, *(more or []))]
-        found = judge(runs, reference, false_alarms=rate, seed=seed)
+        found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
     if plot is not None:
         from ..analysis.plots import save
         from ..diagnosis.plots import plot_diagnosis

@@ -32,6 +32,16 @@ CENTRES = {
     "nominal force": (120.0, 30.0),
 }
 """Centre and scale in "centred" of entries that "measured" has too, from passive runs of Pantograph-v0."""
+FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
+"""Scale and unit of the force deviation."""
+READING_ENTRIES = (
+    ("head displacement", 0.1, "m"),
+    ("frame displacement", 0.1, "m"),
+    ("head velocity", 1.0, "m/s"),
+    ("frame velocity", 1.0, "m/s"),
+    ("contact force", 100.0, "N"),
+)
+"""Name, scale and unit of what sensors read, in the order of ``Reading``."""
 KINDS: dict[str, tuple[str, ...]] = {
     MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED),
     FULL: (FULL,),
@@ -41,7 +51,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 
 
 class Entry(NamedTuple):
-    """One entry of an observation: physical value = centre + entry * scale."""
+    """One entry of an observation: physical value = centre + slope * speed + entry * scale."""
 
     name: str
     scale: float
@@ -49,10 +59,20 @@ class Entry(NamedTuple):
     writer: int  # place in WRITERS
     number: int = 0
     centre: float = 0.0
+    slope: float = 0.0  # in its unit, for each m/s of the train
+
+
+class Asked(NamedTuple):
+    """What decides which entries there are, beside the kind of observation."""
+
+    actuator: ActuatorSettings
+    pantograph: PantographData
+    harmonics: int = 1  # of the position within the span
+    history: int = 0  # earlier control steps
 
 
 Writer = Callable[..., Any]
-Listing = Callable[[ActuatorSettings, PantographData], list[tuple[str, float, str, int]]]
+Listing = Callable[[Asked], list[tuple[str, float, str, int]]]
 """Name, scale, unit and number of all entries that share a writer."""
 WRITERS: list[Writer] = []
 """Writers of all entries; a kernel knows an entry's writer by its place here."""
@@ -63,7 +83,7 @@ def entry(
     kind: str, name: str, scale: float, unit: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorator of the writer of one entry; kind: MEASURED, which all have, or the only one that has it."""
-    return entries(kind, lambda actuator, pantograph: [(name, scale, unit, 0)])
+    return entries(kind, lambda _: [(name, scale, unit, 0)])
 
 
 def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
@@ -77,66 +97,71 @@ def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
     return register
 
 
-def entries_of(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> list[Entry]:
+def entries_of(kind: str, asked: Asked) -> list[Entry]:
     """All entries of an observation, in order."""
     entries = [
         Entry(name, scale, unit, writer, number)
         for writer, (belongs_to, listing) in enumerate(_LISTINGS)
         if kind in KINDS[belongs_to]
-        for name, scale, unit, number in listing(actuator, pantograph)
+        for name, scale, unit, number in listing(asked)
     ]
     if kind != CENTRED:
         return entries
-    centred = [entry for entry in entries if entry.name != "contact force"]  # its deviation stands for it
+    centred = [entry for entry in entries if present(entry) != "contact force"]  # its deviation stands for it
     return [
-        entry._replace(centre=CENTRES[entry.name][0], scale=CENTRES[entry.name][1])
-        if entry.name in CENTRES
+        entry._replace(centre=CENTRES[present(entry)][0], scale=CENTRES[present(entry)][1])
+        if present(entry) in CENTRES
         else entry
         for entry in centred
     ]
 
 
-@entry(MEASURED, "head displacement", 0.1, "m")
-def _head_displacement(episode, own, task, now, number):
-    return now[NOW.READING + READING.HEAD_HEIGHT]
+def earlier(name: str, steps: int) -> str:
+    """Name of an entry as it was so many control steps ago."""
+    return f"{name}, {steps} step{'s' if steps > 1 else ''} ago"
 
 
-@entry(MEASURED, "frame displacement", 0.1, "m")
-def _frame_displacement(episode, own, task, now, number):
-    return now[NOW.READING + READING.FRAME_HEIGHT]
+def present(entry: Entry) -> str:
+    """Name of an entry, or of that which it is an earlier value of."""
+    return entry.name.partition(", ")[0]
 
 
-@entry(MEASURED, "head velocity", 1.0, "m/s")
-def _head_velocity(episode, own, task, now, number):
-    return now[NOW.READING + READING.HEAD_VELOCITY]
-
-
-@entry(MEASURED, "frame velocity", 1.0, "m/s")
-def _frame_velocity(episode, own, task, now, number):
-    return now[NOW.READING + READING.FRAME_VELOCITY]
-
-
-@entry(MEASURED, "contact force", 100.0, "N")
-def _contact_force(episode, own, task, now, number):
-    return now[NOW.READING + READING.CONTACT_FORCE]
+@entries(MEASURED, lambda _: [(*each, row) for row, each in enumerate(READING_ENTRIES)])
+def _reading(episode, own, task, now, number):
+    return now[NOW.READING + number]
 
 
 @entry(MEASURED, "sine of span position", 1.0, "-")
 def _span_sine(episode, own, task, now, number):
-    return sine_of_turns(now[NOW.SPANS])
+    return episode.odometer.sight * sine_of_turns(now[NOW.SPANS])
 
 
 @entry(MEASURED, "cosine of span position", 1.0, "-")
 def _span_cosine(episode, own, task, now, number):
-    return cosine_of_turns(now[NOW.SPANS])
+    return episode.odometer.sight * cosine_of_turns(now[NOW.SPANS])
+
+
+def _harmonics(asked: Asked) -> list[tuple[str, float, str, int]]:
+    """Sine and cosine of each multiple of the position within the span but the first, two above."""
+    return [
+        (f"{wave} of span position, harmonic {k}", 1.0, "-", 2 * k + half)
+        for k in range(2, asked.harmonics + 1)
+        for half, wave in enumerate(("sine", "cosine"))
+    ]
+
+
+@entries(MEASURED, _harmonics)
+def _span_harmonic(episode, own, task, now, number):
+    turns = float(number // 2) * now[NOW.SPANS]
+    return sine_of_turns(turns + 0.25 * float(number % 2))
 
 
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, own, task, now, number):
-    return own[ROW.STRIDE] * (1.0 / episode.time_step)
+    return now[NOW.SPEED]
 
 
-@entry(CENTRED, "force deviation", 0.3, "of the nominal force")
+@entry(CENTRED, "force deviation", FORCE_DEVIATION, OF_NOMINAL)
 def _force_deviation(episode, own, task, now, number):
     return now[NOW.READING + READING.CONTACT_FORCE] / own[ROW.NOMINAL_FORCE] - 1.0
 
@@ -146,8 +171,12 @@ def _nominal_force(episode, own, task, now, number):
     return own[ROW.NOMINAL_FORCE]
 
 
-def _actions(actuator: ActuatorSettings, _: PantographData) -> list[tuple[str, float, str, int]]:
-    return [(f"last {place.name.lower()} action", 1.0, "-", k) for k, place in enumerate(actuator.places)]
+def _actions(asked: Asked) -> list[tuple[str, float, str, int]]:
+    return [(name, 1.0, "-", k) for k, name in enumerate(_action_names(asked.actuator))]
+
+
+def _action_names(actuator: ActuatorSettings) -> list[str]:
+    return [f"last {place.name.lower()} action" for place in actuator.places]
 
 
 @entries(MEASURED, _actions)
@@ -160,19 +189,19 @@ def _wire_displacement(episode, own, task, now, number):
     return own[ROW.WIRE_HEIGHT]
 
 
-@entries(FULL, lambda actuator, _: [("frame force", actuator.force_limit, "N", 0)])
+@entries(FULL, lambda asked: [("frame force", asked.actuator.force_limit, "N", 0)])
 def _frame_force(episode, own, task, now, number):
     return own[ROW.FRAME_FORCE]
 
 
-@entries(FULL, lambda actuator, _: [("head force", actuator.force_limit, "N", 0)])
+@entries(FULL, lambda asked: [("head force", asked.actuator.force_limit, "N", 0)])
 def _head_force(episode, own, task, now, number):
     return own[ROW.HEAD_FORCE]
 
 
-def _inner_masses(_: ActuatorSettings, pantograph: PantographData) -> list[tuple[str, float, str, int]]:
+def _inner_masses(asked: Asked) -> list[tuple[str, float, str, int]]:
     """Displacement and velocity of each mass between head and frame."""
-    count = len(pantograph.masses)
+    count = len(asked.pantograph.masses)
     places = [(k, f"mass {k + 1}") for k in range(1, count - 1)]
     pairs = [
         ((f"{mass} displacement", 0.1, "m", k), (f"{mass} velocity", 1.0, "m/s", count + k))
@@ -184,3 +213,33 @@ def _inner_masses(_: ActuatorSettings, pantograph: PantographData) -> list[tuple
 @entries(FULL, _inner_masses)
 def _pantograph_state(episode, own, task, now, number):
     return own[ROW.STATE + number]
+
+
+def _remembered(asked: Asked) -> list[tuple[str, float, str, int]]:
+    """Readings and actions of earlier control steps; number: row behind that of the first action."""
+    actions = _action_names(asked.actuator)
+    rows = [*READING_ENTRIES, *((name, 1.0, "-") for name in actions)]
+    return [
+        (earlier(name, k), scale, unit, len(actions) + (k - 1) * len(rows) + row)
+        for k in range(1, asked.history + 1)
+        for row, (name, scale, unit) in enumerate(rows)
+    ]
+
+
+@entries(MEASURED, _remembered)
+def _earlier(episode, own, task, now, number):
+    return task[TASK_ROW.ACTION + number]
+
+
+def _remembered_deviations(asked: Asked) -> list[tuple[str, float, str, int]]:
+    rows = {name: number for name, _, _, number in _remembered(asked)}
+    steps = range(1, asked.history + 1)
+    return [
+        (earlier("force deviation", k), FORCE_DEVIATION, OF_NOMINAL, rows[earlier("contact force", k)])
+        for k in steps
+    ]
+
+
+@entries(CENTRED, _remembered_deviations)
+def _earlier_deviation(episode, own, task, now, number):
+    return task[TASK_ROW.ACTION + number] / own[ROW.NOMINAL_FORCE] - 1.0

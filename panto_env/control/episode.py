@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..backend import lane_table
 from ..base.arrays import Array, Index
 from ..plant.plant import Plant
+from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
-from .observation import Layout
+from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
 from .state import RESULT_ROWS, Flag, Result, TaskRow
@@ -26,13 +27,16 @@ class Episode(NamedTuple):
     action: Array  # (actions, lanes): asked for in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
-    table: Array  # (groups, ACTION + actions, lanes abreast): rows of ``TaskRow``
+    table: Array  # (groups, ACTION + actions + history, lanes abreast): rows of ``TaskRow``
     weights: Array  # (terms,): of the reward
     idle: Flags  # (lanes,): lanes that are to stay as they are
     steps: Index  # (lanes,): control steps that a call makes, more than one only where lanes go one by one
     writers: Index  # (entries, 2): writer and number of each entry of the observation
+    history: int  # of the observation: earlier control steps
     centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
+    slope: Array  # (entries,): of the observation, what is added to that for each metre in a plant step
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
+    odometer: OdometerArrays  # by which trains know where they are, and their speed
     spans_per_metre: float  # 1/m
     time_step: float  # s
     control_steps: int  # plant steps in a control step
@@ -41,15 +45,18 @@ class Episode(NamedTuple):
     head_range: float  # height of the head (m), either way, that ends an episode
 
 
-def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_steps: int) -> Episode:
+def new_episode(
+    settings: RunSettings, plant: Plant, layout: Layout, control_steps: int, odometer: OdometerArrays
+) -> Episode:
     """Of all lanes of a plant, none begun; control_steps: plant steps in a control step."""
     lanes, abreast, actuator = plant.lanes, plant.lanes_abreast, settings.actuator
-    table = lane_table(TaskRow.ACTION + len(actuator.places), lanes, abreast)
+    actions = len(actuator.places)
+    table = lane_table(TaskRow.ACTION + actions + layout.history * (READINGS + actions), lanes, abreast)
     table[:, TaskRow.DISTANCE] = 1.0  # of places without a lane: it is divided by
     # An odd number of groups: rows a power of two apart would drive each other out of a cache.
     places = (len(table) | 1) * abreast
     return Episode(
-        action=np.zeros((len(actuator.places), places)),
+        action=np.zeros((actions, places)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,
         table=table,
@@ -57,8 +64,11 @@ def new_episode(settings: RunSettings, plant: Plant, layout: Layout, control_ste
         idle=np.arange(places) >= lanes,
         steps=np.ones(places, dtype=np.int64),
         writers=layout.writers,
+        history=layout.history,
         centre=layout.centre,
+        slope=layout.slope / plant.time_step,
         per_unit=1 / layout.scale,
+        odometer=odometer,
         spans_per_metre=1.0 / float(plant.catenary.span_length),
         time_step=plant.time_step,
         control_steps=control_steps,

@@ -7,6 +7,7 @@ import math
 from ..base.errors import InputError
 from ..metrics.spans import CLEAR
 from ..plant.catenary.schema import MOST_SPANS
+from ..plant.drift import largest_drift
 from ..plant.numerics import Runs
 from .settings import RunSettings
 
@@ -14,8 +15,15 @@ from .settings import RunSettings
 def runs(settings: RunSettings) -> Runs:
     """What the plant must be good for."""
     slow, quick = settings.speed_kmh
+    drift = largest_drift(settings.speed_drift)
     pantograph, interval = settings.pantograph, settings.control_interval
-    return Runs((slow / 3.6, quick / 3.6), interval, settings.line_condition, pantograph.hard_contact)
+    speeds = (slow - drift) / 3.6, (quick + drift) / 3.6
+    return Runs(
+        speeds,
+        interval,
+        settings.line_condition,
+        pantograph.hard_contact,
+    )
 
 
 def spans(settings: RunSettings) -> int | None:

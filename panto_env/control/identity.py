@@ -9,9 +9,10 @@ from pydantic import BaseModel
 from ..base.files import finite
 from ..base.version import __version__
 from ..plant.plant import Plant
+from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
 
-NOT_OF_A_RUN = ("observation", "reward")
+NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward")
 """Settings that only a policy sees."""
 
 

@@ -21,6 +21,7 @@ from ..base.files import write_whole
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from ..plant.line_condition import LineCondition
+from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, far_enough
 
 TOLERANCE = 0.05
@@ -29,7 +30,7 @@ MOST_RUNS = 10
 KNOT_DISTANCE = 5.0
 """Largest distance (km/h) of the speeds that a range is trimmed at. Between them the force is interpolated,
 and the mean is within some 0.3 N of its target."""
-NO_MATTER = {"observation", "reward", "actuator", "sensors", "mean_force"}
+NO_MATTER = {*OBSERVATION_SETTINGS, "reward", "actuator", "sensors", "mean_force"}
 """Settings on which the mean force of a passive run does not depend."""
 
 PassiveMean = Callable[[float], float]
@@ -87,6 +88,7 @@ def trim_as_designed(
     as_designed = {
         "line_condition": (LineCondition(),),
         "pantograph_scatter": 0.0,
+        "speed_drift": 0.0,
         "distance": None,
         "spans": None,
     }

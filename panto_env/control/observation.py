@@ -22,12 +22,11 @@ from ..backend import (
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
-from ..plant.actuators import ActuatorSettings
-from ..plant.pantograph.schema import PantographData
-from ..plant.sensors import Reading
+from ..plant.drift import position_after, stride_after
+from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
-from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, entries_of
-from .state import MAX_ENTRIES, NOW
+from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Asked, Entry, earlier, entries_of
+from .state import NOW, TASK_ROW
 
 READINGS = len(Reading)
 BOUND = 10.0
@@ -40,6 +39,9 @@ class Layout:
 
     kind: str
     entries: tuple[Entry, ...]
+    harmonics: int = 1  # of the position within the span
+    history: int = 0  # earlier control steps
+    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that readings count from
 
     @property
     def scale(self) -> Array:
@@ -50,6 +52,20 @@ class Layout:
     def centre(self) -> Array:
         """What each entry, (entries,), is counted from, in its unit."""
         return np.array([entry.centre for entry in self.entries])
+
+    @property
+    def slope(self) -> Array:
+        """By how much that grows, (entries,), in its unit for each m/s of the train."""
+        return np.array([entry.slope for entry in self.entries])
+
+    @property
+    def earlier(self) -> tuple[Index, Index]:
+        """Places of all earlier values, and of the present value of each."""
+        names = {entry.name: place for place, entry in enumerate(self.entries)}
+        steps = range(1, self.history + 1)
+        pairs = [(names[earlier(n, k)], p) for n, p in names.items() for k in steps if earlier(n, k) in names]
+        past, now = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        return past, now
 
     @property
     def writers(self) -> Index:
@@ -73,19 +89,19 @@ class Layout:
             return nominal_force * (1 + self.read(observation, "force deviation"))
         place = self.index(name)
         entry = self.entries[place]
-        return entry.centre + float(observation[place]) * entry.scale
+        shift = 0.0 if entry.slope == 0.0 else entry.slope * self.read(observation, "speed")
+        return entry.centre + shift + float(observation[place]) * entry.scale
 
 
+OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "normalise")
+"""Settings of a run that decide what a policy sees, and nothing else."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
 
 
-def layout(kind: str, actuator: ActuatorSettings, pantograph: PantographData) -> Layout:
+def layout(kind: str, asked: Asked) -> Layout:
     """Entries of the observation ``kind``, one of OBSERVATIONS."""
-    entries = tuple(entries_of(kind, actuator, pantograph))
-    if len(entries) > MAX_ENTRIES:
-        raise ValueError(f"the observation '{kind}' has {len(entries)} entries; at most are {MAX_ENTRIES}")
-    return Layout(kind, entries)
+    return Layout(kind, tuple(entries_of(kind, asked)), asked.harmonics, asked.history)
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
@@ -119,15 +135,50 @@ def add_noise(sensors, idle, readings, lane):
 
 
 @inlined
-def prepare_entries(episode, sensors, own, now, lane):
+def prepare_entries(episode, sensors, run, own, now, lane):
     """Make ready what entries of an observation look at: noise is added to the readings of a group."""
     if sensors.noise.shape[1] > 0:
         add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
-    now[NOW.SPANS] = own[ROW.STRIDE] * own[ROW.STEP] * episode.spans_per_metre
+    now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
+    now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
+    if episode.odometer.table.shape[1] > 0:
+        spans, speed = rows_from(now, NOW.SPANS), rows_from(now, NOW.SPEED)
+        read_odometer(episode.odometer, episode.idle, spans, speed, lane)
+
+
+@inlined
+def remember(episode, task, now):
+    """Let the readings and actions of a group be the latest of its history."""
+    actions = episode.places.size
+    each = READINGS + actions
+    past = rows_from(task, TASK_ROW.ACTION + actions)
+    for row in range((episode.history - 1) * each - 1, -1, -1):
+        past[row + each] = past[row]
+    if episode.history > 0:
+        for k in range(READINGS):
+            past[k] = now[NOW.READING + k]
+        for a in range(actions):
+            past[READINGS + a] = task[TASK_ROW.ACTION + a]
+
+
+@inlined
+def begin_history(episode, task, now, lane):
+    """Let the history of the lanes of a group that are not idle have been as their first readings."""
+    actions = episode.places.size
+    each = READINGS + actions
+    for i in range(width_of(task)):
+        if not episode.idle[(lane + i) & NOT_NEGATIVE]:
+            for step in range(episode.history):
+                past = rows_from(task, TASK_ROW.ACTION + actions + step * each)
+                for k in range(READINGS):
+                    put_number(past, k, i, number_at(now, NOW.READING + k, i))
+                for a in range(actions):
+                    put_number(past, READINGS + a, i, number_at(task, TASK_ROW.ACTION + a, i))
 
 
 @inlined
 def entry_of(episode, own, task, now, k, entry):
     """Entry k of the observation of a group, within its bounds; entry: room for one row."""
     _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1], entry)
-    return smaller(larger((entry[0] - episode.centre[k]) * episode.per_unit[k], -BOUND), BOUND)
+    centre = episode.centre[k] + episode.slope[k] * own[ROW.STRIDE]
+    return smaller(larger((entry[0] - centre) * episode.per_unit[k], -BOUND), BOUND)

@@ -68,7 +68,7 @@ def trajectory(
     middle = (np.arange(steps) + 0.5) * plant.time_step
     return Trajectory(
         time=middle,
-        position=middle * task.speed[lane],
+        position=middle * task.speed[lane] + plant.ahead(np.array([lane]), np.arange(steps)[None] + 0.5)[0],
         contact_force=rows[:, Row.CONTACT_FORCE].copy(),
         head=rows[:, Row.HEAD_HEIGHT].copy(),
         frame=rows[:, Row.FRAME_HEIGHT].copy(),
@@ -103,8 +103,9 @@ def ending(task: Task, lane: int) -> str:
     if which is Ending.NONE:
         return ""
     plant = task.plant
-    time = plant.of(lane, Row.STEP) * plant.time_step
-    position, line = time * float(task.speed[lane]), plant.catenary
+    steps, line = plant.of(lane, Row.STEP), plant.catenary
+    time = steps * plant.time_step
+    position = time * float(task.speed[lane]) + plant.ahead(np.array([lane]), np.array([[steps]]))[0, 0]
     return (
         f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
         f"{time:.2f} s): {reason(which, line.free_uplift)}."

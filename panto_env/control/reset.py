@@ -24,10 +24,12 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
-    drawn = draw_starts(task.settings, task.speed_range, len(plant.model.droppers), lanes, of_lane)
-    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, task.static_forces(drawn.speed))
+    droppers, supports = len(plant.model.droppers), len(plant.model.supports)
+    drawn = draw_starts(task.settings, task.speed_range, droppers, supports, lanes, of_lane, plant.time_step)
+    forces = task.static_forces(drawn.speed)
+    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.control_interval))
-    end = task.plant_steps(drawn.speed, run_in)
+    end = task.plant_steps(drawn.speed, run_in, drawn.drift)
     run_in = np.minimum(run_in, end // task.control_steps - 1).astype(np.int64)
     task.speed[lanes] = drawn.speed
     _begin(task, lanes, end)
@@ -36,6 +38,9 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     task.sensors.reset(lanes, samples)
     if task.keep_samples:
         task.samples.rows[lanes, 0, 0] = samples
+    if task.odometers.drawn:
+        for lane in lanes.tolist():
+            task.odometers.start(task.episode.odometer, lane, of_lane(lane), task.noise is not None)
     if task.noise is not None:
         for lane in lanes.tolist():
             task.noise.start(task.sensors, lane, of_lane(lane))
@@ -50,7 +55,13 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     start = of_lanes(run, lanes)
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
-    rows[:, TaskRow.DISTANCE] = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    nominal = start[:, Row.NOMINAL_FORCE]
+    target, spread = task.targets(task.speed[lanes], nominal)
+    rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
+    rows[:, TaskRow.PER_SPREAD] = 1 / spread
+    shifted = task.plant.ahead(lanes, np.stack([start[:, Row.STEP], end], axis=1))
+    steady = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
     set_lanes(table, lanes, rows)
     task.running.peak[lanes] = -np.inf
 
@@ -65,3 +76,20 @@ def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
         raise InputError(task.ending(lane))
     _begin(task, lanes, rows[:, TaskRow.END])
     results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
+    if task.layout.history:
+        _forget(task, lanes, rows, results)
+
+
+def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
+    """Let the history of lanes that have run in have been as what they read at the end of that.
+
+    rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
+    """
+    first = TaskRow.ACTION + len(task.actuator.places)
+    history = rows[:, first:]
+    latest = history[:, : history.shape[1] // task.layout.history]
+    begun = of_lanes(task.episode.table, lanes)
+    begun[:, first:] = np.tile(latest, task.layout.history)
+    set_lanes(task.episode.table, lanes, begun)
+    past, now = task.layout.earlier
+    results.entries[np.ix_(past, lanes)] = results.entries[np.ix_(now, lanes)]

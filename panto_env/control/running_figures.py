@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -35,19 +36,27 @@ def no_figures(rows: int) -> Array:
 
 
 def figures_so_far(
-    table: Array, peak: Array, run: Array, supports: Array, time_step: float
+    table: Array,
+    peak: Array,
+    run: Array,
+    supports: Array,
+    time_step: float,
+    ahead: Callable[[Array], Array],
 ) -> dict[str, Array]:
     """Each of ``Figures`` by name, (lanes,), of runs so far.
 
     table: (lanes, rows of TaskRow). peak: (lanes, supports). run: (lanes, rows of Row). supports: their
-    positions (m). time_step: s.
+    positions (m). time_step: s. ahead: how far the trains are ahead of steady ones (m), (lanes, n), after
+    steps, (lanes, n).
     """
     stride, steps = run[:, Row.STRIDE], run[:, Row.STEP]
     samples = table[:, TaskRow.SAMPLES]
     shift = table[:, TaskRow.DEVIATION] / samples
     mean = run[:, Row.NOMINAL_FORCE] + shift
     std = np.sqrt(np.maximum(table[:, TaskRow.SQUARED_DEVIATION] / samples - shift**2, 0.0))
-    first, last = (steps - samples - 0.5) * stride, (steps - 0.5) * stride  # where the train was
+    begin, shifted = steps - samples, ahead(np.stack([steps - samples, steps], axis=1)).T
+    # Where the train was: half a step before either end.
+    first, last = (begin - 0.5) * stride + shifted[0], (steps - 0.5) * stride + shifted[1]
     passed = (supports > first[:, None] - 1e-6) & (supports < last[:, None] + 1e-6)
     largest = np.max(np.where(passed, peak, -np.inf), axis=1, initial=-np.inf)
     changes = np.maximum(samples - 1, 1.0)
@@ -63,7 +72,7 @@ def figures_so_far(
         "cost_function": table[:, TaskRow.ALL_COST],
         "effort": np.sqrt(table[:, TaskRow.SQUARED_EFFORT] / samples),
         "effort_rate": np.sqrt(table[:, TaskRow.SQUARED_CHANGE] / changes) / time_step,
-        "distance": samples * stride,
+        "distance": samples * stride + (shifted[1] - shifted[0]),
     }
 
 

@@ -29,7 +29,7 @@ from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
 from .observation import OBSERVATIONS
-from .reward import Reward
+from .reward import REWARDS, Reward
 
 R = TypeVar("R", bound="RunSettings")
 _Speed = Annotated[float, Field(allow_inf_nan=True)]  # a line says itself which speeds it bears
@@ -43,7 +43,7 @@ def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
 
 
 def _weights(value: Any) -> Reward:
-    return parse(Reward, {} if value is None else value, "reward")
+    return parse(Reward, {} if value is None else value, "reward", REWARDS)
 
 
 def _observation(value: Any) -> str:
@@ -90,20 +90,22 @@ def _mean_force(value: Any) -> float | str | None:
     return force
 
 
-def speed_range(speed_kmh: Any) -> tuple[float, float]:
-    """Lowest and highest speed (km/h) of a number or a range; InputError where it is neither."""
+def speed_range(speed_kmh: Any, name: str = "speed_kmh") -> tuple[float, float]:
+    """Lowest and highest speed (km/h) of a number or a range; InputError, naming it, where it is neither."""
     values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
     try:
         if any(isinstance(value, str | bool) for value in values):  # float would take them
             raise TypeError
         low, high = (float(value) for value in values)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"speed_kmh must be a number or a range of two (km/h), not {speed_kmh!r}."
-        ) from error
+        raise InputError(f"{name} must be a number or a range of two (km/h), not {speed_kmh!r}.") from error
     if low > high:
-        raise InputError(f"The range speed_kmh must not fall, as {speed_kmh!r} does.")
+        raise InputError(f"The range {name} must not fall, as {speed_kmh!r} does.")
     return low, high
+
+
+def _normalise(value: Any) -> tuple[float, float] | None:
+    return None if value is None else speed_range(value, "normalise")
 
 
 class RunSettings(Numerics):
@@ -122,6 +124,12 @@ class RunSettings(Numerics):
         validate_default=True,
         description="train speed (km/h): a number, or a range of two to draw from",
     )
+    # Own choice: a driver, or cruise control, keeps within some km/h.
+    speed_drift: Annotated[float, Between(0, 20, "km/h")] = Field(
+        0.0,
+        description="rms of a slow drift of the speed about its mean, of periods of 7 to 29 s, drawn per run "
+        "(km/h)",
+    )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
@@ -131,7 +139,8 @@ class RunSettings(Numerics):
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", one with values as "ideal:force_noise=5", or a table',
+        description='sensors: "ideal", "realistic", "blind", one with values as "ideal:force_noise=5", or a '
+        "table",
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
@@ -157,6 +166,18 @@ class RunSettings(Numerics):
         description='what a policy sees: "measured", "full", "centred" or "estimated": as measured, but with '
         "the contact force that a Kalman filter estimates from the pantograph's motion",
     )
+    harmonics: Annotated[int, Between(1, 14)] = Field(
+        1, description="sines and cosines of the position within the span, up to this multiple of it (-)"
+    )
+    history: Annotated[int, Between(0, 8)] = Field(
+        0, description="earlier control steps whose readings and actions are observed, too (-)"
+    )
+    normalise: Annotated[tuple[_Speed, _Speed] | None, BeforeValidator(_normalise)] = Field(
+        None,
+        description="speeds (km/h), a range or one, over whose passive runs, of line and pantograph as "
+        "designed, readings have a mean near 0 and a spread near 1 in the observation; by default as the "
+        "observation has them",
+    )
     estimator: Annotated[EstimatorSettings, BeforeValidator(_estimator)] = Field(
         "usual",
         validate_default=True,
@@ -169,7 +190,10 @@ class RunSettings(Numerics):
         "file; by default the true one",
     )
     reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
-        None, validate_default=True, description="weights of the reward's terms: a table"
+        None,
+        validate_default=True,
+        description='weights of the reward\'s terms: "paper1", "agent", one with values as '
+        '"agent:rate=0.01", or a table; by default paper 1\'s',
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..plant.drift import draw_drift
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.build import with_scatter
 from ..plant.pantograph.schema import PantographData
@@ -27,33 +28,39 @@ class Starts(NamedTuple):
     line: Sequence[DrawnLine]  # of each lane
     pantograph: Sequence[PantographData]  # likewise; empty where all are alike
     way: Array  # (lanes,): that they run in (m)
+    drift: Array | None  # (lanes, DRIFT_ROWS): of their speeds; None where these are constant
 
 
 def draw_starts(
     settings: RunSettings,
     speeds: tuple[float, float],
     droppers: int,
+    supports: int,
     lanes: Any,
     random: Callable[[int], np.random.Generator],
+    time_step: float,
 ) -> Starts:
     """Draw the starts of lanes, (n,), each from its own generator, asked for only where something is random.
 
-    speeds: lowest and highest (m/s). droppers: of the line.
+    speeds: lowest and highest (m/s). droppers, supports: of the line. time_step: of the plant (s).
     """
     low, high = speeds
     conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way = np.full(len(lanes), low), np.zeros(len(lanes))
-    if not (low < high or lines_differ or scatter or run_in):
-        return Starts(speed, [draw(conditions, _UNUSED, droppers)] * len(lanes), [], way)
-    line, pantograph = [], []
+    rms = settings.speed_drift / 3.6
+    if not (low < high or lines_differ or scatter or run_in or rms):
+        return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way, None)
+    line, pantograph, drift = [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
         if low < high:
             speed[k] = own.uniform(low, high)
-        line.append(draw(conditions, own, droppers))
+        line.append(draw(conditions, own, droppers, supports))
         if scatter:
             pantograph.append(with_scatter(settings.pantograph, scatter, own))
         if run_in > 0:
             way[k] = own.uniform(0, run_in) * settings.catenary.span_length
-    return Starts(speed, line, pantograph, way)
+        if rms > 0:
+            drift.append(draw_drift(rms, time_step, own))
+    return Starts(speed, line, pantograph, way, np.array(drift) if drift else None)

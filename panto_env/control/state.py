@@ -7,9 +7,6 @@ from enum import IntEnum
 from ..backend import constants
 from ..plant.sensors import Reading
 
-MAX_ENTRIES = 32
-"""Entries of an observation at most."""
-
 
 class Term(IntEnum):
     """Terms of the reward, each summed over one control step and not weighted."""
@@ -19,6 +16,7 @@ class Term(IntEnum):
     EFFORT = 2  # -
     RATE = 3  # -
     MEAN_FORCE = 4  # -
+    LOW_PASSED = 5  # -
 
 
 TERMS = tuple(term.name.lower() for term in Term)
@@ -33,8 +31,10 @@ class TaskRow(IntEnum):
     ENDING = 2  # why it ended early, an ``Ending``
     LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
     MEAN_DEVIATION = 4  # running mean of the contact force less the nominal one (N)
+    TARGET_SHIFT = 5  # force that the reward counts from, less the nominal one (N)
+    PER_SPREAD = 6  # for a squared deviation from it of 1 (1/N)
     # Running figures.
-    FILTER_STATE = 5  # of EN 50317's filter, two rows for each of three sections
+    FILTER_STATE = 7  # of EN 50317's filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6
     DEVIATION = FILTER_STATE + 7  # sum of the filtered contact force less the nominal one (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum (N^2)
@@ -44,7 +44,8 @@ class TaskRow(IntEnum):
     ALL_COST = FILTER_STATE + 12  # sum of the cost function's term (N m)
     SQUARED_EFFORT = FILTER_STATE + 13  # sum over both places (N^2)
     SQUARED_CHANGE = FILTER_STATE + 14  # sum of the actuator forces' changes from step to step (N^2)
-    ACTION = FILTER_STATE + 15  # the present one, -1..1, one row per entry
+    ACTION = FILTER_STATE + 15  # the present one, -1..1, one row per entry; then the observation's history:
+    # readings and actions of the latest control step, of the one before that, ...
 
 
 class Now(IntEnum):
@@ -55,8 +56,12 @@ class Now(IntEnum):
     SIGNED_DEVIATION = 2  # sum of the contact force less the nominal one (N)
     EFFORT = 3  # the reward's term
     RATE = 4  # likewise
-    SPANS = 5  # travelled since the start (-)
-    READING = 6  # what the sensors read, one row per ``Reading``
+    SPANS = 5  # travelled since the line's start, as read (-)
+    SPEED = 6  # of the train, as read (m/s)
+    STRIDE = 7  # mean distance covered in a plant step (m)
+    DEVIATION_BEFORE = 8  # running figure of that name as the control step begins (N)
+    SQUARED_BEFORE = 9  # likewise (N^2)
+    READING = 10  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):

@@ -27,14 +27,15 @@ from ..backend import (
     width_of,
 )
 from ..plant.catenary.protocol import ending_by_wire
+from ..plant.drift import mean_stride, position_after
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import CONTACTS, PLACE, ROW, SCRATCH, SCRATCH_ROWS
 from ..plant.step import new_scratch, record_group, step_group
 from ..plant.valid_range import ENDING
-from .observation import entry_of, prepare_entries
+from .observation import begin_history, entry_of, prepare_entries, remember
 from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
-from .state import FLAG, MAX_ENTRIES, NOW, NOW_ROWS, RESULT, RESULT_ROWS, TASK_ROW
+from .state import FLAG, NOW, NOW_ROWS, RESULT, RESULT_ROWS, TASK_ROW
 
 
 @inlined
@@ -74,14 +75,14 @@ def end_episodes(line, wire, episode, own, task, values, flags, lane):
 
 
 @inlined
-def tell(own, told):
+def tell(run, own, told, lane):
     """Write what is told of the last sample of a group."""
     told[RESULT.CONTACT_FORCE] = own[ROW.CONTACT_FORCE]
     told[RESULT.HEAD_HEIGHT] = own[ROW.HEAD_HEIGHT]
     told[RESULT.WIRE_HEIGHT] = own[ROW.WIRE_HEIGHT]
     told[RESULT.FRAME_FORCE] = own[ROW.FRAME_FORCE]
     told[RESULT.HEAD_FORCE] = own[ROW.HEAD_FORCE]
-    told[RESULT.POSITION] = own[ROW.STEP] * own[ROW.STRIDE]
+    told[RESULT.POSITION] = position_after(run, own, own[ROW.STEP], lane)
 
 
 @inlined
@@ -96,7 +97,8 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
     take_action(line, episode, task, now, scratch, lane)
     ended = False
     for _ in range(episode.steps[lane]):
-        begin_terms(now)
+        begin_terms(task, now)
+        now[NOW.STRIDE] = mean_stride(run, own, float(episode.control_steps), lane)
         for step in range(1, episode.control_steps + 1):
             force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
             step_group(line, wire, pantographs, actuators, run, scratch, lane)
@@ -109,10 +111,11 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
         ended = end_episodes(line, wire, episode, own, task, told, flags, lane)
         if ended:
             break
-    prepare_entries(episode, sensors, own, now, lane)
+    prepare_entries(episode, sensors, run, own, now, lane)
     for k in range(entries.shape[0]):
         put_across(entries, k, lane, entry_of(episode, own, task, now, k, entry))
-    tell(own, told)
+    remember(episode, task, now)
+    tell(run, own, told, lane)
     return ended
 
 
@@ -170,23 +173,25 @@ def control_steps(packed, entries, values, flags, first, last, size, role, patie
 def observe_start(packed, entries, values, flags, first, last):
     """Results of the lanes from ``first`` to before ``last`` at their start, but of idle ones; as above."""
     line, _, _, _, run, sensors, _, episode, _, _ = open_packed(packed)
-    now, seen = new_columns(line, NOW_ROWS), new_columns(line, MAX_ENTRIES)
-    told, entry = new_columns(line, RESULT_ROWS), new_columns(line, 1)
+    now, told = new_columns(line, NOW_ROWS), new_columns(line, RESULT_ROWS)
+    seen, entry = new_columns(line, 1), new_columns(line, 1)
     width = width_of(line)
     for lane in range(first - first % width, last, width):
         own, task = columns(line, run.table[0], lane), columns(line, episode.table, lane)
         take_first_readings(sensors, own, rows_from(now, NOW.READING), lane)
-        prepare_entries(episode, sensors, own, now, lane)
+        prepare_entries(episode, sensors, run, own, now, lane)
+        begin_history(episode, task, now, lane)
         for k in range(entries.shape[0]):
-            seen[k] = entry_of(episode, own, task, now, k, entry)
+            seen[0] = entry_of(episode, own, task, now, k, entry)
+            for i in range(width):
+                if not episode.idle[lane + i]:
+                    entries[k, lane + i] = number_at(seen, 0, i)
         for k in range(RESULT_ROWS):
             told[k] = 0.0
-        tell(own, told)
+        tell(run, own, told, lane)
         for i in range(width):
             if not episode.idle[lane + i]:
                 for k in range(RESULT_ROWS):
                     values[k, lane + i] = number_at(told, k, i)
-                for k in range(entries.shape[0]):
-                    entries[k, lane + i] = number_at(seen, k, i)
                 for k in range(flags.shape[0]):
                     flags[k, lane + i] = False

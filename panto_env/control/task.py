@@ -24,16 +24,19 @@ from ..base.errors import InputError
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
+from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
-from ..plant.sensors import Noise
+from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
-from .entries import ESTIMATED
+from .entries import ESTIMATED, Asked
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .memory import check_memory, record_size
+from .normalise import normalised
 from .observation import layout
+from .passive_run import LOW_PASSED, PassiveRun, passive_run
 from .record import ending, refuse_divergence, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
@@ -68,6 +71,8 @@ class Task:
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
+        if settings.speed_drift and settings.catenary.kind == "rig":
+            raise InputError("A rig runs its line at one speed; leave out speed_drift, or take another line.")
         self.settings, self.lanes, self.actuator = settings, lanes, settings.actuator
         self.plant = plant = Plant(
             settings.catenary,
@@ -79,6 +84,7 @@ class Task:
             runs=runs(settings),
             bilateral=settings.bilateral,
             varied=settings.pantograph_scatter > 0,
+            drifting=settings.speed_drift > 0,
         )
         self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
         if self.distance > plant.model.length:
@@ -95,19 +101,28 @@ class Task:
                 f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
                 f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
             )
-        self.layout = layout(settings.observation, settings.actuator, settings.pantograph)
+        asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
+        self.layout = layout(settings.observation, asked)
+        self.known_pantograph = settings.known_pantograph or settings.pantograph
+        if settings.normalise is not None:
+            known = settings.model_copy(update={"pantograph": self.known_pantograph})
+            speeds = self.check_speeds(settings.normalise)
+            self.layout = normalised(self.layout, passive_run(known, speeds, passive_pass))
+        self.passive: PassiveRun | None = None  # that the reward counts from
+        if settings.reward.target == "passive":
+            self.passive = passive_run(settings, self.speed_range, passive_pass)
         self.speed = np.zeros(lanes)  # m/s
         self.trim = trim
-        self.episode = new_episode(settings, plant, self.layout, self.control_steps)
+        self.odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
+        self.episode = new_episode(settings, plant, self.layout, self.control_steps, self.odometers.arrays())
         self.results = self.new_results()
-        self.known_pantograph = settings.known_pantograph or settings.pantograph
         self.sensors, rms = self._sensors()
         self.noise = None if rms is None else Noise(rms, lanes)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         # The slowest run sets how many samples an episode may have; row 0 is the start.
         slow = self.speed_range[0]
         longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
-        rows = int(self.plant_steps(slow, longest)) + 1 if keep_samples else 1
+        rows = int(self.plant_steps(slow, longest)) + self._late + 1 if keep_samples else 1
         supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
         self.memory = record_size(lanes, rows - 1, supports, droppers)
         check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
@@ -161,24 +176,44 @@ class Task:
     def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
         """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
         low, high = (speed / 3.6 for speed in speed_range(speed_kmh))
-        for speed in (low, high):
+        drift = largest_drift(self.settings.speed_drift) / 3.6
+        for speed in (low - drift, high + drift):
             self.plant.check_speed(speed)
         return low, high
 
-    def plant_steps(self, speed: Any, run_in: Any = 0) -> Any:
+    def plant_steps(self, speed: Any, run_in: Any = 0, drift: Array | None = None) -> Any:
         """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
 
-        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins.
+        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins. drift: of
+        each speed, as ``Plant.start`` takes it.
         """
         stride = speed * self.control_interval
+        if drift is not None:
+            return np.array([self._drifting_steps(*each) for each in zip(stride, run_in, drift, strict=True)])
         wanted = run_in + np.ceil(self.distance / stride - 1e-9)
         possible = self.plant.model.length / stride + 1e-9
         return np.maximum(1, np.floor(np.minimum(wanted, possible))) * self.control_steps
 
+    def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
+        """The same of one train that drifts about this stride of a control step (m)."""
+        lag = largest_lag(self.settings.speed_drift / 3.6)
+        most = min(self.plant.model.length, stride * run_in + lag + self.distance) + lag
+        steps = np.arange(math.ceil(most / stride) + 1.0)
+        position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # it rises
+        wanted = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
+        possible = np.searchsorted(position, self.plant.model.length + 1e-9) - 1
+        return max(1, min(int(wanted), int(possible))) * self.control_steps
+
+    @property
+    def _late(self) -> int:
+        """Plant steps by which a train may fall back."""
+        lag = largest_lag(self.settings.speed_drift / 3.6)
+        return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
+
     @property
     def most_control_steps(self) -> int:
         """Control steps of an episode at the lowest speed: the longest that there are."""
-        return int(self.plant_steps(self.speed_range[0])) // self.control_steps
+        return (int(self.plant_steps(self.speed_range[0])) + self._late) // self.control_steps
 
     def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
         """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.
@@ -204,6 +239,15 @@ class Task:
         if self.trim is None:
             self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
+
+    def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
+
+        Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        """
+        if self.passive is None:
+            return nominal, nominal
+        return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -242,6 +286,8 @@ class Task:
         self._action[...] = action
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
+        if self.odometers.drawn:
+            self.odometers.prepare(self.episode.odometer, skip)
         if skip is None and results is None:
             return self._told(self._plain_step())  # the usual step, as short as it can be
         results = results or self.results
@@ -316,7 +362,12 @@ class Task:
         """
         run, supports = of_lanes(self.plant.run.table[0], lanes), self.plant.model.supports
         figures = figures_so_far(
-            of_lanes(self.episode.table, lanes), self.running.peak[lanes], run, supports, self.plant.time_step
+            of_lanes(self.episode.table, lanes),
+            self.running.peak[lanes],
+            run,
+            supports,
+            self.plant.time_step,
+            partial(self.plant.ahead, lanes),
         )
         distance = figures["distance"]
         deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
@@ -340,6 +391,14 @@ class Task:
     def ending(self, lane: int) -> str:
         """Where and why a lane's run ended early, as a sentence; empty where it did not."""
         return ending(self, lane)
+
+
+def passive_pass(settings: RunSettings) -> Trajectory:
+    """Record of a pass without a policy, under seed 0."""
+    task = Task(settings)
+    task.reset(0, np.random.default_rng(0))
+    task.run_passively()
+    return task.trajectory(0, last=True)
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:

@@ -5,23 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..base.arrays import Array
+from ..catalog import load_pantograph
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 from .features import Sort
 from .healthy import Healthy
 from .kinds import Answer, Classifier, trained
 from .passes import Passes, side_by_side
 from .places import Evidence, regions
-from .threshold import ENOUGH, FALSE_ALARMS, threshold
+from .threshold import ENOUGH, FALSE_ALARMS, cautious_threshold
 
+ENOUGH_PASSES = 10
+"""Healthy passes from which on how they differ is well known: with fewer, what a pantograph unlike all of
+theirs does is taken for defects (``studies/paper2``)."""
 MANY = 6
-"""Healthy passes from which on what they have in common is well known."""
-ALIKE = 3.0
-"""Level of healthy passes (N) that those over one line keep to: simulated ones have 2.1 to 2.7 N at 160 to
-280 km/h on two lines. Over several lines of a design, droppers differing by 5 mm rms, it is 3.5 to 6.6 N."""
+"""Likewise their mean."""
+ALIKE = 2.0
+"""Level of healthy passes (N) that those over one line keep to: simulated ones have 0.6 to 1.6 N at 160 to
+280 km/h on two lines. Over several lines of a design, droppers differing by 5 mm rms, it is 2.2 to 5.9 N."""
 CHANGED, RARE = 2.0, 1e-3
 """Level of a pass over that of healthy ones from which on the whole line counts as changed, where no more
 than this share of healthy passes would have it (Student's t of log levels)."""
@@ -67,14 +73,17 @@ def diagnose(
     false_alarms: float = FALSE_ALARMS,
     classifier: Classifier | None = None,
     seed: int = 0,
+    pantograph: str | Path | PantographData | None = None,
 ) -> Diagnosis:
     """Hold one pass over a line, or the mean of several, against healthy passes over it at the same speed.
 
     false_alarms: per km of healthy line, by which the threshold is set. classifier: of the kinds, by default
-    the one that comes with the project. seed: of the noise of the estimated forces. Raises InputError where
-    passes are too few or too short, or cannot be compared.
+    the one that comes with the project. seed: of the noise of the sensors that forces are estimated from.
+    pantograph: of all passes, as the estimator knows it; by default that of the catalogue which each names.
+    Raises InputError where passes are too few or too short, cannot be compared, or cannot be a pantograph's.
     """
-    passes, reference = side_by_side(runs, healthy, seed)
+    known = None if pantograph is None else load_pantograph(pantograph)
+    passes, reference = side_by_side(runs, healthy, seed, known)
     return judge(passes, Healthy.of(reference), false_alarms, classifier)
 
 
@@ -85,7 +94,7 @@ def judge(
     classifier: Classifier | None = None,
 ) -> Diagnosis:
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
-    limit = threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
+    limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
     evidence, levels = healthy.weigh(passes, limit)
     asked = classifier or trained()
     found = [
@@ -138,9 +147,10 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
     """Why the answer is less good than it could be."""
     notes = []
     count, spans = len(healthy.scores), healthy.scores.size // per_span
-    if count < MANY:
+    if count < ENOUGH_PASSES:
         notes.append(
-            f"Only {count} healthy passes: their mean is not well known, and less is found than with {MANY}."
+            f"Only {count} healthy passes: how much they differ is not well known; less is found, and more "
+            f"of it is false, than with {ENOUGH_PASSES}."
         )
     if spans < ENOUGH:
         notes.append(

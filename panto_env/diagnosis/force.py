@@ -1,30 +1,97 @@
-"""The contact force that a diagnosis is made from."""
+"""The contact force that a diagnosis is made from: what an estimator on the train makes of its sensors."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from ..base.arrays import Array
-from ..metrics.low_pass import CUTOFF, low_pass_in_place
+from ..base.errors import InputError
+from ..base.record_columns import equal_step
+from ..catalog import load_pantograph
+from ..estimation.estimate import filter_motion, gains_of, model_of
+from ..estimation.motion import Motion, measure
+from ..estimation.plausibility import check_motion
+from ..estimation.settings import EstimatorSettings
+from ..estimation.smoother import smooth_force
+from ..metrics.low_pass import low_pass_in_place
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 
-ERROR = 3.0
-"""Rms error (N) of an estimated force within 0 to 20 Hz, own choice: half as much again as the 2 N of a
-measured one (seen)."""
-PADDED = 1.0
-"""Time (s) of noise that is drawn beyond either end of a run."""
+RATE = 500.0
+"""Samples of a sensor per second, own choice: as many as a fast simulation has, to look at 20 Hz."""
+ESTIMATOR = EstimatorSettings(observation="displacements", gain="steady", lag=0.1)
+"""Displacements are what is cheap to measure, and a diagnosis can wait. The gain is steady because the first
+spans, where it would learn, are not judged."""
+FEWEST = 20
+"""Samples below which a record has no time step to speak of."""
+EVEN = 0.01
+"""Relative difference up to which clock and positions are as a run states."""
 
 
-def estimated_force(run: Trajectory, random: np.random.Generator, error: float = ERROR) -> Array:
-    """Contact force (N), (n,), of a run's samples as an estimator with a smoother would give it.
+def known_pantograph(run: Trajectory) -> PantographData:
+    """The pantograph that an estimator takes a run's for: of the catalogue, as designed, not as it is.
 
-    A stand-in for the estimator: the true force, low-passed at 20 Hz without delay, with noise of this rms
-    (N) in the same band. Only this function knows.
+    Raises InputError for one that is not there.
     """
-    pad = round(PADDED / run.time_step)
-    spectrum = np.fft.rfft(random.standard_normal(len(run.time) + 2 * pad))
-    frequency = np.fft.rfftfreq(len(run.time) + 2 * pad, run.time_step)
-    spectrum[frequency > CUTOFF] = 0.0
-    noise = np.fft.irfft(spectrum, len(run.time) + 2 * pad)
-    noise *= error / noise.std()
-    return low_pass_in_place(run.contact_force, run.time_step) + noise[pad : len(noise) - pad]
+    name = run.settings.get("known_pantograph") or run.pantograph
+    try:
+        return load_pantograph(name)
+    except InputError as error:
+        raise InputError(
+            f"Its pantograph '{name}' is not in the catalogue, and without its masses and springs no force "
+            "can be estimated; give its TOML file with --pantograph."
+        ) from error
+
+
+def check_clock(run: Trajectory) -> None:
+    """Raise InputError unless time and position go in equal steps, as large as the run states."""
+    step = equal_step(run.time, FEWEST, "to estimate a force")
+    if not abs(step / run.time_step - 1) <= EVEN:
+        raise InputError(
+            f"Samples are {step:.4g} s apart, not {run.time_step:.4g} s as the run states: is its time in s?"
+        )
+    if not np.isfinite(run.position).all():
+        raise InputError("Its position is no number somewhere; leave the run out.")
+    if not np.abs(np.diff(run.position) / run.stride - 1).max() <= EVEN:
+        mean = float(np.ptp(run.position) / np.ptp(run.time)) * 3.6
+        raise InputError(
+            f"Its positions go at {mean:.4g} km/h in the mean, not evenly at the {run.speed_kmh:.4g} km/h "
+            "that it states; leave the run out."
+        )
+
+
+def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | None = None) -> Array:
+    """Contact force (N), (n,), of a run's samples, to 20 Hz, as a smoother on the train estimates it.
+
+    Sensors show displacements of head and frame with the noise of ``measure``. seed: of that; pantograph: as
+    the estimator knows it, by default that of the catalogue which the run names. Raises InputError, with the
+    likely mistake, where no force can be estimated.
+    """
+    known = known_pantograph(run) if pantograph is None else pantograph
+    check_motion(_as_recorded(run), known)  # before there is noise, which would hide a dead sensor
+    none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
+    seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
+    motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
+    model = model_of(motion, known, ESTIMATOR)
+    filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
+    force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
+    return low_pass_in_place(np.interp(run.time, motion.time, force), run.time_step)
+
+
+def _as_recorded(run: Trajectory) -> Motion:
+    """A run's own samples, of displacements alone."""
+    return Motion(
+        time_step=run.time_step,
+        head=run.head,
+        frame=run.frame,
+        head_velocity=None,
+        frame_velocity=None,
+        frame_force=run.frame_force,
+        head_force=run.head_force,
+        lift=run.nominal_force,
+        speed=run.speed_kmh / 3.6,
+        span_length=run.span_length,
+        start=float(run.time[0]),
+    )

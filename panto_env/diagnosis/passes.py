@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,8 @@ from ..base.errors import InputError
 from ..metrics.low_pass import CUTOFF
 from ..metrics.spans import FIRST_SETTLED, last_whole_span
 from ..metrics.trajectory import Trajectory
-from .force import estimated_force
+from ..plant.pantograph.schema import PantographData
+from .force import check_clock, estimated_force
 
 STEP = 0.5
 """Distance of the places at which forces are looked at (m), at most."""
@@ -64,12 +66,15 @@ class Passes:
 
 
 def side_by_side(
-    runs: Sequence[Trajectory], healthy: Sequence[Trajectory], seed: int = 0
+    runs: Sequence[Trajectory],
+    healthy: Sequence[Trajectory],
+    seed: int = 0,
+    pantograph: PantographData | None = None,
 ) -> tuple[Passes, Passes]:
     """The runs to be judged, and the healthy ones, from the tenth span on: before, their start is felt.
 
-    seed: of the noise of the estimates. Raises InputError where they are too few or too short, are not of one
-    line and speed, hold what is no number, or one stands there twice.
+    seed: of the sensors' noise; pantograph: as ``estimated_force`` takes it. Raises InputError where runs are
+    too few or too short, are not of one line and speed, cannot be a pantograph's, or one stands there twice.
     """
     if len(healthy) < FEWEST:
         raise InputError(
@@ -77,13 +82,18 @@ def side_by_side(
             "give more with --healthy."
         )
     everything = [*runs, *healthy]
-    for run in everything:
-        _check(run)
+    names = [f"Run {k + 1}" for k in range(len(runs))]
+    names += [f"Healthy run {k + 1}" for k in range(len(healthy))]
+    for name, run in zip(names, everything, strict=True):
+        if run.terminated:
+            raise InputError(f"{run.ending} A run that ended early cannot be judged.")
+        with _named(name):
+            check_clock(run)
     first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))
     for run in everything:
         _check_alike(run, first, speed)
     for k, run in enumerate(everything):
-        if any(np.array_equal(run.contact_force, other.contact_force) for other in everything[:k]):
+        if any(np.array_equal(run.head, other.head) for other in everything[:k]):
             raise InputError("One run stands there twice, which says nothing new; give each once.")
     span = first.span_length
     last = min(last_whole_span(run.distance - END, span) for run in everything)
@@ -96,8 +106,12 @@ def side_by_side(
     per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)
     step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
     places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
+    force = np.zeros((len(everything), len(places)))
     random = np.random.default_rng(seed)
-    force = np.array([np.interp(places, run.position, estimated_force(run, random)) for run in everything])
+    for own, name, run in zip(force, names, everything, strict=True):
+        with _named(name):
+            estimate = estimated_force(run, int(random.integers(2**63)), pantograph)
+        own[:] = np.interp(places, run.position, estimate)
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
     if not len(droppers):
         raise InputError(
@@ -107,12 +121,13 @@ def side_by_side(
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
 
 
-def _check(run: Trajectory) -> None:
-    """Raise InputError for a run that can't be judged by itself."""
-    if run.terminated:
-        raise InputError(f"{run.ending} A run that ended early cannot be judged.")
-    if not (np.isfinite(run.contact_force).all() and np.isfinite(run.position).all()):
-        raise InputError("The contact force or the position of a run is no number somewhere; leave it out.")
+@contextmanager
+def _named(run: str) -> Iterator[None]:
+    """Say which run it is that an InputError is about."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{run}: {error}") from error
 
 
 def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:

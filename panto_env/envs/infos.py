@@ -39,7 +39,7 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     """
     (count, _, values, _), speed_kmh, lanes = answer
     rows = values[:, :count]
-    cost_function, contact_loss, effort, rate, mean_force = rows[TERM:CONTACT_FORCE]
+    cost_function, contact_loss, effort, rate, mean_force, low_passed = rows[TERM:CONTACT_FORCE]
     return {
         "contact_force": rows[CONTACT_FORCE],
         "_contact_force": lanes,
@@ -66,6 +66,8 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
             "_rate": lanes,
             "mean_force": mean_force,
             "_mean_force": lanes,
+            "low_passed": low_passed,
+            "_low_passed": lanes,
         },
         "_reward_terms": lanes,
     }

@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.arguments import table, takes
-from ..control.entries import CENTRED
+from ..control.entries import CENTRED, Asked
 from ..control.observation import BOUND, layout
 from ..control.settings import default, read_settings
 from ..metrics.trajectory import Trajectory
@@ -71,8 +71,10 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Minus the cost function CF over the control step (relative to the nominal force) and minus the
     share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
     effort and rate of the action and for the mean force have weight 0 but in `Pantograph-v0`. A `reward` of
-    your own takes the place of all its weights. `info["reward_terms"]` holds the unweighted terms:
-    over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
+    your own takes the place of all its weights. `reward="agent"` is what the benchmark measures: the squared
+    deviation of the low-passed contact force from the passive run's mean, over its variance there; with it go
+    terms that hold the mean and keep the action from chattering. `info["reward_terms"]` holds the unweighted
+    terms: over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
 
     ## Starting State
     At the start of the line, at rest under the nominal force; with `run_in`, so many spans later at most.
@@ -174,7 +176,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task.step(checked(action, self._shape))
         terminated, truncated = self._flags.tolist()
         values = self._values.tolist()
-        reward, cost_function, contact_loss, effort, rate, mean_force = values[:CONTACT_FORCE]
+        reward, cost_function, contact_loss, effort, rate, mean_force, low_passed = values[:CONTACT_FORCE]
         contact_force, head, wire, frame_force, head_force, position = values[CONTACT_FORCE:]
         info: dict[str, Any] = {
             "contact_force": contact_force,
@@ -190,6 +192,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 "effort": effort,
                 "rate": rate,
                 "mean_force": mean_force,
+                "low_passed": low_passed,
             },
             "figures": FIGURES_TO_COME.copy(),
         }
@@ -225,7 +228,7 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
 def _observation_table(kind: str) -> str:
     """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, actuator, pantograph).entries
+    entries = layout(kind, Asked(actuator, pantograph)).entries
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
         for k, each in enumerate(entries)

@@ -40,13 +40,15 @@ class Figures:
         return dict(vars(self))
 
 
-def cost_function(force: Array, nominal_force: float, stride: float) -> float:
+def cost_function(force: Array, nominal_force: float, stride: float | Array) -> float:
     """CF (N m), Eq. 14 of paper 1: |F - F_N| over the distance, by trapezoids.
 
-    stride: distance between samples (m), which is v/3.6 times the time step.
+    stride: distance between samples (m), which is v/3.6 times the time step, or (n - 1,) where the speed
+    drifts.
     """
     deviation = np.abs(force - nominal_force)
-    return float(stride / 2 * (deviation[:-1] + deviation[1:]).sum())
+    pairs, half = deviation[:-1] + deviation[1:], stride / 2
+    return float(half * pairs.sum() if np.ndim(stride) == 0 else np.sum(half * pairs))
 
 
 def contact_loss(force: Array) -> float:

@@ -89,6 +89,7 @@ class Trajectory:
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
         frame, head = self.frame_force[inside], self.head_force[inside]
         frame_change, head_change = np.diff(frame), np.diff(head)
+        ways = np.diff(self.position[inside]) if self.settings.get("speed_drift") else self.stride
         changes = frame_change @ frame_change + head_change @ head_change
         return Figures(
             mean=mean,
@@ -99,10 +100,10 @@ class Trajectory:
             min=float(filtered.min()),
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
             contact_loss=contact_loss(force),
-            cost_function=cost_function(force, self.nominal_force, self.stride),
+            cost_function=cost_function(force, self.nominal_force, ways),
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
             effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
-            distance=float(inside.sum() * self.stride),
+            distance=float(inside.sum() * np.mean(ways)),
         )
 
     def compliance(self, spans: SpanChoice = None) -> list[Criterion]:
@@ -125,7 +126,7 @@ class Trajectory:
 
     @property
     def stride(self) -> float:
-        """Distance from one sample to the next (m)."""
+        """Distance from one sample to the next (m), the mean where the speed drifts."""
         return self.speed_kmh / 3.6 * self.time_step
 
     @property

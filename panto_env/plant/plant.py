@@ -22,6 +22,7 @@ from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
+from .drift import DRIFT_ROWS, ahead
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
@@ -46,13 +47,14 @@ class Plant:
         runs: Runs = RUNS,
         bilateral: bool = False,
         varied: bool = False,
+        drifting: bool = False,
     ) -> None:
         """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
 
         runs: what the plant must be good for: speeds, conditions of the line. bilateral: let the
         contact pull, as paper 3's equations do. varied: each lane may have a pantograph that differs in
-        its values. Raises InputError where grid and step are not usable, or the line has not what is said
-        to be defective.
+        its values. drifting: each may have a speed that drifts. Raises InputError where grid and step are
+        not usable, or the line has not what is said to be defective.
         """
         self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
@@ -77,6 +79,7 @@ class Plant:
         self.run = Run(
             table=lane_table(Row.STATE + size, lanes, abreast, CONTACTS),
             waves=lane_table(3 * waves, lanes, abreast),
+            drift=lane_table(DRIFT_ROWS if drifting else 0, lanes, abreast),
             lowest_force=-np.inf if bilateral else 0.0,
         )
         self.run.table[:, :, Row.NOMINAL_FORCE] = 1.0  # of places without a lane: it is divided by
@@ -99,6 +102,10 @@ class Plant:
         """The same of one lane."""
         return float(of_lanes(self.run.table[0], lane)[row])
 
+    def ahead(self, lanes: Array, steps: Array) -> Array:
+        """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
+        return ahead(of_lanes(self.run.drift, lanes), steps)
+
     @property
     def arrays(self) -> tuple[Any, ...]:
         """The named tuples that every kernel takes first: line, wire, pantographs, actuators, run."""
@@ -115,13 +122,14 @@ class Plant:
         drawn: Sequence[DrawnLine] = (),
         pantographs: Sequence[PantographData] = (),
         static_forces: Array | None = None,
+        drift: Array | None = None,
     ) -> None:
         """Put lanes at the start of the line, at rest under the nominal force.
 
         lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), not beyond the waves of the
         wire. drawn: what is random about their lines, as ``line_condition.draw`` gives it. pantographs: the
-        lanes' own, where they are varied. static_forces: instead of the pantograph's, (n,) (N). Raises
-        InputError for a bad speed.
+        lanes' own, where they are varied. static_forces: instead of the pantograph's, (n,) (N). drift: of
+        their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed.
         """
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
@@ -133,6 +141,7 @@ class Plant:
         for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
             own_waves[: line.waves.size] = line.waves.ravel()
         set_lanes(run.waves, lanes, waves)
+        set_lanes(run.drift, lanes, 0.0 if drift is None else drift)
         height, wire, spring = self.model.start_point
         heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
         strip = float(self.pantographs.table[0, Part.STRIP_COMPLIANCE, 0])  # all have the same strips

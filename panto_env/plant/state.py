@@ -37,7 +37,7 @@ class Row(IntEnum):
     FRAME_FORCE = 6  # of the actuator (N), one row per place
     HEAD_FORCE = 7  # likewise
     STEP = 8  # steps since the start
-    STRIDE = 9  # distance covered in one step (m)
+    STRIDE = 9  # distance covered in one step (m), the mean where the speed drifts
     NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
     STATE = 11  # displacements (m), then velocities (m/s) of the pantograph, head first
 
@@ -65,6 +65,7 @@ class Run(NamedTuple):
 
     table: Array  # (contacts, groups, STATE + 2n, lanes abreast): the rows above
     waves: Array  # (groups, 3 waves, lanes abreast): irregularity, each as a ``Wave``
+    drift: Array  # (groups, DRIFT_ROWS, lanes abreast): of the speed; no rows where it is constant
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 

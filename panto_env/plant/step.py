@@ -30,6 +30,7 @@ from .catenary.protocol import (
     rise_at_contact,
 )
 from .contact import contact_force
+from .drift import mean_stride, position_after
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import (
     ALL_FREE_ROWS,
@@ -59,7 +60,7 @@ def approach(line, wire, pantographs, actuators, run, contact, own, scratch, fre
     """Begin the step of one contact's pantographs: all but the contact force."""
     drive(actuators, pantographs, contact, own, rows_from(scratch, SCRATCH.COMMAND), lane)
     move_freely(pantographs, own, free_state, lane)
-    x = own[ROW.STRIDE] * (own[ROW.STEP] + 0.5)
+    x = position_after(run, own, own[ROW.STEP] + 0.5, lane)
     scratch[SCRATCH.IRREGULARITY] = irregularity(run, own, x, lane)
     before, middle = place_contact(line, wire, lane, contact, x)
     scratch[SCRATCH.WIRE_BEFORE] = before
@@ -69,10 +70,11 @@ def approach(line, wire, pantographs, actuators, run, contact, own, scratch, fre
 @inlined
 def rise_along(line, wire, run, contact, own, lane):
     """How far the wire rises over the way of the step (m): what a damped contact feels."""
-    x0 = own[ROW.STRIDE] * own[ROW.STEP]
-    x1 = own[ROW.STRIDE] * (own[ROW.STEP] + 1.0)
+    x0 = position_after(run, own, own[ROW.STEP], lane)
+    x1 = position_after(run, own, own[ROW.STEP] + 1.0, lane)
+    way = mean_stride(run, own, 1.0, lane)
     uneven = irregularity(run, own, x1, lane) - irregularity(run, own, x0, lane)
-    return uneven + rise_at_contact(line, wire, lane, contact, x0, x0 + own[ROW.STRIDE])
+    return uneven + rise_at_contact(line, wire, lane, contact, x0, x0 + way)
 
 
 @inlined
@@ -83,7 +85,7 @@ def meet(line, wire, pantographs, run, contact, own, scratch, free_head, lane):
     """
     parts = columns(own, pantographs.table, lane)
     contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
-    x = own[ROW.STRIDE] * (own[ROW.STEP] + 0.5)
+    x = position_after(run, own, own[ROW.STEP] + 0.5, lane)
     rise = 0.0 * x
     if any_of(parts[PART.STRIP_DAMPING] > 0.0):
         rise = rise_along(line, wire, run, contact, own, lane)

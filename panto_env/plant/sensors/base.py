@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from ...backend import Lanes, constants, operation
 from ...base.arrays import Array, Index
 from ...base.settings import Settings
+from .odometer import OdometerErrors
 
 
 class Reading(IntEnum):
@@ -50,6 +51,11 @@ class SensorSettings(Settings, ABC):
     @abstractmethod
     def noise_rms(self) -> tuple[float, ...] | None:
         """Noise of each ``Reading``, rms, in its unit; None where no reading carries any."""
+
+    @property
+    def odometer(self) -> OdometerErrors:
+        """How wrong position and speed are read; exact unless a kind says otherwise."""
+        return OdometerErrors()
 
     @abstractmethod
     def arrays(self, time_step: float, control_steps: int, lanes: int, abreast: int) -> SensorArrays:

@@ -1,4 +1,4 @@
-"""Sensors with a delay, and with noise on each reading."""
+"""Sensors with a delay and with noise on each reading, and an odometer."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ...base.ranges import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
 from .noise import AHEAD
+from .odometer import OdometerErrors
 
 SENSED = (Row.HEAD_HEIGHT, Row.FRAME_HEIGHT, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.CONTACT_FORCE)
 """Rows of a sample that are read, in the order of ``Reading``."""
@@ -21,7 +22,7 @@ _READINGS = len(Reading)
 
 
 class DelayedSensors(SensorSettings):
-    """What is added to the readings of contact force, displacement and velocity."""
+    """What is added to readings: of contact force, displacement, velocity, and of an odometer."""
 
     kind: Literal["delayed"] = "delayed"
     force_noise: Annotated[float, Between(0, 1000, "N")] = Field(
@@ -36,6 +37,28 @@ class DelayedSensors(SensorSettings):
     delay: Annotated[float, Between(0, 1, "s")] = Field(
         0.0, description="age of a reading (s); at least half a time step, as it is a mean over one"
     )
+
+    odometer_scale: Annotated[float, Between(0, 0.1)] = Field(
+        0.0, description="rms share by which an odometer's way and speed are wrong, drawn per run (-)"
+    )
+    odometer_walk: Annotated[float, Between(0, 10, "m")] = Field(
+        0.0, description="rms random walk of its way after 100 m (m)"
+    )
+    mast_jitter: Annotated[float, Between(0, 10, "m")] = Field(
+        0.0, description="rms error of where it detects a mast, at each of which its count begins anew (m)"
+    )
+    speed_noise: Annotated[float, Between(0, 10, "m/s")] = Field(
+        0.0, description="rms noise of the train's speed (m/s)"
+    )
+    blind: bool = Field(
+        False, description="the position within the span is not known: its sine and cosine read 0"
+    )
+
+    @property
+    def odometer(self) -> OdometerErrors:
+        """How wrong position and speed are read."""
+        errors = self.odometer_scale, self.odometer_walk, self.mast_jitter, self.speed_noise
+        return OdometerErrors(*errors, self.blind)
 
     @property
     def noise_rms(self) -> tuple[float, ...] | None:

@@ -22,8 +22,9 @@ PANTOGRAPH = "dsa250"
 """Training has ``dsa380``."""
 SPEEDS_KMH = (220.0, 260.0)
 """Training has 160, 200, 240 and 280 km/h."""
-SEEDS = (21, 22, 23, 24)
-HEALTHY, CONTROLS, BROKEN_EACH = 8, 4, 8
+SEEDS = (21, 22, 23)
+"""Of tracks of one line and speed."""
+HEALTHY, CONTROLS, BROKEN_EACH = 12, 4, 8
 """Of each track: healthy passes to compare with, healthy passes to be judged, broken droppers."""
 MEANS = (1, 3)
 """Passes over a defect of which the mean is judged."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from ..study import Outcome, Report
-from . import closed_loop, estimated_force, estimator, head_motors, rig
+from . import closed_loop, diagnosis, estimated_force, estimator, head_motors, rig
 
-PARTS = (rig, estimator, estimated_force, head_motors, closed_loop)
+PARTS = (rig, estimator, estimated_force, diagnosis, head_motors, closed_loop)
 
 
 def run(report: Report) -> Outcome:

@@ -111,12 +111,7 @@ def constants(
     linear = np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None]
 
     real = np.float32 if numerics.precision == "single" else np.float64
-    keep = (1.0 - damping.alpha * step / 2) / settle
-    weights_by_wire = [
-        [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
-    ]
-    courant = np.array([np.sqrt(wire.tension / wire.mass) for wire in wires]) * step / dx
-    table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
+    tensioned = of_tension(data, shape, dx, step)
     rows = per_span * window // WIDTH
     mast_row, mast_segment = places(per_span * np.arange(1, window), rows)
     held = Sets(springs.wire[:, None], springs.node - PAD, rows)
@@ -129,12 +124,12 @@ def constants(
         spans=spans,
         window=window,
         rows=rows,
-        shape=shape.contact.height(np.linspace(0, data.span_length, table)),
+        shape=tensioned.shape[None],
         rise=np.zeros((1, 0, 5)),
         rise_breaks=np.zeros(0),
-        rise_decay=0.0,
-        stencil=np.array(weights_by_wire, dtype=real),
-        absorbing=(courant - 1) / (courant + 1),
+        rise_decay=np.zeros(1),
+        stencil=tensioned.stencil[None].astype(real),
+        absorbing=tensioned.absorbing[None],
         inertia=np.ascontiguousarray(
             lay_out(inertia, rows, real)[:, PAD : -PAD if (inertia != 1).any() else PAD]
         ),
@@ -158,6 +153,31 @@ def constants(
         link_segment=joined.segment,
         link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
         link_gap=np.zeros((1, len(first)), dtype=real),
+    )
+
+
+class Tensioned(NamedTuple):
+    """What the wires' tension changes of a line's constants: a row of each, as ``FlexibleLine`` has them."""
+
+    shape: Array
+    stencil: Array
+    absorbing: Array
+
+
+def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: float) -> Tensioned:
+    """Of a line on its grid (m) and time step (s)."""
+    damping, wires = data.damping, (data.contact_wire, data.messenger_wire)
+    settle = 1.0 + damping.alpha * step / 2
+    keep = (1.0 - damping.alpha * step / 2) / settle
+    stencil = [
+        [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
+    ]
+    courant = np.array([np.sqrt(wire.tension / wire.mass) for wire in wires]) * step / dx
+    table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
+    return Tensioned(
+        shape=shape.contact.height(np.linspace(0, data.span_length, table)),
+        stencil=np.array(stencil),
+        absorbing=(courant - 1) / (courant + 1),
     )
 
 

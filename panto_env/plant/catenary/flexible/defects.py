@@ -47,9 +47,18 @@ class StaticState:
 class DefectiveLine:
     """A line with the defects of a condition, to be solved for any scatter of its droppers' lengths."""
 
-    def __init__(self, data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> None:
-        """data: the line as designed. Raises InputError for what a line of so many spans has not."""
-        left = with_tension_left(data, condition)
+    def __init__(
+        self,
+        data: FlexibleCatenaryData,
+        spans: int,
+        condition: LineCondition,
+        tensions: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """data: the line as designed. tensions: as ``DrawnLine`` has them.
+
+        Raises InputError for what a line of so many spans has not.
+        """
+        left = with_tension_left(data, condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
         self._static = np.tile(shape.dropper_tension, spans)
         self._stiffness = np.tile(shape.dropper_stiffness, spans)
@@ -65,17 +74,18 @@ class DefectiveLine:
         self._band = np.zeros((BAND, UNKNOWNS * len(number)))
         self._load = np.zeros(UNKNOWNS * len(number))
         for w, wire in ((CONTACT, left.contact_wire), (MESSENGER, left.messenger_wire)):
-            elements = [_element(wire, length) for length in np.diff(self.breaks)]
+            shapes, stiffness = _elements(wire, np.diff(self.breaks))
             unknowns = UNKNOWNS * number[:-1, None] + 2 * w + [0, 1, 4, 5]
-            _add(self._band, unknowns, np.tile([stiffness for _, stiffness in elements], (spans, 1, 1)))
+            _add(self._band, unknowns, np.tile(stiffness, (spans, 1, 1)))
             if w == CONTACT:
                 self._unknowns = unknowns
-                self._shapes = np.tile([shapes for shapes, _ in elements], (spans, 1, 1))
+                self._shapes = np.tile(shapes, (spans, 1, 1))
         self._band[0, masts] += data.steady_arm.stiffness
         self._band[0, masts + 2] += data.support.stiffness
         self._load[masts + 2] = data.support.stiffness * height
+        self._lifted, self._support_stiffness = masts + 2, data.support.stiffness
         self._band[0, [0, 2, -4, -2]] = HELD
-        self.decay = _decay(data.contact_wire)
+        self.decay = _decay(left.contact_wire)
         self._carry(data, left, own, spans)
 
     def _carry(
@@ -108,24 +118,33 @@ class DefectiveLine:
             link_gap=np.zeros((rows, droppers), dtype=real),
             rise=np.zeros((rows, len(self._unknowns), 5)),
             rise_breaks=self.breaks,
-            rise_decay=self.decay,
+            rise_decay=np.full(rows, self.decay),
         )
 
-    def write(self, line: FlexibleLine, row: int, scatter: Array | None = None) -> StaticState:
-        """Write the state under this scatter of the droppers' lengths (m) into the line's tables."""
-        state = self.solve(scatter)
+    def write(
+        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
+    ) -> StaticState:
+        """Write the state under these errors, as ``solve`` takes them, into the line's tables."""
+        state = self.solve(scatter, heights)
         line.link_static[row] = state.tension
         line.link_gap[row] = state.gap
         line.rise[row] = state.rise
+        line.rise_decay[row] = self.decay
         return state
 
-    def solve(self, scatter: Array | None = None) -> StaticState:
-        """Static state; scatter: length error of every dropper (m), added to those of the condition."""
+    def solve(self, scatter: Array | None = None, heights: Array | None = None) -> StaticState:
+        """Static state; scatter: length error of every dropper, heights: of every support's height (m), both
+        added to those of the condition.
+        """
         error = self._error if scatter is None else self._error + scatter
+        load = self._load
+        if heights is not None:
+            load = load.copy()
+            load[self._lifted] += self._support_stiffness * heights
         taut = ~self._broken
         rounds = 0
         while True:
-            change = self._solve_linear(taut, error)
+            change = self._solve_linear(taut, error, load)
             contact, messenger = change[self._ends].T
             pull = self._static + self._stiffness * (messenger - contact - error)  # were it always taut
             wrong = np.flatnonzero(~self._broken & (np.where(taut, -pull, pull) > SLIGHT))
@@ -139,11 +158,11 @@ class DefectiveLine:
         rise = np.concatenate([bare[:, :2] + self._surface, bare[:, 2:], self._bulge[:, None]], axis=1)
         return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
 
-    def _solve_linear(self, taut: Any, error: Array) -> Array:
-        """Change of all unknowns with these droppers taut, the others without tension."""
+    def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
+        """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""
         from scipy.linalg import solveh_banded  # slow to import
 
-        band, load = self._band.copy(), self._load.copy()
+        band, load = self._band.copy(), loaded.copy()
         spring = np.where(taut, self._stiffness, 0.0)
         contact, messenger = self._ends.T
         band[0, contact] += spring
@@ -187,23 +206,29 @@ def _decay(wire: Wire) -> float:
     return float(np.sqrt(wire.tension / max(wire.bending_stiffness, wire.tension * SHARPEST**2)))
 
 
-def _element(wire: Wire, length: float) -> tuple[Array, Array]:
-    """Shapes and stiffness, each (4, 4), of a tensioned beam (m) by height and slope of its two ends.
+def _elements(wire: Wire, lengths: Array) -> tuple[Array, Array]:
+    """Shapes and stiffness, each (n, 4, 4), of tensioned beams (m), (n,), by height and slope of their ends.
 
     Shapes are a, b, c, d of each unknown. What the ends are held by follows from T u' - EI u''' = T b
     and EI u'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
     """
     kappa = _decay(wire)
-    far = np.exp(-kappa * length)
-    ends = [[1, 0, 1, far], [0, 1, -kappa, kappa * far], [1, length, far, 1], [0, 1, -kappa * far, kappa]]
-    shapes = np.linalg.inv(np.array(ends))
-    held = wire.tension * np.array([[0, -1, 0, 0], [0, 0, -1, -far], [0, 1, 0, 0], [0, 0, far, 1]])
-    return shapes, held @ shapes
+    far, one = np.exp(-kappa * lengths), np.ones(len(lengths))
+    no = 0 * one
+    ends = [
+        [one, no, one, far],
+        [no, one, -kappa * one, kappa * far],
+        [one, lengths, far, one],
+        [no, one, -kappa * far, kappa * one],
+    ]
+    shapes = np.linalg.inv(np.moveaxis(np.array(ends), -1, 0))
+    held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])
+    return shapes, wire.tension * np.ascontiguousarray(np.moveaxis(held, -1, 0)) @ shapes
 
 
 def _bulging(wire: Wire, length: float) -> Array:
     """Load on height and slope of the two ends of a beam (m), (4,), which an even load of 2 T bulges."""
-    _, stiffness = _element(wire, length)
+    stiffness = _elements(wire, np.array([length]))[1][0]
     bending = 2 * wire.tension / _decay(wire) ** 2
     held = [-wire.tension * length, bending, -wire.tension * length, -bending]
     return np.asarray(stiffness @ [0, length, 0, -length] - held)

@@ -26,7 +26,7 @@ class FlexibleLine(NamedTuple):
     which has constants that do nothing where a segment has none.
 
     What defects change about links has one row for all lanes or one per lane, for the whole line; intact
-    spans are alike, and there one window does.
+    spans are alike, and there one window does. What tension changes has one row likewise, or one per lane.
     """
 
     spacing: float  # of the grid (m)
@@ -34,12 +34,12 @@ class FlexibleLine(NamedTuple):
     spans: int  # of the whole line
     window: int  # spans that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
-    shape: Array  # static height of the contact wire over one span, every span/(n - 1) m (m)
+    shape: Array  # (rows, n): static height of the contact wire over a span, every span/(n - 1) m (m)
     rise: Array  # (rows, pieces, 5): what defects add to it: a, b, c, d, e of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
-    rise_decay: float  # kappa: of exponentials along a piece (1/m)
-    stencil: Array  # (wires, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
-    absorbing: Array  # (wires,): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
+    rise_decay: Array  # (rows,): kappa: of exponentials along a piece (1/m)
+    stencil: Array  # (rows, wires, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
+    absorbing: Array  # (rows, wires): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
     inertia: (
         Array  # (wires, rows, WIDTH): mass of the bare wire over that of the node; no rows where all are 1
     )

@@ -8,9 +8,9 @@ from .segments import move, read
 
 
 @inlined
-def defect_row(table, lane):
-    """Row of a lane in a table of defects."""
-    return min(lane, table.shape[0] - 1)
+def own_row(table, lane):
+    """Row of a lane in a table of one row for all or one per lane."""
+    return min(lane, table.shape[0] - 1) & NOT_NEGATIVE
 
 
 @inlined

@@ -11,7 +11,7 @@ from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
-from .build import at_rest, constants, dropper_positions, settle
+from .build import at_rest, constants, dropper_positions, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
 from .resolution import resolution
@@ -47,24 +47,27 @@ class FlexibleCatenary:
             locate(data, spans, condition),
         )
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
-        check_speeds(data.name, self.wave_speed, runs.speeds)
-        chosen = resolution(data, numerics, runs)
+        error = max(each.largest_tension_error for each in runs.conditions)
+        check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
+        tightest = with_tension_left(designed, condition, (1 + error, 1 + error))
+        chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
-        self.contact_gain = contact_gain(data, self.line.spacing, self.time_step, own.lightest)
+        self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
         self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
         self.supports = data.span_length * np.arange(1, spans)
         self.droppers = dropper_positions(data, spans)
         self._tension = np.tile(shape.dropper_tension, (1, spans))
+        # The anchor does not yield: the pantograph is at rest there exactly.
+        self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
+        self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
         self._defective: dict[LineCondition, DefectiveLine] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
         self.wire = at_rest(self.line, lanes)
-        # The anchor does not yield: the pantograph is at rest there exactly.
-        self.start_point = StartPoint(float(self.line.shape[0]), 0.0, 0.0)
 
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
@@ -72,15 +75,38 @@ class FlexibleCatenary:
         """Give the line its defects, or tables for them where each lane draws its own."""
         self._defective = {condition: DefectiveLine(data, spans, condition) for condition in conditions}
         first = conditions[0]
-        self._lines_differ = len(conditions) > 1 or first.dropper_scatter > 0
+        self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
         self.line = self._defective[first].with_tables(self.line, rows)
+        if any(condition.tension_scatter > 0 for condition in conditions):
+            self._designed = data
+            self.line = self.line._replace(
+                shape=np.repeat(self.line.shape, lanes, axis=0),
+                stencil=np.repeat(self.line.stencil, lanes, axis=0),
+                absorbing=np.repeat(self.line.absorbing, lanes, axis=0),
+            )
         self._tension = np.repeat(self._tension, rows, axis=0)
         self._write_defects(0, DrawnLine(first))
 
     def _write_defects(self, row: int, drawn: DrawnLine) -> None:
-        state = self._defective[drawn.condition].write(self.line, row, drawn.scatter)
+        defective = self._defective[drawn.condition]
+        if self._designed is not None:
+            self._write_tension(row, drawn)
+        if drawn.tensions != (1.0, 1.0):
+            assert self._designed is not None
+            defective = DefectiveLine(self._designed, self.line.spans, drawn.condition, drawn.tensions)
+        state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
+
+    def _write_tension(self, row: int, drawn: DrawnLine) -> None:
+        """Give a lane the wires of its own tension, and the shape that they would be hung in."""
+        assert self._designed is not None
+        own = with_tension_left(self._designed, drawn.condition, drawn.tensions)
+        shape = shape_left(self._designed, own)
+        tensioned = of_tension(own, shape, self.line.spacing, self.time_step)
+        self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
+        # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
+        self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
         """Put one lane's wires at rest, as ``drawn`` has them; a force (N) at the anchor moves no wire."""

@@ -23,7 +23,7 @@ from ..protocol import (
     rise_at_contact,
 )
 from .line import CONTACT, LOWER, UPPER, FlexibleLine
-from .links import defect_row, difference, follow_links, measure_extensions, pull_links
+from .links import difference, follow_links, measure_extensions, own_row, pull_links
 from .segments import shift_nodes
 from .wires import (
     apply_springs,
@@ -49,7 +49,7 @@ def follow(line, wire, lane, x):
         for w in range(wire.displacement.shape[1]):
             shift_nodes(wire.displacement[lane, w], line.rows, per_span)
             shift_nodes(wire.increment[lane, w], line.rows, per_span)
-        row = defect_row(line.link_static, lane)
+        row = own_row(line.link_static, lane)
         follow_links(
             line, row, wire.first_span[lane], wire.extension[lane], wire.static[lane], wire.gap[lane]
         )
@@ -58,10 +58,10 @@ def follow(line, wire, lane, x):
 @inlined
 def unmoved_height(line, lane, x):
     """Height (m) of the contact wire at rest at x (m)."""
-    height = static_height(line.shape, line.span, x)
+    height = static_height(line.shape[own_row(line.shape, lane)], line.span, x)
     if line.rise.shape[1] > 0:
-        rise = line.rise[defect_row(line.link_static, lane)]
-        height += rise_by_defects(rise, line.rise_breaks, line.rise_decay, x)
+        row = own_row(line.rise, lane)
+        height += rise_by_defects(line.rise[row], line.rise_breaks, line.rise_decay[row], x)
     return height
 
 
@@ -86,8 +86,9 @@ def _advance(line, wire, lane):
     past, now = wire.past_extension[lane], wire.extension[lane]
     keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
     measure_extensions(line, u, past, now, wire.gap[lane])
+    stencil = line.stencil[own_row(line.stencil, lane)]
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], line.inertia[w], line.stencil[w])
+        leapfrog(u[w], d[w], line.inertia[w], stencil[w])
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     pull_links(line, u, d, past, now, wire.static[lane], wire.change[lane])
 
@@ -125,9 +126,10 @@ def _apply(line, wire, lane, contact, x, force):
 def _end(line, wire, lane):
     first_span = wire.first_span[lane]
     at_start, at_end = first_span == 0, first_span + line.window >= line.spans
+    absorbing = line.absorbing[own_row(line.absorbing, lane)]
     for w in range(wire.displacement.shape[1]):
         u, d = wire.displacement[lane, w], wire.increment[lane, w]
-        end_wire(u, d, line.absorbing[w], at_start, at_end)
+        end_wire(u, d, absorbing[w], at_start, at_end)
 
 
 @implements(ending_by_wire, FlexibleLine)

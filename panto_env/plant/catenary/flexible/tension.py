@@ -1,5 +1,6 @@
-"""A line whose tension is lost: droppers and steady arms stay as they were cut and set for the design's.
+"""A line of another tension than its design's.
 
+Droppers and steady arms stay as they were cut and set for the design's.
 Less tension lets the wires hang lower between droppers and supports than a line that was hung with it. The
 static shape that the tension left and the design's sag would have wants droppers of other lengths: those that
 are there are too long or too short by the difference.
@@ -27,16 +28,22 @@ class Misfit(NamedTuple):
     lift: float  # force of each steady arm (N)
 
 
-def with_tension_left(data: FlexibleCatenaryData, condition: LineCondition) -> FlexibleCatenaryData:
-    """The line with the tension that a condition leaves it, hung anew; itself where none is lost."""
-    lost = {
-        "contact_wire": condition.lost_contact_tension,
-        "messenger_wire": condition.lost_messenger_tension,
+def with_tension_left(
+    data: FlexibleCatenaryData, condition: LineCondition, errors: tuple[float, float] = (1.0, 1.0)
+) -> FlexibleCatenaryData:
+    """The line with the tension that a condition leaves it, hung anew; itself where it is the design's.
+
+    errors: contact and messenger wire's tension over that.
+    """
+    contact, messenger = errors
+    left = {
+        "contact_wire": (1 - condition.lost_contact_tension) * contact,
+        "messenger_wire": (1 - condition.lost_messenger_tension) * messenger,
     }
     wires = {
-        name: wire.model_copy(update={"tension": (1 - share) * wire.tension})
-        for name, share in lost.items()
-        if share > 0 and (wire := getattr(data, name))
+        name: wire.model_copy(update={"tension": share * wire.tension})
+        for name, share in left.items()
+        if share != 1 and (wire := getattr(data, name))
     }
     return data.model_copy(update=wires) if wires else data
 

@@ -1,0 +1,48 @@
+"""A policy that an agent starts from, or adds to: one for each lane of a vector environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.base.errors import InputError
+from panto_env.control.settings import RunSettings
+from panto_env.policies import errors_name, find_policy, wishes
+
+Array = NDArray[np.float64]
+
+
+class PolicyLanes:
+    """Policies of one name, one a lane: each has an episode, and a memory, of its own."""
+
+    def __init__(self, name: str, task: Any) -> None:
+        """name: as ``find_policy`` takes it. task: ``Task`` of the lanes."""
+        self.name, self._task = name, task
+        self._policies = [find_policy(name) for _ in range(task.lanes)]
+
+    def begin(self, lanes: Any) -> None:
+        """Begin the episodes that the lanes, (n,), have just begun."""
+        with errors_name(self.name, "reset"):
+            for lane in lanes.tolist():
+                self._policies[lane].reset(self._task.context(lane))
+
+    def act(self, observations: NDArray[np.float32]) -> Array:
+        """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""
+        with errors_name(self.name, "act"):
+            # Copies: a policy may keep what it was shown.
+            pairs = zip(self._policies, observations.copy(), strict=True)
+            actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
+        return np.clip(actions, -1.0, 1.0)
+
+
+def check_wishes(name: str, settings: RunSettings) -> None:
+    """Raise InputError unless a policy is found that can see what the environment shows."""
+    for key, wanted in wishes(find_policy(name)).items():
+        offered = getattr(settings, key)
+        if wanted != offered:
+            raise InputError(
+                f"the policy '{name}' asks for {key} = {wanted!r}, and the environment has {offered!r}; set "
+                "it so"
+            )

@@ -1,0 +1,165 @@
+"""Lanes of the true plant that run the same stretch of the same line again and again, under commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from panto_env.analysis.pool import in_threads, workers_for
+from panto_env.base.arrays import Array
+from panto_env.control import Task
+from panto_env.control.mean_force import Trim
+from panto_env.control.memory import check_memory
+from panto_env.control.settings import RunSettings
+from panto_env.plant.state import CONTACTS, SAMPLE_ROWS, Place, Row, Samples
+
+PUSHED = 48
+"""Lanes of a group that take pushes."""
+
+
+class Stretch:
+    """A stretch of one line, begun in the state in which a passive train comes to it."""
+
+    def __init__(
+        self, settings: RunSettings, trim: Trim | None, seed: int, begin: int, control_steps: int
+    ) -> None:
+        """begin: control steps before it; control_steps: of the stretch. seed: of what is drawn."""
+        self._settings, self._trim, self._seed = settings, trim, seed
+        self._begin, self._control_steps = begin, control_steps
+        self._groups: dict[int, list[_Group]] = {}  # by the lanes of each
+
+    def forces(self, commands: Array) -> Array:
+        """Contact force (N), not filtered, (runs, samples), under commands (N), (runs, steps, places)."""
+        jobs = workers_for(len(commands), None)
+        lanes = -(-len(commands) // jobs)
+        padded = np.zeros((jobs * lanes, *commands.shape[1:]))
+        padded[: len(commands)] = commands
+        work = zip(self._of(lanes, jobs), np.split(padded, jobs), strict=True)
+        runs = in_threads([partial(group.run, part) for group, part in work])
+        return np.concatenate(runs)[: len(commands)]
+
+    def changes(self, commands: Array, push: Array, steps: int) -> Array:
+        """Change of that force (N), (steps, places, samples), by pushes that begin at one step, at one place.
+
+        commands: (steps, places) (N), of the run about which they are made. push: (length,): added to the
+        commands from that step on (N). steps: control steps after which a push is no longer followed.
+        """
+        pushes = [(step, place) for step in range(len(commands)) for place in range(commands.shape[1])]
+        jobs = workers_for(len(pushes), None)
+        groups, shares = self._of(PUSHED, jobs), [pushes[job::jobs] for job in range(jobs)]
+        found = in_threads(
+            [
+                partial(group.changes, commands, push, steps, share)
+                for group, share in zip(groups, shares, strict=True)
+            ]
+        )
+        changes = np.empty((len(pushes), found[0].shape[1]))
+        for job, part in enumerate(found):
+            changes[job::jobs] = part
+        return changes.reshape(*commands.shape, -1)
+
+    def _of(self, lanes: int, jobs: int) -> list[_Group]:
+        """So many groups of so many lanes each."""
+        groups = self._groups.setdefault(lanes, [])
+        while len(groups) < jobs:
+            groups.append(
+                _Group(self._settings, self._trim, self._seed, lanes, self._begin, self._control_steps)
+            )
+        return groups[:jobs]
+
+
+class _Group:
+    """Lanes that one thread drives."""
+
+    def __init__(
+        self, settings: RunSettings, trim: Trim | None, seed: int, lanes: int, begin: int, control_steps: int
+    ) -> None:
+        task = Task(settings, lanes=lanes, keep_samples=False, trim=trim)
+        task.reset(np.arange(lanes), lambda _: np.random.default_rng(seed))
+        self._plant, self._steps = task.plant, task.control_steps
+        self._places = [int(place) for place in task.actuator.places]
+        self._first = begin * task.control_steps
+        rows = self._first + control_steps * task.control_steps + 1
+        shape = (lanes, rows, CONTACTS, SAMPLE_ROWS)
+        check_memory(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
+        # Rows before the stretch are never touched, and so take no memory.
+        self._samples = Samples(
+            rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))
+        )
+        self._plant.advance_passively(
+            self._first, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0)))
+        )
+        moving = self._plant.model.wire, self._plant.actuators, self._plant.run
+        self._moving = list(_arrays(moving))
+        self._start = [(array, array.copy()) for array in self._moving]
+
+    def run(self, commands: Array) -> Array:
+        """Contact force (N), (lanes, samples), from the start of the stretch under (lanes, steps, places)."""
+        _restore(self._start)
+        self._advance(commands)
+        return self._force.copy()
+
+    def changes(self, commands: Array, push: Array, steps: int, pushes: list[tuple[int, int]]) -> Array:
+        """Change of the force (N), (pushes, samples), by pushes, each a step and a place, in order of steps.
+
+        As of ``Stretch.changes``. All lanes go along under the plain commands; from step to step some of
+        them, all in the same state, are let run ahead, each with its own push, and are then put back.
+        """
+        _restore(self._start)
+        lanes, end, now = len(self._force), len(commands), 0
+        forces = np.zeros((len(pushes), self._force.shape[1]))
+        reach = []  # of each push, samples that it is followed over
+        for first in range(0, len(pushes), lanes):
+            block = pushes[first : first + lanes]
+            self._advance(
+                np.broadcast_to(commands[now : block[0][0]], (lanes, *commands[now : block[0][0]].shape))
+            )
+            now, last = block[0][0], min(end, block[-1][0] + steps)
+            here = [(array, array.copy()) for array in self._moving]
+            pushed = np.repeat(commands[None, now:last], lanes, axis=0)
+            for lane, (step, place) in enumerate(block):
+                begun = pushed[lane, step - now : step - now + len(push), place]
+                begun += push[: len(begun)]
+            self._advance(pushed)
+            forces[first : first + len(block)] = self._force[: len(block)]
+            reach += [(step * self._steps, min(last, step + steps) * self._steps) for step, _ in block]
+            _restore(here)
+        self._advance(np.broadcast_to(commands[now:], (lanes, *commands[now:].shape)))
+        plain = self._force[0]
+        for force, (begin, stop) in zip(forces, reach, strict=True):
+            force[begin:stop] -= plain[begin:stop]
+            force[:begin] = force[stop:] = 0.0
+        return forces
+
+    @property
+    def _force(self) -> Array:
+        """(lanes, samples): of the stretch, as last recorded (N), a view."""
+        return self._samples.rows[:, self._first + 1 :, 0, Row.CONTACT_FORCE]
+
+    def _advance(self, commands: Array) -> None:
+        """Advance all lanes under commands (N), (lanes, steps, places)."""
+        now = np.zeros((len(commands), CONTACTS, len(Place)))
+        for step in range(commands.shape[1]):
+            now[:, 0, self._places] = commands[:, step]
+            self._plant.advance(now, self._steps, self._samples)
+
+
+Saved = list[tuple[Any, Any]]
+"""Arrays of a state, each with a copy of what was in it."""
+
+
+def _restore(saved: Saved) -> None:
+    for array, content in saved:
+        np.copyto(array, content)
+
+
+def _arrays(value: Any) -> Iterator[Any]:
+    """All arrays of named tuples, at any depth."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, tuple):
+        for each in value:
+            yield from _arrays(each)

@@ -1,0 +1,122 @@
+"""What is asked of the oracle: the least σ over some spans of one pass, at the passive run's mean force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from panto_env import Trajectory, simulate
+from panto_env.base.arrays import Array
+from panto_env.base.errors import InputError
+from panto_env.control import passive_mean, trim_of_pass
+from panto_env.control.extent import whole_steps
+from panto_env.control.settings import far_enough, run_settings
+from panto_env.metrics.low_pass import low_pass_sections
+from panto_env.metrics.spans import SpanChoice, limits
+
+from ..benchmark.controls import Tape
+from .knots import Knots, without_limits
+from .lanes import Stretch
+
+LEAD = 2.0
+"""Time (s) before the evaluated spans from which on the actuator may push: their start has to be met."""
+MEMORY = 3.0
+"""Time (s) after which the contact force has forgotten a push, as far as the search needs to know."""
+PUSH = 5.0
+"""Change of a knot (N) from which the response is taken: smaller ones see droppers go slack one by one."""
+RESOLUTION = 0.01
+"""Of the filtered force in the least squares (s): it has little above 20 Hz."""
+
+
+class Problem:
+    """One pass along one line, and what the contact force over its evaluated spans does under knots."""
+
+    def __init__(self, given: Mapping[str, Any], seed: int = 0, spans: SpanChoice = None) -> None:
+        """given: settings of a run, by name; a line's last spans give the end where none is told.
+
+        Raises InputError for what is not valid, or where the passive run ends early.
+        """
+        settings = far_enough(run_settings(given))
+        if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
+            raise InputError("An oracle takes one speed, without run_in and without pantograph_scatter.")
+        self.given, self.seed, self.settings = dict(given), seed, settings
+        self.passive = passive = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
+        if passive.terminated:
+            raise InputError(f"There is no oracle where the passive run has no figures. {passive.ending}")
+        covered = passive.spans(spans)
+        inside = np.flatnonzero(passive.inside(spans))
+        self.spans = covered
+        self.figures = passive.summary(spans)
+        self.chosen = spans
+        self.places = len(settings.actuator.places)
+        self.interval = settings.control_interval
+        self.steps = whole_steps(self.interval, passive.time_step)
+        start = 0.0 if covered is None else limits(covered, passive.span_length)[0] / passive.stride
+        self.begin = max(0, int(start * passive.time_step / self.interval - LEAD / self.interval))
+        self.count = int(inside[-1]) // self.steps + 1 - self.begin
+        """Knots of one place."""
+        self._inside = inside - self.begin * self.steps  # samples evaluated, counted from the first knot's
+        before = passive.contact_force[: self.begin * self.steps]
+        self.every = max(1, round(RESOLUTION / passive.time_step))
+        """Evaluated samples from one row of the least squares to the next."""
+        self._filter_state = _state_after(before, passive.contact_force[0], passive.time_step)
+        trim = trim_of_pass(settings, seed, spans, passive_mean)
+        self.knots = Knots(settings.actuator, passive.time_step, self.steps)
+        self._true = Stretch(settings, trim, seed, self.begin, self.count)
+        free = settings.model_copy(update={"actuator": without_limits(settings.actuator)})
+        self._free = self._true if free == settings else Stretch(free, trim, seed, self.begin, self.count)
+
+    def forces(self, knots: Array) -> Array:
+        """Filtered contact force (N), (runs, samples evaluated), under knots (N), (runs, count, places)."""
+        actions = self.knots.commands(knots) / self.knots.limit
+        return self._filtered(self._true.forces(actions * self.knots.limit))[:, self._inside]
+
+    def response(self, knots: Array) -> Array:
+        """Change of the filtered force per change of each knot (N/N), (rows, count * places).
+
+        Rows are evaluated samples ``RESOLUTION`` apart. By a push of ``PUSH`` on each knot of (count, places)
+        in the true plant, followed for ``MEMORY``, of an actuator without limits of force and rate.
+        """
+        from scipy.signal import sosfilt  # slow to import
+
+        push = self.knots.free_commands(np.array([[PUSH], [0.0]]))[:, 0]
+        followed = max(1, round(MEMORY / self.interval))
+        changes = self._free.changes(self.knots.free_commands(knots), push, followed)
+        sections, _ = low_pass_sections(self.passive.time_step)
+        filtered = sosfilt(sections, changes, axis=2)[:, :, self.rows] / PUSH
+        return np.asarray(filtered.reshape(-1, len(self.rows)).T)
+
+    @property
+    def rows(self) -> Any:
+        """Samples of the least squares, counted from the first knot's."""
+        return self._inside[:: self.every]
+
+    def replay(self, commands: Array) -> Trajectory:
+        """The whole pass as ``simulate`` runs it under commands (N), (count, places)."""
+        rest = np.zeros((self.begin, self.places))
+        actions = np.concatenate([rest, commands / self.knots.limit, np.zeros((1, self.places))])
+        return simulate(
+            **self.given,
+            policy=Tape(actions),
+            seed=self.seed,
+            record_droppers=False,
+            evaluated=self.chosen,
+        )
+
+    def _filtered(self, force: Array) -> Array:
+        from scipy.signal import sosfilt  # slow to import
+
+        sections, _ = low_pass_sections(self.passive.time_step)
+        state = np.repeat(self._filter_state[:, None], len(force), axis=1)
+        return np.asarray(sosfilt(sections, force, axis=1, zi=state)[0])
+
+
+def _state_after(force: Array, first: float, time_step: float) -> Array:
+    """State of EN 50317's filter, (sections, 2), after a force (N), settled at its first value."""
+    from scipy.signal import sosfilt  # slow to import
+
+    sections, settled = low_pass_sections(time_step)
+    state = settled * first
+    return np.asarray(sosfilt(sections, force, zi=state)[1]) if len(force) else state

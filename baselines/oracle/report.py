@@ -1,0 +1,144 @@
+"""Tables of oracles for people, and a picture of one. Matplotlib is imported late: it is slow to import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from panto_env.analysis.plots import mark_supports
+from panto_env.base.table import Table
+from panto_env.metrics.spans import in_words
+from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
+from panto_env.terminal import number
+
+from .search import Oracle
+from .solver import Iteration
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LEGEND = (
+    "σ of the force low-passed at 20 Hz, at the mean force of the passive run. Each σ is reached by the true "
+    "plant: a local optimum, not a proof that nothing is better."
+)
+
+
+def title(oracle: Oracle) -> str:
+    """Which pass it is."""
+    problem = oracle.problem
+    return (
+        f"{problem.passive.pantograph} on {problem.passive.catenary} at {problem.passive.speed_kmh:g} km/h, "
+        f"spans {in_words(problem.spans)}, seed {problem.seed}"
+    )
+
+
+def convergence(oracle: Oracle) -> Table:
+    """Every iteration of every search of one pass."""
+    rows, ends, passive = [], [], oracle.problem.figures
+    for search in oracle.searches:
+        rows += [(search.start, *_numbers(each, passive.std)) for each in search.iterations]
+        ends.append(len(rows) - 1)
+    headings = ("start", "iteration", "σ (N)", "of passive (%)", "mean (N)", "at limits (%)", "step")
+    return Table(f"{title(oracle)}: passive σ {passive.std:.3f} N", headings, rows, section_ends=tuple(ends))
+
+
+def _numbers(iteration: Iteration, passive_std: float) -> tuple[str, ...]:
+    return (
+        str(iteration.number),
+        number(iteration.std, 3),
+        number(100 * (iteration.std / passive_std - 1), 2),
+        number(iteration.mean, 3),
+        number(100 * iteration.at_limits, 0),
+        number(iteration.step, 2),
+    )
+
+
+def summary(oracles: Sequence[Oracle]) -> Table:
+    """One row for each pass; of several starts the spread of what they reach."""
+    rows = []
+    for each in oracles:
+        passive, figures = each.problem.figures, each.figures
+        reached = [search.std for search in each.searches if search.start != "repeated"]
+        rows.append(
+            (
+                title(each),
+                number(passive.mean, 2),
+                number(passive.std, 3),
+                number(figures.mean, 2),
+                number(figures.std, 3),
+                number(100 * each.change, 1),
+                number(max(reached) - min(reached), 3) if len(reached) > 1 else "–",
+                number(figures.contact_loss, 2),
+            )
+        )
+    headings = (
+        "pass",
+        "passive mean (N)",
+        "σ (N)",
+        "oracle mean (N)",
+        "σ (N)",
+        "change (%)",
+        "spread of starts (N)",
+        "CL (%)",
+    )
+    return Table("Oracles", headings, rows)
+
+
+def stored_table(data: Mapping[str, Any]) -> Table:
+    """What a file of ``stored.save`` holds, one row for each cell."""
+    rows = []
+    for cell in data["cells"]:
+        passes, actuator = cell["passes"], actuator_settings(cell["actuator"])
+        preset = next(
+            (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]
+        )
+        changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
+        rows.append(
+            (
+                cell["catenary"],
+                f"{preset}, {actuator.place}",
+                number(cell["speed_kmh"], 0),
+                number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
+                number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
+                number(100 * (cell["ratio"] - 1), 1),
+                f"{min(changes):.1f} to {max(changes):.1f}",
+            )
+        )
+    headings = ("line", "actuator", "km/h", "passive σ (N)", "oracle σ (N)", "change (%)", "by seed (%)")
+    return Table("Stored oracles", headings, rows, text_columns=2)
+
+
+def plot(oracle: Oracle) -> Figure:
+    """Contact force and actuator force along the evaluated spans, and σ by iteration."""
+    from matplotlib.figure import Figure
+
+    problem, run = oracle.problem, oracle.run
+    inside = problem.passive.inside(problem.chosen)
+    position = run.position[inside]
+    figure = Figure(figsize=(10, 9), layout="constrained")
+    force, actuator, search = figure.subplots(3, 1)
+    for values, colour, label in zip(oracle.forces, ("0.6", "tab:blue"), ("passive", "oracle"), strict=True):
+        force.plot(position, values[inside], color=colour, label=label)
+    force.set(ylabel="contact force low-passed\nat 20 Hz, not delayed (N)")
+    for values, label in ((run.frame_force, "on the frame"), (run.head_force, "on the head")):
+        if np.any(values):
+            actuator.plot(position, values[inside], linewidth=0.9, label=label)
+    actuator.set(ylabel="actuator force (N)", xlabel="position (m); grey lines: supports")
+    for axis in (force, actuator):
+        mark_supports(axis, run)
+        axis.set_xlim(position[0], position[-1])
+    for each in oracle.searches:
+        search.plot(
+            [one.number for one in each.iterations],
+            [one.std for one in each.iterations],
+            "o-",
+            label=each.start,
+        )
+    search.axhline(problem.figures.std, color="0.6", linestyle=":", label="passive")
+    search.set(xlabel="iteration", ylabel="σ (N)", ylim=(0, None))
+    for axis in (force, actuator, search):
+        axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize="small", frameon=False)
+    figure.suptitle(f"{title(oracle)}: σ {100 * oracle.change:+.1f} %")
+    return figure

@@ -1,0 +1,84 @@
+"""What an oracle is asked for: passes as a table of cells, from keywords or a TOML file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, SerializeAsAny
+
+from panto_configs import find
+from panto_env.base.files import read_toml
+from panto_env.base.settings import Positive, Settings, parse
+from panto_env.control.settings import default, description
+from panto_env.plant.actuators import ActuatorSettings, actuator_settings
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
+
+from .search import STARTS
+
+Start = Literal[STARTS]  # type: ignore[valid-type]
+_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(actuator_settings)]]
+
+
+def _condition(value: Any) -> LineCondition:
+    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
+
+
+class Cell(Settings):
+    """A pantograph with an actuator on a line, and the speeds to run at."""
+
+    catenary: str = Field(default("catenary"), description=description("catenary"))
+    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
+    actuator: _Actuator = Field(
+        default("actuator"), validate_default=True, description=description("actuator")
+    )
+    speeds_kmh: tuple[Positive, ...] = Field((300.0,), min_length=1, description="km/h")
+
+
+class OracleSettings(Settings):
+    """Cells, and what is the same in all of them."""
+
+    cells: tuple[Cell, ...] = Field((Cell(),), min_length=1, description="lines, actuators and speeds")
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
+    spans: tuple[int, int] | None = Field(
+        None, description="first and last span over which σ is least; by default those after the start"
+    )
+    starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
+    line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
+        LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
+    )
+    control_interval: Positive = Field(
+        default("control_interval"), description=description("control_interval")
+    )
+
+    def passes(self) -> Iterator[tuple[dict[str, Any], int]]:
+        """Settings of the run and seed of each pass."""
+        for cell in self.cells:
+            for speed in cell.speeds_kmh:
+                for seed in self.seeds:
+                    yield self.given(cell, speed), seed
+
+    def given(self, cell: Cell, speed_kmh: float) -> dict[str, Any]:
+        """Settings of the run of a cell at a speed (km/h), by name."""
+        return {
+            "catenary": cell.catenary,
+            "pantograph": cell.pantograph,
+            "speed_kmh": speed_kmh,
+            "actuator": cell.actuator,
+            "line_condition": self.line_condition,
+            "control_interval": self.control_interval,
+        }
+
+
+def oracle_settings(
+    source: str | Path | None, changes: Mapping[str, Any], cell: Mapping[str, Any]
+) -> OracleSettings:
+    """Settings of a TOML file, its path or a name of ``configs/``, or the defaults, with changes.
+
+    cell: where it has anything, the only cell. Raises InputError for what is not valid.
+    """
+    table = {} if source is None else read_toml(find(source, "oracle"))
+    if cell:
+        table["cells"] = [dict(cell)]
+    return parse(OracleSettings, table | dict(changes), "the oracle" if source is None else str(source))

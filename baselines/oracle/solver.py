@@ -1,0 +1,211 @@
+"""Gauss-Newton on the knots, within the actuator's limits and at the passive run's mean force.
+
+Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
+of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
+et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
+is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that
+there is nothing better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+from scipy.sparse import csc_matrix, eye_array, kron
+
+from panto_env.base.arrays import Array
+from panto_env.base.errors import InputError
+
+from .problem import Problem
+
+if TYPE_CHECKING:
+    from .knots import Limits
+
+SHARES = (1.0, 0.6, 0.3, 0.1)
+"""Of a step that are tried, all at once."""
+DAMPING = 0.1
+"""Weight of the step's own size at first, over the mean square of the response to one knot."""
+DAMPINGS = (0.03, 0.3, 3.0, 30.0)
+"""Of the last one, that are tried in each iteration: what the model says of large steps is not so."""
+MEAN_TOLERANCE = 5e-4
+"""Largest difference of the mean force from the passive run's at the end of a search, as a share of it."""
+MEAN_WEIGHT = 2.0
+"""Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
+MEAN_STIFFNESS = 1e3
+"""Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
+WORTH, ENOUGH = 2e-2, 2e-3
+"""Relative gains of an iteration: below the first the response is taken anew, with a new one and below the
+second the search ends."""
+MOST_ITERATIONS = 12
+OSQP = {"verbose": False, "eps_abs": 1e-4, "eps_rel": 1e-4, "max_iter": 10_000}
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Where the search stands."""
+
+    number: int
+    std: float  # σ of the filtered force (N)
+    mean: float  # N
+    at_limits: float  # share of the knots at a limit of force or rate
+    step: float  # share of the last step that was taken
+
+
+@dataclass(frozen=True)
+class Descent:
+    """One search from one start."""
+
+    start: str
+    knots: Array  # (count, places): N
+    iterations: tuple[Iteration, ...]
+
+    @property
+    def std(self) -> float:
+        """σ reached (N)."""
+        return self.iterations[-1].std
+
+
+Progress = Callable[[str, Iteration], None]
+
+
+def descend(
+    problem: Problem,
+    start: str,
+    knots: Array,
+    *,
+    basis: Array | None = None,
+    iterations: int = MOST_ITERATIONS,
+    progress: Progress | None = None,
+) -> Descent:
+    """Search from knots, (count, places) (N), which keep the limits; start: their name.
+
+    basis: (knots of all places, directions), where only some combinations are looked at. progress: called
+    with each iteration. The merit, σ and a weighted error of the mean, falls from iteration to iteration.
+    Where the mean is not met after so many iterations, up to as many more follow.
+    """
+    limits = of_all_places(problem.knots.limits(problem.count), problem.places)
+    force, damping = problem.forces(knots[None])[0], DAMPING
+    found = [_iteration(problem, 0, knots, force, 0.0)]
+    if progress is not None:
+        progress(start, found[-1])
+    response, fresh = problem.response(knots), True
+    while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
+        before = merit(problem, force)
+        model = Model.of(problem, response, force, basis)
+        weights = damping * np.array(DAMPINGS)
+        steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
+        tried = knots + np.array([share * step for step in steps for share in SHARES]).reshape(
+            -1, *knots.shape
+        )
+        forces = problem.forces(tried)
+        merits = [merit(problem, each) for each in forces]
+        best = int(np.argmin(merits))
+        share = SHARES[best % len(SHARES)] if merits[best] < before else 0.0
+        if share > 0:
+            change = (forces[best] - force)[:: problem.every]
+            response = corrected(response, (tried[best] - knots).ravel(), change)
+            knots, force = tried[best], forces[best]
+            damping = weights[best // len(SHARES)]
+        else:
+            damping = weights[-1]
+        found.append(_iteration(problem, len(found), knots, force, share))
+        if progress is not None:
+            progress(start, found[-1])
+        gain = (before - merit(problem, force)) / before
+        if gain < ENOUGH and fresh and _mean_met(problem, force):
+            break
+        fresh = gain < WORTH
+        if fresh:
+            response = problem.response(knots)
+    return Descent(start, knots, tuple(found))
+
+
+def merit(problem: Problem, force: Array) -> float:
+    """What may not grow (N): σ of a filtered force, (samples,), and the weighted error of its mean."""
+    return float(force.std() + MEAN_WEIGHT * abs(force.mean() - problem.figures.mean))
+
+
+def _mean_met(problem: Problem, force: Array) -> bool:
+    """Whether the mean of a filtered force, (samples,) (N), is that of the passive run."""
+    wanted = problem.figures.mean
+    return abs(float(force.mean()) - wanted) <= MEAN_TOLERANCE * wanted
+
+
+class Model(NamedTuple):
+    """Sum of squares of the filtered force about its mean, and of a wrong mean, as a quadratic of a step."""
+
+    square: Array  # (directions, directions)
+    slope: Array  # (directions,)
+    size: float  # of ``square``: mean of its diagonal
+    basis: Array | None
+
+    @classmethod
+    def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
+        """About the present filtered force, (samples,) (N); response: (rows, knots) (N/N)."""
+        rest = force[:: problem.every]
+        if basis is not None:
+            response = response @ basis
+        mean = response.mean(axis=0)
+        stiffness = MEAN_STIFFNESS * len(rest)
+        missing = problem.figures.mean - float(force.mean())
+        about_mean = response - mean
+        square = about_mean.T @ about_mean
+        size = float(np.trace(square)) / len(square)
+        square += stiffness * np.outer(mean, mean)
+        slope = about_mean.T @ (rest - rest.mean()) - stiffness * missing * mean
+        return cls(square, slope, size, basis)
+
+    def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
+        """Change of all knots, flat (N), that is best within the limits; damping: as of ``DAMPING``.
+
+        Raises InputError where OSQP finds none.
+        """
+        now = limits.matrix @ knots
+        matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
+        square = self.square + damping * self.size * np.eye(len(self.square))
+        scale = 1.0 / float(np.diag(square).max())
+        solver = quadratic_solver()
+        quadratic = csc_matrix(np.triu(scale * square))
+        solver.setup(quadratic, scale * self.slope, matrix, limits.low - now, limits.high - now, **OSQP)
+        answer = solver.solve(raise_error=False)
+        if answer.x is None or not np.isfinite(answer.x).all():
+            raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
+        return np.asarray(answer.x if self.basis is None else self.basis @ answer.x)
+
+
+def corrected(response: Array, step: Array, change: Array) -> Array:
+    """The response, changed as little as can be to give the change, (rows,) (N), of a step, flat (N).
+
+    Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
+    """
+    return np.asarray(response + np.outer(change - response @ step, step) / (step @ step))
+
+
+def quadratic_solver() -> Any:
+    """A solver of OSQP's. Raises InputError where OSQP, an extra, is not installed."""
+    try:
+        import osqp
+    except ImportError as error:
+        raise InputError(
+            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with its extra "
+            "'control'."
+        ) from error
+    return osqp.OSQP()
+
+
+def of_all_places(limits: Limits, places: int) -> Limits:
+    """Limits of knots, (count, places), taken row by row, from those of one place."""
+    matrix = csc_matrix(kron(limits.matrix, eye_array(places)))
+    return limits._replace(
+        matrix=matrix, low=np.repeat(limits.low, places), high=np.repeat(limits.high, places)
+    )
+
+
+def _iteration(
+    problem: Problem, number: int, knots: Array, force: Array, share: float, damping: float = 0.0
+) -> Iteration:
+    at_limits = problem.knots.at_limits(knots)
+    return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)

@@ -1,0 +1,117 @@
+"""Gains of policies as `panto tune` stores them: one file per policy, one table per line and pantograph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from panto_configs import FOLDER
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.remember import remembered
+from panto_env.base.settings import Settings, parse
+from panto_env.control.context import Context
+from panto_env.plant.state import Place
+
+Source = str | Sequence[float]
+GAINS_FOLDER = FOLDER / "policies"
+REACH = 12.5
+"""How far (km/h) beyond the lowest and the highest tuned speed gains are still used: half a usual step."""
+
+
+class Tuning(Settings):
+    """Gains for one line and pantograph over speed, and what they came from."""
+
+    catenary: str
+    pantograph: str
+    place: str = Field(description="where the actuator acts: frame, head or both")
+    names: tuple[str, ...] = Field(description="of the gains")
+    speeds_kmh: tuple[float, ...] = Field(min_length=1, description="rising (km/h)")
+    gains: tuple[tuple[float, ...], ...] = Field(description="at each speed")
+    command: str
+    version: str
+    actuator: dict[str, Any]
+    sensors: dict[str, Any]
+    line_condition: str
+    seeds: tuple[int, ...] = Field(description="of the training's lines and noise")
+    passes: int = Field(description="simulated passes that the tuning took")
+    std_change: tuple[float, ...] = Field(description="of sigma to passive on selection seeds, by speed (-)")
+    mean_change: tuple[float, ...] = Field(description="of the mean force, likewise (-)")
+
+    @model_validator(mode="after")
+    def _fit(self) -> Self:
+        if len(self.gains) != len(self.speeds_kmh) or any(len(row) != len(self.names) for row in self.gains):
+            raise ValueError("gains must have a row for each speed and a number for each name")
+        if list(self.speeds_kmh) != sorted(set(self.speeds_kmh)):
+            raise ValueError("speeds_kmh must rise")
+        return self
+
+
+class GainFile(Settings):
+    """A file of gains."""
+
+    policy: str
+    tunings: tuple[Tuning, ...] = ()
+
+
+def gain_file(source: str | Path) -> Path:
+    """The file of a path, or of a name among those that come with the project."""
+    path = Path(source)
+    return path if path.suffix == ".toml" else GAINS_FOLDER / f"{source}.toml"
+
+
+def load_gains(path: Path) -> GainFile:
+    """Read a file of gains. Raises InputError, naming the file, where it cannot be read or is not valid."""
+    if not path.is_file():
+        raise InputError(
+            f"There are no gains in {path}: make them with `panto tune`, or give them by the parameter gains."
+        )
+    return _load(path, path.stat().st_mtime_ns)
+
+
+def place_of(channels: Sequence[int]) -> str:
+    """Where an actuator acts, in a word."""
+    return "both" if len(channels) > 1 else Place(channels[0]).name.lower()
+
+
+def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
+    """Gains for an episode, (gains,): those given, or those stored, between two speeds linear.
+
+    Raises InputError where there are none for line, pantograph, place of the actuator, and speed.
+    """
+    if not isinstance(source, str):
+        if len(source) != len(names):
+            raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
+        return np.array(source, dtype=float)
+    path = gain_file(source)
+    line, pantograph = context.catenary.name, context.pantograph.name
+    place = place_of(context.channels)
+    for tuning in load_gains(path).tunings:
+        if (tuning.catenary, tuning.pantograph, tuning.place) == (line, pantograph, place):
+            return _at_speed(tuning, names, 3.6 * context.speed, path)
+    raise InputError(
+        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
+        f"at {place}: make them with `panto tune`, or take a policy that needs none."
+    )
+
+
+def _at_speed(tuning: Tuning, names: Sequence[str], speed_kmh: float, path: Path) -> NDArray[np.float64]:
+    low, high = tuning.speeds_kmh[0], tuning.speeds_kmh[-1]
+    if not low - REACH <= speed_kmh <= high + REACH:
+        raise InputError(
+            f"{path.name} has gains for '{tuning.catenary}' from {low:g} to {high:g} km/h, "
+            f"not for {speed_kmh:g} km/h; tune it there."
+        )
+    if tuning.names != tuple(names):
+        raise InputError(f"The gains in {path.name} are not those of this policy; tune it again.")
+    return np.array([np.interp(speed_kmh, tuning.speeds_kmh, column) for column in np.array(tuning.gains).T])
+
+
+@remembered
+def _load(path: Path, _modified: int) -> GainFile:
+    return parse(GainFile, read_toml(path), str(path))

@@ -1,0 +1,176 @@
+"""Mixed-sensitivity H-infinity control: two Riccati equations and a search for the least bound."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from panto_env.base.errors import InputError
+from panto_env.control.context import Context
+
+from .gains import Source
+from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
+
+CORNER = 30.0
+"""rad/s: up to this the height of the wire is expected to vary."""
+READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
+"""Of ``OUTPUTS``, the model's error included (N, m, m/s)."""
+HEIGHT = 1e-3
+"""m: unit of the height of the wire."""
+WIDTH = 0.7
+"""Damping of the weight on the contact force: a band of about its frequency to either side."""
+NEAR = 1.1
+"""The bound used, over the least one: a controller at the least bound is badly conditioned."""
+AVERAGED = 2.0
+"""Time constant (s) of the slow averages that readings are counted from."""
+SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
+"""Bounds (-) between which the least one is sought, by what factor first, how often that is then halved."""
+
+
+class HInfinity(TunableLaw):
+    """Central H-infinity controller of the pantograph under the mean line.
+
+    What comes in is the height of the wire, low-passed, and noise on each reading; what is to be small is the
+    contact force through a band-pass weight, W_S = performance 2 zeta w s / (s^2 + 2 zeta w s + w^2), and the
+    command. The controller makes the largest gain between them, over all frequencies, at most 1.1 times the
+    least possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The band
+    leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
+    included; the controller is sampled by the bilinear rule.
+
+    It needs to know the pantograph, tension and mass of the wires, and the delays; not the place within the
+    span.
+    """
+
+    def __init__(self, gains: Source = "h-infinity", delay: float = DELAY, lag: float = LAG) -> None:
+        """gains: (3,): log10 of the weight's performance (N/N), of its frequency (Hz), of the wire's height
+        (mm); or a file of gains by name or path. delay of actuator and sensors together, lag: s.
+        """
+        super().__init__(gains)
+        self._delays = delay, lag
+
+    def begin(self, context: Context, lanes: int) -> None:
+        """Prepare for episodes in so many lanes. Raises InputError where no controller keeps a bound."""
+        from scipy.signal import cont2discrete
+
+        super().begin(context, lanes)
+        performance, frequency, height = 10.0**self.gains
+        delay, lag = self._delays
+        interval = context.control_interval
+        model = line_model(context, mean_line(context), delay + interval / 2, lag)
+        plant = weighted(model, performance, 2 * np.pi * frequency, height * HEIGHT)
+        self.bound, controller = least_bound(plant)
+        self._a, self._b, self._c, self._d, _ = cont2discrete(
+            (*controller, np.zeros((1, len(OUTPUTS)))), interval, "bilinear"
+        )
+        self._state = np.zeros((len(self._a), lanes))
+        self._from_average = FromAverage(interval, AVERAGED)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        readings = np.stack([self.read(observations, name) for name in OUTPUTS])
+        seen = self._from_average(readings) / np.array(READING_NOISE)[:, None]
+        force: Array = (self._c @ self._state + self._d @ seen)[0]
+        self._state = self._a @ self._state + self._b @ seen
+        return force
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return ["log performance", "log frequency", "log height"]
+
+    @classmethod
+    def first_gains(cls, context: Context) -> Array:
+        """Gains from which a tuner starts."""
+        return np.array([0.0, 0.3, 1.0])
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.array([0.1, 0.05, 0.1])
+
+
+class Weighted(NamedTuple):
+    """x' = a x + b1 w + b2 u; the first of what is to be small is c1 x, the second u; readings c2 x + noise.
+
+    Noise and command are counted in their weights, so that both have the weight 1.
+    """
+
+    a: Array  # (states, states)
+    b1: Array  # (states, 1)
+    b2: Array  # (states, 1)
+    c1: Array  # (1, states)
+    c2: Array  # (5, states)
+
+
+Controller = tuple[Array, Array, Array]
+"""Matrices A, B and C of x' = A x + B readings, u = C x."""
+
+
+def weighted(model: LineModel, performance: float, centre: float, height: float) -> Weighted:
+    """Model with its weights. centre: of the band (rad/s); height: of the wire (m)."""
+    size = len(model.a)
+    late, wire, band = size, size + 1, slice(size + 2, size + 4)
+    a = np.zeros((size + 4, size + 4))
+    b1, b2, c1 = np.zeros((size + 4, 1)), np.zeros((size + 4, 1)), np.zeros((1, size + 4))
+    a[:size, :size] = model.a
+    # Pade: (1 - s T / 2) / (1 + s T / 2) = -1 + 2 / (1 + s T / 2)
+    corner = 2 / model.delay
+    a[late, late] = -corner
+    b2[late] = corner
+    a[:size, late] = 2 * model.b[:, 0]
+    b2[:size, 0] = -model.b[:, 0]
+    a[wire, wire] = -CORNER
+    b1[wire] = height * np.sqrt(2 * CORNER)
+    a[:size, wire] = model.b[:, 1]
+    c2 = np.hstack([model.c, np.zeros((len(model.c), 4))])
+    c2[:, wire] = model.d[:, 1]
+    a[band, band] = [[0.0, 1.0], [-(centre**2), -2 * WIDTH * centre]]
+    a[size + 3] += c2[0]
+    c1[0, size + 3] = performance * 2 * WIDTH * centre
+    return Weighted(a, b1, b2, c1, c2 / np.array(READING_NOISE)[:, None])
+
+
+def least_bound(plant: Weighted) -> tuple[float, Controller]:
+    """A bound (-) a little above the least, and the controller that keeps it; InputError where none does."""
+    bound = SMALLEST
+    while central(plant, bound) is None:
+        bound *= STRIDE
+        if bound > LARGEST:
+            raise InputError("h-infinity finds no controller with these gains; take others.")
+    low, high = bound / STRIDE, bound
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if central(plant, middle) is None else (low, middle)
+    found = central(plant, NEAR * high)
+    if found is None:  # the equations are too badly conditioned to be solved at one bound after another
+        raise InputError("h-infinity's equations cannot be solved with these gains; take others.")
+    return NEAR * high, found
+
+
+def central(plant: Weighted, bound: float) -> Controller | None:
+    """The central controller that keeps a bound (-); None where there is none."""
+    a, b1, b2, c1, c2 = plant
+    x = _stabilising(a, b1, b2, c1, bound)
+    y = _stabilising(a.T, c1.T, c2.T, b1.T, bound)
+    if x is None or y is None or np.abs(np.linalg.eigvals(x @ y)).max() >= bound**2:
+        return None
+    feedback, correction = -b2.T @ x, -y @ c2.T
+    z = np.linalg.inv(np.eye(len(a)) - y @ x / bound**2)
+    inside = a + b1 @ b1.T @ x / bound**2 + b2 @ feedback + z @ correction @ c2
+    return inside, -z @ correction, feedback
+
+
+def _stabilising(a: Array, worst: Array, b: Array, c: Array, bound: float) -> Array | None:
+    """Solution, not negative, of A'X + XA + X (W W' / bound^2 - B B') X + C'C = 0; None without one."""
+    from scipy.linalg import solve_continuous_are
+
+    inputs = np.hstack([worst, b])
+    weight = np.diag([-(bound**2)] * worst.shape[1] + [1.0] * b.shape[1])
+    try:
+        x: Array = solve_continuous_are(a, inputs, c.T @ c, weight)
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    lowest = np.linalg.eigvalsh(x)
+    return x if lowest[0] >= -1e-7 * max(1.0, lowest[-1]) else None

@@ -1,0 +1,117 @@
+"""What controllers have in common that give the force of many lanes at once: a tuner runs them in batches."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.base.errors import InputError
+from panto_env.control.context import Context
+
+from .gains import Source, find_gains
+
+Array = NDArray[np.float64]
+Observations = NDArray[np.float32]
+
+
+class LanesLaw(ABC):
+    """A controller that returns one force (N) per lane, positive upwards; a single run is a batch of one.
+
+    All lanes are on the same line at the same speed. The force acts on the articulated frame; with actuators
+    on frame and head, that on the head stays at 0; with an actuator on the head only, the same law drives
+    that one, between head and the mass below it.
+    """
+
+    def begin(self, context: Context, lanes: int) -> None:
+        """Prepare for episodes in so many lanes."""
+        self.context, self.lanes = context, lanes
+        self._places = {entry.name: place for place, entry in enumerate(context.layout.entries)}
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self.begin(context, 1)
+
+    def act(self, observation: Observations) -> Array:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        action = np.zeros(self.context.actions)
+        action[0] = min(max(float(self.forces(observation[None])[0]) / self.context.force_limit, -1.0), 1.0)
+        return action
+
+    @abstractmethod
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+
+    def read(self, observations: Observations, name: str) -> Array:
+        """Physical values of an entry, (lanes,). Raises InputError where there is none of this name."""
+        layout = self.context.layout
+        place = self._places.get(name)
+        if place is None or layout.entries[place].slope:  # another kind, normalised, or an error
+            return np.array([layout.read(each, name) for each in observations])
+        entry = layout.entries[place]
+        return entry.centre + observations[:, place].astype(float) * entry.scale
+
+    def span_angle(self, observations: Observations, lead: float = 0.0) -> Array:
+        """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on.
+
+        Raises InputError where the observation does not tell it: both sine and cosine are 0.
+        """
+        sine = self.read(observations, "sine of span position")
+        cosine = self.read(observations, "cosine of span position")
+        if (sine**2 + cosine**2 < 0.5).any():
+            raise InputError(
+                "It needs the place within the span, which these sensors do not tell; take skyhook or "
+                "h-infinity."
+            )
+        ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.span_length
+        angle: Array = np.arctan2(sine, cosine) + ahead
+        return angle
+
+
+class TunableLaw(LanesLaw):
+    """A law with a vector of gains, which is given, or found for line, pantograph and speed in a file."""
+
+    def __init__(self, gains: Source) -> None:
+        """gains: the numbers, or the name or path of a file that `panto tune` wrote, asked at each start."""
+        if not isinstance(gains, str) and not (
+            len(gains) and all(isinstance(each, int | float) and np.isfinite(each) for each in gains)
+        ):
+            raise ValueError(f"gains must be finite numbers or the name of a file of gains, not {gains!r}")
+        self._source = gains
+
+    def begin(self, context: Context, lanes: int) -> None:
+        """Prepare for episodes in so many lanes. Raises InputError where there are no gains for them."""
+        super().begin(context, lanes)
+        self.gains = find_gains(self._source, self.gain_names(context), context)
+
+    @classmethod
+    @abstractmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+
+    @classmethod
+    def first_gains(cls, context: Context) -> Array:
+        """Gains from which a tuner starts: by default all zero, which is no control."""
+        return np.zeros(len(cls.gain_names(context)))
+
+    @classmethod
+    @abstractmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect, by which a tuner tells what they do."""
+
+
+class FromAverage:
+    """Readings counted from slow averages, which begin at the first ones: no constant part is left."""
+
+    def __init__(self, interval: float, averaged: float) -> None:
+        """interval: between readings (s); averaged: time constant of the averages (s)."""
+        self._share = 1 - np.exp(-interval / averaged)
+        self._average: Array | None = None
+
+    def __call__(self, readings: Array) -> Array:
+        """Deviations of readings, (..., lanes), which move the averages."""
+        if self._average is None:
+            self._average = readings.copy()
+        self._average += self._share * (readings - self._average)
+        return readings - self._average

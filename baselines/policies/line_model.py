@@ -1,0 +1,149 @@
+"""A pantograph under a line as it is in the mean, with its actuator, as a linear system of low order.
+
+Under a string of tension T and mass mu per metre that a point force travels along, the point yields with the
+velocity F / (2 sqrt(T mu)) whatever the speed: waves carry the energy off, as a dashpot would. (From the
+string's equation in the moving frame: waves ahead and behind have the wave numbers omega / (c - v) and
+omega / (c + v), and the jump of the slopes they leave carries the force.) Below a few hertz the supports hold
+the wires: a spring beside the dashpot, the mean over the span of the static stiffness of a string between two
+supports, 6 T / s. Both wires are taken for one string.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.base.errors import InputError
+from panto_env.control.context import Context
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.pantograph.build import STRIP_STIFFNESS, matrices
+
+Array = NDArray[np.float64]
+DELAY, LAG = 0.010, 0.015
+"""Of actuator and sensors together, and of the actuator (s): those of the presets "realistic"."""
+SHORTEST_LAG = 1e-3
+"""A lag below this (s) is taken for this: it matters to nobody at 100 Hz."""
+OUTPUTS = ("contact force", "head displacement", "frame displacement", "head velocity", "frame velocity")
+"""Of the model, in order (N, m, m/s): entries of the observation."""
+
+
+@dataclass(frozen=True)
+class MeanLine:
+    """What a line is to the contact point in the mean."""
+
+    damper: float  # N s/m
+    spring: float  # N/m
+
+
+def mean_line(context: Context) -> MeanLine:
+    """The line of an episode as its closed form has it. Raises InputError for a line without wires."""
+    line = context.catenary
+    if not isinstance(line, FlexibleCatenaryData):
+        raise InputError(
+            f"The line '{line.name}' has no wires with mass and tension, from which this policy makes its "
+            "model; take one of kind 'flexible', or another policy."
+        )
+    wires = line.contact_wire, line.messenger_wire
+    tension, mass = sum(wire.tension for wire in wires), sum(wire.mass for wire in wires)
+    return MeanLine(2 * float(np.sqrt(tension * mass)), 6 * tension / line.span_length)
+
+
+@dataclass(frozen=True)
+class LineModel:
+    """x' = a x + b [actuator's command (N), height of the wire (m)], outputs = c x + d [the same].
+
+    The state: displacements and velocities of the masses, head first (m, m/s), uplift of the wire where it
+    is touched (m), the actuator's force (N). The command acts ``delay`` late, which a and b leave out.
+    """
+
+    a: Array  # (states, states)
+    b: Array  # (states, 2)
+    c: Array  # (5, states): OUTPUTS
+    d: Array  # (5, 2)
+    delay: float  # s
+
+    def response(self, frequency: Array) -> Array:
+        """Contact force for a command (N/N), complex, (n,), at frequencies (Hz), the delay included."""
+        s = 2j * np.pi * np.asarray(frequency, dtype=float)
+        eye = np.eye(len(self.a))
+        force = [self.c[0] @ np.linalg.solve(each * eye - self.a, self.b[:, 0]) for each in s]
+        return np.array(force) * np.exp(-s * self.delay)
+
+    def sampled(self, interval: float) -> Sampled:
+        """The model at a controller's interval (s), commands and heights held in between."""
+        return Sampled(self, interval)
+
+
+class Sampled:
+    """A model in discrete time; the state gets the commands that are still on their way, the newest last."""
+
+    def __init__(self, model: LineModel, interval: float) -> None:
+        whole = int(model.delay / interval + 1e-9)
+        rest = model.delay - whole * interval
+        size, late = len(model.a), whole + (rest > 1e-9)
+        transition, new, height = _held(model, interval - rest)
+        before, old, height_before = _held(model, rest)
+        self.a = np.zeros((size + late, size + late))
+        self.a[:size, :size] = transition @ before
+        self.b = np.zeros(size + late)
+        # Within a step the command changes once, where the delay is no whole number of steps.
+        for ago, gain in ((whole, new), (whole + 1, transition @ old)):
+            if ago == 0:
+                self.b[:size] += gain
+            elif ago <= late:
+                self.a[:size, size + late - ago] += gain
+        if late:
+            self.a[size : size + late - 1, size + 1 :] = np.eye(late - 1)
+            self.b[-1] = 1.0
+        self.height = np.concatenate([transition @ height_before + height, np.zeros(late)])
+        self.c = np.hstack([model.c, np.zeros((len(model.c), late))])
+        self.d_height = model.d[:, 1]
+
+    @cached_property
+    def size(self) -> int:
+        """States."""
+        return len(self.a)
+
+
+def line_model(context: Context, line: MeanLine, delay: float = DELAY, lag: float = LAG) -> LineModel:
+    """Model of an episode's pantograph under a mean line; delay of actuator and sensors, lag: s."""
+    a, b = matrices(context.pantograph)
+    masses = len(context.pantograph.masses)
+    size = 2 * masses + 2
+    wire, actuator = size - 2, size - 1
+    stiffness = context.pantograph.contact_stiffness
+    spring = STRIP_STIFFNESS if stiffness == "rigid" else float(stiffness)
+    force = np.zeros(size)
+    force[0], force[wire] = spring, -spring
+    whole = np.zeros((size, size))
+    whole[:wire, :wire] = a
+    whole[:wire] += np.outer(b[:, 0], force)
+    whole[:wire, actuator] = b[:, 1 + context.channels[0]]
+    whole[wire] = force / line.damper
+    whole[wire, wire] -= line.spring / line.damper
+    whole[actuator, actuator] = -1 / max(lag, SHORTEST_LAG)
+    inputs = np.zeros((size, 2))
+    inputs[actuator, 0] = 1 / max(lag, SHORTEST_LAG)
+    inputs[:wire, 1] = -spring * b[:, 0]
+    inputs[wire, 1] = -spring / line.damper
+    outputs = np.zeros((len(OUTPUTS), size))
+    outputs[0] = force
+    for row, state in enumerate((0, masses - 1, masses, 2 * masses - 1), start=1):
+        outputs[row, state] = 1.0
+    direct = np.zeros((len(OUTPUTS), 2))
+    direct[0, 1] = -spring
+    return LineModel(whole, inputs, outputs, direct, delay)
+
+
+def _held(model: LineModel, time: float) -> tuple[Array, Array, Array]:
+    """Transition over a time (s), and what a command and a height held over it add."""
+    from scipy.linalg import expm
+
+    size = len(model.a)
+    both = np.zeros((size + 2, size + 2))
+    both[:size, :size], both[:size, size:] = model.a, model.b
+    whole = expm(both * time)
+    return whole[:size, :size], whole[:size, size], whole[:size, size + 1]

@@ -1,0 +1,60 @@
+"""Feed-forward that repeats with the span, fitted to a line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from panto_env.control.context import Context
+
+from .gains import Source
+from .lanes_law import Array, Observations, TunableLaw
+
+HARMONICS = 14
+"""Of the span: the highest passes 60 m at 350 km/h with 23 Hz, about where the figures' filter ends."""
+LEAD = 0.03
+"""Time (s) by which the series looks ahead: about what actuator and sensors cost, so that its coefficients
+turn little between two tuned speeds. It is part of the coefficients' meaning, not a gain."""
+STEP = 3.0
+"""Change (N) of a coefficient by which a tuner tells what it does: well below the limits of an actuator."""
+
+
+class Periodic(TunableLaw):
+    """Force that is a Fourier series of the place within the span, without feedback.
+
+    u(x) = sum over k = 1..14 of a_k cos(2 pi k x / s) + b_k sin(2 pi k x / s), with x the place within the
+    span s, as measured, plus the way that the train makes in the lead time. There is no constant term: the
+    static force sets the mean. The contact force that repeats with the span is most of sigma under a line
+    that is as designed, and its answer to u is nearly linear, so that Gauss-Newton finds the coefficients.
+
+    It needs to know: line and pantograph (it is fitted to them), the place within the span, the speed. It
+    helps nothing against what differs from span to span, and on another line it is not to be used.
+    """
+
+    def __init__(self, gains: Source = "periodic") -> None:
+        """gains: (28,) coefficients a_1..a_14, b_1..b_14 (N), or the name or path of a file of gains."""
+        super().__init__(gains)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        return series(self.span_angle(observations, LEAD)) @ self.gains
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return series_names()
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.full(2 * HARMONICS, STEP)
+
+
+def series(angle: Array) -> Array:
+    """Cosines, then sines, of the harmonics at angles (lanes,): (lanes, 2 HARMONICS)."""
+    angles = np.multiply.outer(angle, np.arange(1, HARMONICS + 1))
+    return np.concatenate([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def series_names() -> list[str]:
+    """Names of the coefficients of a series, in order."""
+    return [f"{kind}{k}" for kind in ("cosine", "sine") for k in range(1, HARMONICS + 1)]

@@ -1,0 +1,42 @@
+"""Damping of the frame and the head against the sky."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from panto_env.control.context import Context
+
+from .gains import Source
+from .lanes_law import Array, Observations, TunableLaw
+
+
+class Skyhook(TunableLaw):
+    """Force against the absolute velocities of frame and head: dashpots between them and the sky.
+
+    u = - frame dz_f/dt - head dz_h/dt (Karnopp, Crosby and Harwood, J. Eng. Ind. 96:619, 1974). A force at
+    the frame that opposes the frame's velocity only takes energy out; one that follows the head's may put
+    some in, so that its gain may have either sign. It takes no part in the mean force.
+
+    It needs to know nothing of the line but its gains, and reads two velocities.
+    """
+
+    def __init__(self, gains: Source = "skyhook") -> None:
+        """gains: (2,): frame and head (N s/m); or the name or path of a file of gains."""
+        super().__init__(gains)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        frame, head = self.gains
+        velocities = [self.read(observations, f"{mass} velocity") for mass in ("frame", "head")]
+        force: Array = -frame * velocities[0] - head * velocities[1]
+        return force
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return ["frame", "head"]
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.array([20.0, 20.0])

@@ -1,0 +1,107 @@
+"""Passes of many policies at once: the lanes of one task, a policy and a seed each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.base.errors import InputError
+from panto_env.control import Task
+from panto_env.control.context import Context
+from panto_env.control.settings import RunSettings, far_enough
+from panto_env.metrics.low_pass import low_pass_sections
+from panto_env.metrics.spans import chosen_spans, within
+from panto_env.plant.state import Row
+
+from ..policies.lanes_law import LanesLaw, Observations
+
+Array = NDArray[np.float64]
+MOST_LANES = 256
+"""Of one task: their records are kept in memory, some 6 MB each."""
+KEPT_RATE = 100.0
+"""Samples per second that are kept of the contact force, which is low-passed at 20 Hz."""
+
+
+class Still(LanesLaw):
+    """The passive pantograph in a batch."""
+
+    def forces(self, observations: Observations) -> Array:
+        """No force, (lanes,)."""
+        return np.zeros(len(observations))
+
+
+class Forces(NamedTuple):
+    """Contact forces of passes over the evaluated spans, low-passed as EN 50317 says."""
+
+    values: Array  # (laws, seeds, samples): N; nan where a pass ended early
+    mean: Array  # (laws, seeds): N
+    std: Array  # (laws, seeds): N
+
+
+def run_batch(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Forces:
+    """Run each law under each seed, at the settings' one speed.
+
+    Where some laws cannot begin, their passes are as if ended early; raises InputError where none can.
+    """
+    at_once = max(1, MOST_LANES // len(seeds))
+    parts = [_run(settings, laws[first : first + at_once], seeds) for first in range(0, len(laws), at_once)]
+    values = np.concatenate(parts)
+    return Forces(values, values.mean(axis=2), values.std(axis=2))
+
+
+def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Array:
+    settings = far_enough(settings)
+    task = Task(settings, lanes=len(laws) * len(seeds))
+    task.reset(np.arange(task.lanes), lambda lane: np.random.default_rng(seeds[lane % len(seeds)]))
+    context, results = task.context(0), task.results
+    unable = _begin(laws, context, len(seeds))
+    owned = [slice(k * len(seeds), (k + 1) * len(seeds)) for k in range(len(laws))]
+    actions = np.zeros((task.lanes, context.actions))
+    ended = np.zeros(task.lanes, dtype=np.bool_)
+    early = ended.copy()
+    while not ended.all():
+        observations = results.observation
+        for k, (law, its) in enumerate(zip(laws, owned, strict=True)):
+            if k not in unable:
+                actions[its, 0] = law.forces(observations[its])
+        actions[:, 0] /= context.force_limit
+        task.step(np.nan_to_num(np.clip(actions, -1, 1)), ended if ended.any() else None)
+        early |= results.terminated
+        ended |= results.terminated | results.truncated
+    values = _low_passed(task, settings)
+    values[early] = np.nan
+    values = values.reshape(len(laws), len(seeds), -1)
+    values[list(unable)] = np.nan
+    return values
+
+
+def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
+    """Begin all laws; the places of those that cannot. Raises InputError where none can."""
+    unable: dict[int, InputError] = {}
+    for k, law in enumerate(laws):
+        try:
+            law.begin(context, lanes)
+        except InputError as error:
+            unable[k] = error
+    if len(unable) == len(laws):
+        raise unable[0]
+    return set(unable)
+
+
+def _low_passed(task: Task, settings: RunSettings) -> Array:
+    """Low-passed contact force over the evaluated spans, (lanes, samples), (N)."""
+    from scipy.signal import sosfilt
+
+    time_step, span = task.plant.time_step, task.plant.catenary.span_length
+    force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
+    sections, settled = low_pass_sections(time_step)
+    start = settled[:, None, :] * force[None, :, :1]
+    filtered, _ = sosfilt(sections, force, axis=1, zi=start)
+    position = (np.arange(force.shape[1]) + 0.5) * time_step * float(task.speed[0])
+    spans = chosen_spans(None, task.distance, span)
+    assert spans is not None  # of a choice that is not "all"
+    inside = filtered[:, within(position, spans, span)]
+    return np.asarray(inside[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

@@ -1,0 +1,74 @@
+"""The command `panto tune`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from panto_env.analysis.options import with_settings
+from panto_env.terminal import Json, counting, print_json, print_table
+
+
+@with_settings(
+    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    defaults=False,
+)
+def tune(
+    given: dict[str, Any],
+    policy: Annotated[str, typer.Argument(help="Name of a policy that has gains: periodic, skyhook, ...")],
+    speed: Annotated[
+        list[float] | None,
+        typer.Option(help="Speed (km/h); repeatable; 200 to 350 in steps of 25 by default."),
+    ] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, help="Number of training seeds.")] = None,
+    passes: Annotated[
+        int | None, typer.Option(min=1, help="Simulated passes at each speed, at most.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file to put the gains into; by default that in which the policy looks for them."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Fit a policy's gains to a line, a pantograph, an actuator and sensors, speed by speed.
+
+    Least squares of the contact force at a mean force like the passive one's, on training seeds; the table
+    shows what the gains do on selection seeds. Actuator and sensors are "realistic", the line "fair", unless
+    told otherwise.
+    """
+    import shlex
+    import sys
+
+    from panto_env.control import Task
+    from panto_env.control.settings import run_settings
+
+    from ..benchmark.seeds import TRAINING
+    from ..policies.gains import gain_file
+    from .store import check_gain_file, make_tuning, store
+    from .tables import table
+    from .tune import PASSES, SEEDS, SPEEDS_KMH, tunable
+    from .tune import tune as run
+
+    settings = run_settings(
+        {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
+    )
+    kind, path = tunable(policy), gain_file(output or policy)
+    check_gain_file(path, policy)
+    names = kind.gain_names(Task(settings, keep_samples=False).context(0))
+    count = seeds or SEEDS
+    with counting("speeds") as progress:
+        tuned = run(
+            policy, settings, sorted(set(speed or SPEEDS_KMH)), count, passes or PASSES, workers, progress
+        )
+    command = shlex.join(["panto", *sys.argv[1:]])
+    tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
+    store(path, policy, tuning)
+    if json:
+        print_json(tuning.model_dump(mode="json"))
+        return
+    print_table(table(policy, tuned))

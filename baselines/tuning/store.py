@@ -1,0 +1,85 @@
+"""Gains written as TOML beside those of other lines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from panto_env.base.errors import InputError
+from panto_env.base.files import check_output, write_whole
+from panto_env.base.version import __version__
+from panto_env.control.settings import RunSettings
+
+from ..policies.gains import GainFile, Tuning, load_gains
+from .tune import Tuned
+
+DIGITS = 5
+"""Significant ones of a gain: far beyond what a tuning can tell."""
+
+
+def make_tuning(
+    settings: RunSettings, names: Sequence[str], tuned: Sequence[Tuned], seeds: Sequence[int], command: str
+) -> Tuning:
+    """What a tuning has found, as it is stored; line_condition: JSON of the conditions drawn from."""
+    conditions = [
+        condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
+    ]
+    return Tuning(
+        catenary=settings.catenary.name,
+        pantograph=settings.pantograph.name,
+        place=settings.actuator.place,
+        names=tuple(names),
+        speeds_kmh=tuple(each.speed_kmh for each in tuned),
+        gains=tuple(tuple(float(f"{gain:.{DIGITS}g}") for gain in each.gains) for each in tuned),
+        command=command,
+        version=__version__,
+        actuator=settings.actuator.model_dump(mode="json", exclude_none=True),
+        sensors=settings.sensors.model_dump(mode="json", exclude_none=True),
+        line_condition=json.dumps(conditions),
+        seeds=tuple(seeds),
+        passes=sum(each.passes for each in tuned),
+        std_change=tuple(round(each.std_change, 4) for each in tuned),
+        mean_change=tuple(round(each.mean_change, 4) for each in tuned),
+    )
+
+
+def check_gain_file(path: Path, policy: str) -> None:
+    """Raise InputError unless a policy's gains can be put into a file: asked before any work begins."""
+    check_output(path, (".toml",))
+    if path.is_file() and load_gains(path).policy != policy:
+        raise InputError(f"{path} holds gains of '{load_gains(path).policy}'; give another --output.")
+
+
+def store(path: Path, policy: str, tuning: Tuning) -> None:
+    """Put a tuning into a file of gains, in the place of one for the same line, pantograph and place."""
+    old = load_gains(path).tunings if path.is_file() else ()
+    kept = [each for each in old if _case(each) != _case(tuning)]
+    with write_whole(path) as temporary:
+        temporary.write_text(as_toml(GainFile(policy=policy, tunings=(*kept, tuning))), encoding="utf-8")
+
+
+def as_toml(file: GainFile) -> str:
+    """The text of a file of gains."""
+    lines = ["# Gains of a policy, written by `panto tune`.", f"policy = {_value(file.policy)}"]
+    for tuning in file.tunings:
+        lines += ["", "[[tunings]]"]
+        for key, value in tuning:
+            lines.append(f"{key} = {_value(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _case(tuning: Tuning) -> tuple[str, str, str]:
+    return tuning.catenary, tuning.pantograph, tuning.place
+
+
+def _value(value: Any) -> str:
+    """A value as TOML; a row of gains on a line of its own. JSON's texts and numbers are TOML's."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(each)}" for key, each in value.items()) + " }"
+    if isinstance(value, tuple | list) and value and isinstance(value[0], tuple | list):
+        return "[\n" + "".join(f"    {_value(each)},\n" for each in value) + "]"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,116 @@
+"""Gains of a policy for a line: fitted speed by speed on training seeds, reported on selection seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.analysis.pool import Progress, in_processes
+from panto_env.base.errors import InputError
+from panto_env.control import Task
+from panto_env.control.settings import RunSettings
+from panto_env.policies import maker_of, policy_names
+
+from ..benchmark.seeds import SELECTION, TRAINING
+from ..policies.lanes_law import TunableLaw
+from .batch import Forces, Still, run_batch
+from .gauss_newton import DAMPINGS, fit
+
+Array = NDArray[np.float64]
+SPEEDS_KMH = (200.0, 225.0, 250.0, 275.0, 300.0, 325.0, 350.0)
+SEEDS = 4
+"""Training seeds of a fit: more make it slower, and lines of one condition differ little."""
+SELECTION_SEEDS = 5
+PASSES = 4000
+"""Budget of one speed, the same for every policy. A fit that gets no better ends before."""
+MEAN_TOLERANCE, MEAN_WEIGHT = 0.015, 0.04
+"""A mean force this far (-) from the passive one adds this much to (sigma / passive sigma)^2."""
+RIDGE = 1e-5
+"""What a gain of one step adds to it: keeps gains from growing that do next to nothing."""
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """Gains at one speed, and what they do."""
+
+    speed_kmh: float
+    gains: tuple[float, ...]
+    history: tuple[float, ...]  # objective at the start and after each iteration
+    passes: int  # simulated
+    std_change: float  # of sigma to passive, mean over selection seeds (-)
+    mean_change: float  # of the mean force (-)
+
+
+def tunable(name: str) -> type[TunableLaw]:
+    """The policy of a name, if it can be tuned. Raises InputError where it can't."""
+    makers = {each: maker_of(each) for each in policy_names()}
+    able = {
+        each: maker
+        for each, maker in makers.items()
+        if isinstance(maker, type) and issubclass(maker, TunableLaw)
+    }
+    if name not in able:
+        raise InputError(f"'{name}' has no gains to tune; policies that have are {', '.join(able)}.")
+    return able[name]
+
+
+def tune(
+    policy: str,
+    settings: RunSettings,
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    seeds: int = SEEDS,
+    passes: int = PASSES,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> list[Tuned]:
+    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at each speed.
+
+    seeds: how many training seeds. passes: budget of one speed. Training runs with ``accuracy="fast"``, the
+    selection seeds run as the settings say. Raises InputError for a policy without gains.
+    """
+    tunable(policy)
+    jobs = [partial(tune_at, policy, settings, speed, seeds, passes) for speed in speeds_kmh]
+    return in_processes(jobs, workers=workers, progress=progress)
+
+
+def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:
+    """As ``tune``, at one speed (km/h)."""
+    kind, training = tunable(policy), TRAINING[:seeds]
+    at_speed = settings.model_copy(update={"speed_kmh": (speed_kmh, speed_kmh)})
+    fast = at_speed.model_copy(update={"accuracy": "fast"})
+    task = Task(fast, keep_samples=False)
+    task.reset(0, np.random.default_rng(training[0]))
+    context = task.context(0)
+    passive = run_batch(fast, [Still()], training)
+    used = len(training)
+
+    def residuals(candidates: Array) -> Array:
+        nonlocal used
+        used += len(candidates) * len(training)
+        laws = [kind(gains=tuple(each.tolist())) for each in candidates]
+        return residuals_of(run_batch(fast, laws, training), passive)
+
+    first, steps = kind.first_gains(context), kind.gain_steps(context)
+    iterations = max(1, passes // ((1 + len(first) + len(DAMPINGS)) * len(training)))
+    found = fit(residuals, first, steps, iterations, RIDGE)
+    gains = tuple(found.gains.tolist())
+    selection = SELECTION[:SELECTION_SEEDS]
+    reached = run_batch(at_speed, [Still(), kind(gains=gains)], selection)
+    std_change = float(np.mean(reached.std[1] / reached.std[0]) - 1)
+    mean_change = float(np.mean(reached.mean[1] / reached.mean[0]) - 1)
+    return Tuned(speed_kmh, gains, found.history, used, std_change, mean_change)
+
+
+def residuals_of(forces: Forces, passive: Forces) -> Array:
+    """Residuals of laws, (laws, residuals), whose squares sum to the mean over seeds of the objective.
+
+    That is (sigma / passive sigma)^2, and a charge for a mean force off the passive one.
+    """
+    laws, seeds, samples = forces.values.shape
+    deviation = (forces.values - forces.mean[..., None]) / passive.std[..., None] / np.sqrt(seeds * samples)
+    off = np.sqrt(MEAN_WEIGHT / seeds) / MEAN_TOLERANCE * (forces.mean / passive.mean - 1)
+    return np.concatenate([deviation.reshape(laws, -1), off], axis=1)

@@ -1,0 +1,46 @@
+"""An observation counted from what a passive run reads: entries then have a mean near 0 and a spread near 1.
+
+The mean of a reading changes with the speed, nearly in proportion where the uplift does: what an entry is
+counted from is linear in it. The scale is one for all speeds, so that a swing twice as large is seen as such.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import InputError
+from .entries import CENTRES, READING_ENTRIES, Entry, present
+from .observation import Layout
+from .passive_run import PassiveRun
+
+_ROWS = {name: row for row, (name, _, _) in enumerate(READING_ENTRIES)}
+
+
+def normalised(layout: Layout, run: PassiveRun) -> Layout:
+    """The layout with readings, present and earlier ones, and speed counted from a passive run.
+
+    Raises InputError where a reading has no spread.
+    """
+    low, high = float(run.speeds[0]), float(run.speeds[-1])
+    entries = tuple(_normalised(entry, run) for entry in layout.entries)
+    return replace(layout, entries=entries, normalise=(round(3.6 * low, 9), round(3.6 * high, 9)))
+
+
+def _normalised(entry: Entry, run: PassiveRun) -> Entry:
+    if entry.name == "speed":
+        half = 0.5 * float(run.speeds[-1] - run.speeds[0])
+        return entry._replace(centre=float(run.speeds.mean()), scale=half or CENTRES["speed"][1])
+    row = _ROWS.get(present(entry))
+    if row is None:
+        return entry
+    scale = float(np.sqrt(np.mean(run.spreads[:, row] ** 2)))
+    if scale == 0.0:
+        raise InputError(
+            f"The {present(entry)} does not change in a passive run, so it can't be scaled by its spread; "
+            "leave out normalise."
+        )
+    means, several = run.means[:, row], len(run.speeds) > 1
+    slope, centre = np.polyfit(run.speeds, means, 1) if several else (0.0, means[0])
+    return entry._replace(centre=float(centre), slope=float(slope), scale=scale)

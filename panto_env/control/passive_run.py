@@ -1,0 +1,118 @@
+"""What a passive run of line and pantograph as designed reads, by speed: means and spreads.
+
+Agents' observations and rewards may be counted from it. What is found is kept on disk, under a hash of the
+sources and of all that the runs are made of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backend import cache_folder
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.files import write_whole
+from ..metrics.low_pass import low_pass
+from ..metrics.trajectory import Trajectory
+from ..plant.line_condition import LineCondition
+from ..plant.sensors import Reading
+from .observation import OBSERVATION_SETTINGS
+from .settings import RunSettings, far_enough
+
+KNOT_DISTANCE = 25.0
+"""Largest distance (km/h) of the speeds that are run; between them it is interpolated."""
+LOW_PASSED = len(Reading)
+"""Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
+AS_DESIGNED = {
+    "line_condition": (LineCondition(),),
+    "pantograph_scatter": 0.0,
+    "run_in": 0.0,
+    "distance": None,
+    "spans": None,
+}
+"""Of a line and a pantograph that nothing was drawn for."""
+NO_MATTER = (*OBSERVATION_SETTINGS, "estimator", "known_pantograph", "reward", "actuator", "sensors")
+"""Settings on which a passive run does not depend."""
+
+RunPassively = Callable[[RunSettings], Trajectory]
+"""The record of a run without control."""
+
+
+@dataclass(frozen=True)
+class PassiveRun:
+    """Means and spreads over the settled spans, by speed; rows as of ``Reading``, then ``LOW_PASSED``."""
+
+    speeds: Array  # (speeds,): m/s, rising
+    means: Array  # (speeds, rows): in the unit of each
+    spreads: Array  # (speeds, rows): standard deviation
+
+    def mean(self, row: int, speed: Any) -> Any:
+        """Mean at a speed (m/s), or at each of an array."""
+        return np.interp(speed, self.speeds, self.means[:, row])
+
+    def spread(self, row: int, speed: Any) -> Any:
+        """Standard deviation at a speed (m/s), or at each of an array."""
+        return np.interp(speed, self.speeds, self.spreads[:, row])
+
+
+def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> PassiveRun:
+    """Passive runs over a range of speeds (m/s). Raises InputError where one leaves the valid range."""
+    low, high = speeds
+    count = 1 if low == high else 2 + int(3.6 * (high - low) / KNOT_DISTANCE)
+    knots = np.linspace(low, high, count)
+    table = np.array([_at_speed(settings, speed, run) for speed in knots.tolist()])
+    return PassiveRun(knots, table[:, 0], table[:, 1])
+
+
+def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[list[float]]:
+    """Means and spreads at one speed (m/s), from the disk where they are kept."""
+    usual = RunSettings()
+    own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
+    own |= AS_DESIGNED | {"speed_kmh": (3.6 * speed, 3.6 * speed)}
+    designed = far_enough(RunSettings.model_construct(**own))
+    file = _file(designed)
+    kept = _read(file)
+    if kept is None:
+        kept = _measured(run(designed))
+        file.parent.mkdir(exist_ok=True)
+        with write_whole(file) as temporary:
+            temporary.write_text(json.dumps({"values": kept, "check": _check(file, kept)}))
+    return kept
+
+
+def _measured(run: Trajectory) -> list[list[float]]:
+    if run.terminated:
+        raise InputError(
+            f"The passive run that observation or reward are to be counted from has no figures: {run.ending}"
+        )
+    inside = run.inside()
+    filtered = low_pass(run.contact_force, run.time_step)
+    series = [run.head, run.frame, run.head_velocity, run.frame_velocity, run.contact_force, filtered]
+    return [[float(each[inside].mean()) for each in series], [float(each[inside].std()) for each in series]]
+
+
+def _file(settings: RunSettings) -> Path:
+    table = settings.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
+    text = json.dumps(table, sort_keys=True)
+    return cache_folder() / "passive_run" / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
+
+
+def _read(file: Path) -> list[list[float]] | None:
+    """What was kept; None where there is nothing or it is damaged."""
+    try:
+        kept: dict[str, Any] = json.loads(file.read_text())
+        values: list[list[float]] = kept["values"]
+        return values if kept["check"] == _check(file, values) else None
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _check(file: Path, values: Sequence[Sequence[float]]) -> str:
+    return hashlib.sha256(f"{file.stem} {values!r}".encode()).hexdigest()

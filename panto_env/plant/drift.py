@@ -1,0 +1,95 @@
+"""A train whose speed drifts slowly, and where it is: in closed form, at any time of its run.
+
+The drift is a sum of sines whose accelerations are of one size, so that the slow ones move the speed most;
+its phases are drawn per run. The way is its integral. The aerodynamic force stays that of the mean speed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..backend import columns, inlined
+from ..base.arrays import Array
+from .state import ROW
+from .trigonometry import cosine_of_turns, sine_of_turns
+
+PERIODS = (7.0, 13.0, 29.0)
+"""Of the sines (s), own choice: between what a driver does and what gradients do. No two are multiples."""
+DRIFT_ROWS = 1 + 3 * len(PERIODS)
+"""Rows of a lane's drift: way at step 0 (m); then of each sine amplitude (m), turns per step and phase."""
+_TURN = 2 * math.pi
+
+
+def speeds_of(rms: float) -> Array:
+    """Amplitude of each sine, in the unit of the whole drift's rms."""
+    periods = np.array(PERIODS)
+    return np.asarray(rms * periods / np.sqrt(0.5 * np.sum(periods**2)))
+
+
+def largest_drift(rms: float) -> float:
+    """By which the speed differs at most, in the unit of its rms."""
+    return float(np.sum(speeds_of(rms)))
+
+
+def largest_lag(rms: float) -> float:
+    """How far a train may fall back, or come ahead, in a run (m); rms: m/s."""
+    return float(np.sum(2 * speeds_of(rms) * np.array(PERIODS)) / _TURN)
+
+
+def draw_drift(rms: float, time_step: float, random: np.random.Generator) -> Array:
+    """A lane's drift, (DRIFT_ROWS,); rms: m/s; time_step: s."""
+    phases = random.uniform(0, 1, len(PERIODS))
+    amplitudes = speeds_of(rms) * np.array(PERIODS) / _TURN
+    waves = np.stack([amplitudes, time_step / np.array(PERIODS), phases], axis=1)
+    return np.append(-np.sum(amplitudes * np.sin(_TURN * phases)), waves)
+
+
+def ahead(drift: Array, steps: Array) -> Array:
+    """How far trains are ahead of steady ones (m), (lanes, n), after steps, (lanes, n).
+
+    drift: (lanes, DRIFT_ROWS), or of no rows.
+    """
+    way = np.zeros((len(drift), np.shape(steps)[-1]))
+    if drift.shape[1]:
+        way += drift[:, :1]
+    for k in range(1, drift.shape[1], 3):
+        amplitude, turns, phase = drift[:, k : k + 3].T[:, :, None]
+        way += amplitude * np.sin(_TURN * (turns * steps + phase))
+    return way
+
+
+@inlined
+def position_after(run, own, steps, lane):
+    """Where the contact point is (m) after so many steps, of which one may be a half."""
+    x = own[ROW.STRIDE] * steps
+    if run.drift.shape[1] > 0:
+        drift = columns(own, run.drift, lane)
+        x += drift[0]
+        for k in range(1, run.drift.shape[1], 3):
+            x += drift[k] * sine_of_turns(drift[k + 1] * steps + drift[k + 2])
+    return x
+
+
+@inlined
+def stride_after(run, own, steps, lane):
+    """How far the contact point moves in a step (m), by its speed after so many steps."""
+    stride = own[ROW.STRIDE]
+    if run.drift.shape[1] > 0:
+        drift = columns(own, run.drift, lane)
+        for k in range(1, run.drift.shape[1], 3):
+            turns = drift[k + 1] * steps + drift[k + 2]
+            stride += _TURN * drift[k] * drift[k + 1] * cosine_of_turns(turns)
+    return stride
+
+
+@inlined
+def mean_stride(run, own, steps, lane):
+    """The same as a mean over so many steps to come."""
+    stride = own[ROW.STRIDE]
+    if run.drift.shape[1] > 0:
+        begin, end = own[ROW.STEP], own[ROW.STEP] + steps
+        way = position_after(run, own, end, lane) - position_after(run, own, begin, lane)
+        stride = way * (1.0 / steps)
+    return stride

@@ -1,0 +1,304 @@
+"""Policies made from a model: the model against the plant, each design against what its theory promises."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize
+
+from panto_baselines.policies.h_infinity import central, least_bound, weighted
+from panto_baselines.policies.lanes_law import LanesLaw
+from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
+from panto_baselines.policies.lqg import Disturbed, kalman, regulator
+from panto_baselines.policies.mpc import HORIZON, Programs
+from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
+from panto_baselines.policies.preview import Preview, preview
+from panto_baselines.policies.repetitive import LISTENING, Repetitive
+from panto_baselines.tuning.batch import Still, run_batch
+from panto_env import InputError
+from panto_env.control import Task
+from panto_env.control.context import Context
+from panto_env.control.settings import run_settings
+from panto_env.policies import find_policy
+
+Array = NDArray[np.float64]
+
+
+def a_context(speed_kmh: float = 250.0, **settings: Any) -> Context:
+    task = Task(run_settings({"speed_kmh": speed_kmh, "accuracy": "fast"} | settings), keep_samples=False)
+    task.reset(0, np.random.default_rng(0))
+    return task.context(0)
+
+
+CONTEXT = a_context()
+MODEL = line_model(CONTEXT, mean_line(CONTEXT))
+
+
+# --- the model -----------------------------------------------------------------------------------
+
+
+def test_models_response_is_that_of_masses_springs_and_dampers_by_hand() -> None:
+    frequency = np.array([0.3, 2.0, 9.0])
+    pantograph, line = CONTEXT.pantograph, mean_line(CONTEXT)
+    (m1, m2), (k1, k2), (c1, c2) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
+    expected = []
+    for s in 2j * np.pi * frequency:
+        wire = s * line.damper + line.spring
+        contact = 1 / (1 / float(pantograph.contact_stiffness) + 1 / wire)
+        between = k1 + s * c1
+        dynamic = [
+            [s**2 * m1 + between + contact, -between],
+            [-between, s**2 * m2 + between + k2 + s * c2],
+        ]
+        head, _ = np.linalg.solve(np.array(dynamic), np.array([0.0, 1.0]))
+        expected.append(contact * head * np.exp(-0.010 * s) / (1 + 0.015 * s))
+    assert MODEL.response(frequency) == pytest.approx(np.array(expected), rel=1e-9)
+
+
+def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says() -> None:
+    """The dashpot of the string's closed form stands for wires, droppers and supports within a quarter."""
+    settings = run_settings(
+        {"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic", "sensors": "ideal"}
+    )
+    amplitude, harmonics = 3.0, (1, 2, 4)
+    laws: list[LanesLaw] = [Still()]
+    for place in (k - 1 + half for k in harmonics for half in (0, HARMONICS)):
+        gains = np.zeros(2 * HARMONICS)
+        gains[place] = amplitude
+        laws.append(Periodic(gains=gains.tolist()))
+    force = run_batch(settings, laws, [0]).values[:, 0]
+    turns = np.linspace(0, 10, force.shape[1], endpoint=False)  # ten spans
+    rate = CONTEXT.speed / CONTEXT.span_length
+    model = line_model(CONTEXT, mean_line(CONTEXT), delay=0.005)
+    for row, k in enumerate(harmonics):
+        answer = force[1 + 2 * row] - force[0] + 1j * (force[2 + 2 * row] - force[0])
+        answer *= np.exp(-2j * np.pi * k * (turns + LEAD * rate))
+        # The figures' filter lets the force through late: size alone is compared.
+        size = abs(answer.mean()) / amplitude
+        assert size == pytest.approx(abs(model.response(np.array([k * rate]))[0]), rel=0.25)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.010, 0.023])
+def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay: float) -> None:
+    interval, steps = 0.01, 12
+    model = line_model(CONTEXT, MeanLine(600.0, 3000.0), delay)
+    commands = np.random.default_rng(1).normal(size=steps)
+
+    def late(time: float) -> float:
+        step = int(np.floor((time - delay) / interval + 1e-9))
+        return float(commands[step]) if 0 <= step < steps else 0.0
+
+    state, time = np.zeros(len(model.a)), 0.0
+    edges = np.unique(np.round([k * interval + shift for k in range(steps + 1) for shift in (0, delay)], 9))
+    for begin, end in pairwise(edges):
+        if end > steps * interval + 1e-9:
+            break
+        force = late(0.5 * (begin + end))
+        state = solve_ivp(
+            lambda _, x, force=force: model.a @ x + model.b[:, 0] * force,
+            (begin, end),
+            state,
+            rtol=1e-9,
+            atol=1e-12,
+        ).y[:, -1]
+        time = end
+    sampled = model.sampled(interval)
+    x = np.zeros(sampled.size)
+    for command in commands:
+        x = sampled.a @ x + sampled.b * command
+    assert time == pytest.approx(steps * interval)
+    assert x[: len(state)] == pytest.approx(state, rel=1e-6, abs=1e-10)
+
+
+def test_a_line_without_wires_is_refused() -> None:
+    context = a_context(catenary="periodic-stiffness", speed_kmh=100.0)
+    with pytest.raises(InputError, match="has no wires"):
+        mean_line(context)
+
+
+# --- repetitive control ----------------------------------------------------------------------------
+
+
+def repeated(policy: Repetitive, spans: int, sign: float = 1.0) -> tuple[Array, Array]:
+    """Sigma of each span of the model, under a force that repeats with the span, with and without control."""
+    context = CONTEXT
+    rate = context.speed / context.span_length * context.control_interval
+    sampled = MODEL.sampled(context.control_interval)
+    policy.begin(context, 1)
+    state = np.zeros(sampled.size)
+    with_control, without = [], []
+    entry = context.layout.index
+    for k in range(int(spans / rate)):
+        angle = 2 * np.pi * k * rate
+        disturbance = 20 * np.cos(angle) + 15 * np.sin(2 * angle) - 8 * np.cos(3 * angle)
+        contact = 115 + disturbance + sign * float(sampled.c[0] @ state)
+        observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
+        values = {
+            "contact force": contact,
+            "sine of span position": np.sin(angle),
+            "cosine of span position": np.cos(angle),
+            "speed": context.speed,
+        }
+        for name, value in values.items():
+            observation[0, entry(name)] = value / context.layout.entries[entry(name)].scale
+        force = float(policy.forces(observation)[0])
+        state = sampled.a @ state + sampled.b * force
+        with_control.append(contact)
+        without.append(115 + disturbance)
+    whole = [slice(int(np.ceil(j / rate)), int((j + 1) / rate)) for j in range(spans - 1)]
+    controlled, passive = (
+        np.array([np.std(np.array(force)[each]) for each in whole]) for force in (with_control, without)
+    )
+    return controlled, passive
+
+
+def test_repetitive_control_learns_a_force_that_repeats_to_near_zero() -> None:
+    controlled, passive = repeated(Repetitive(gains=(0.5, 0.0, 0.05)), 25)
+    assert controlled[: int(LISTENING) - 1] == pytest.approx(passive[: int(LISTENING) - 1], rel=1e-6)
+    assert controlled[-1] < 0.05 * passive[-1]
+
+
+def test_repetitive_control_backs_off_where_its_model_is_wrong() -> None:
+    """Under a plant of the opposite sign it would grow without bounds."""
+    controlled, passive = repeated(Repetitive(gains=(0.5, 0.05, 0.1)), 40, sign=-1.0)
+    assert np.mean(controlled[-10:]) < 1.08 * passive[-1]
+
+
+# --- linear-quadratic-Gaussian ---------------------------------------------------------------------
+
+
+def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
+    model = Disturbed(MODEL.sampled(0.01), CONTEXT, harmonics=1.0, wandering=3.0)
+    effort, held = 0.4, 0.7
+    a, b, force = model.a, model.b, model.c[0]
+    cost = np.outer(force, force)
+    cost[-1, -1] += effort * (2 * np.pi * held) ** 2
+    p = np.zeros_like(a)
+    for _ in range(6000):
+        gain = (b @ p @ a) / (effort + b @ p @ b)
+        p = cost + a.T @ p @ (a - np.outer(b, gain))
+    assert regulator(a, b, force, effort, held) == pytest.approx(gain, rel=1e-5, abs=1e-5)
+    assert np.abs(np.linalg.eigvals(a - np.outer(b, gain))).max() < 1
+
+    known = len(a) - 1
+    a, c, noise = a[:known, :known], model.c[:, :known], model.noise[:known]
+    readings = np.array([4.0, 1e-6, 1e-6, 4e-4, 4e-4])
+    p = np.eye(known) * 1e-6
+    for _ in range(6000):
+        correction = p @ c.T @ np.linalg.inv(c @ p @ c.T + np.diag(readings))
+        p = a @ (p - correction @ c @ p) @ a.T + np.diag(noise)
+    assert kalman(a, c, noise, readings) == pytest.approx(correction, rel=1e-3, abs=1e-6)
+
+
+# --- H-infinity ------------------------------------------------------------------------------------
+
+
+def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
+    plant = weighted(MODEL, performance=2.0, centre=12.0, height=2e-3)
+    bound, (a, b, c) = least_bound(plant)
+    n, k = len(plant.a), len(a)
+    closed = np.block([[plant.a, plant.b2 @ c], [b @ plant.c2, a]])
+    assert np.linalg.eigvals(closed).real.max() < 0
+    disturbed = np.block([[plant.b1, np.zeros((n, 5))], [np.zeros((k, 1)), b]])
+    small = np.block([[plant.c1, np.zeros((1, k))], [np.zeros((1, n)), c]])
+    gains = [
+        np.linalg.norm(small @ np.linalg.solve(1j * w * np.eye(n + k) - closed, disturbed), 2)
+        for w in np.geomspace(0.01, 1e4, 400)
+    ]
+    assert 0.5 * bound < max(gains) < bound
+    assert central(plant, 0.5 * bound) is None
+
+
+# --- predictive control ----------------------------------------------------------------------------
+
+
+def a_program(limit: float = 1e6, rate: float = 1e9) -> tuple[Programs, Array, Array]:
+    rng = np.random.default_rng(3)
+    response = np.exp(-0.1 * np.arange(HORIZON)) * rng.uniform(0.1, 0.4, size=(50, 1))
+    response[:, 0] = 0.0  # a delay
+    line = Preview(0.0, 1.2, np.zeros(50), response)
+    return Programs(line, 0.1, limit, rate, 0.01), rng.normal(size=HORIZON) * 20, response
+
+
+def objective(programs: Programs, step: int, free: Array, total: float, u: Array) -> float:
+    force = free + programs.answers[step] @ u
+    sums = total + 0.01 * np.cumsum(u)
+    return float(force @ force + 0.1 * u @ u + (2 * np.pi * 0.4) ** 2 * sums @ sums)
+
+
+@pytest.mark.parametrize(("limit", "rate"), [(1e6, 1e9), (15.0, 1e9), (100.0, 600.0)])
+def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float, rate: float) -> None:
+    pytest.importorskip("osqp")
+    programs, free, _ = a_program(limit, rate)
+    last, total, change = 4.0, 0.3, rate * 0.01
+    between = np.eye(HORIZON) - np.eye(HORIZON, k=-1)
+    before = np.zeros(HORIZON)
+    before[0] = last
+    inside = [
+        {"type": "ineq", "fun": lambda u: change - (between @ u - before)},
+        {"type": "ineq", "fun": lambda u: change + (between @ u - before)},
+    ]
+    best = minimize(
+        lambda u: objective(programs, 7, free, total, u),
+        np.zeros(HORIZON),
+        method="SLSQP",
+        bounds=[(-limit, limit)] * HORIZON,
+        constraints=inside if rate < 1e6 else [],
+        options={"maxiter": 500, "ftol": 1e-12},
+    )
+    assert best.success
+    assert programs.first(7, free, last, total) == pytest.approx(best.x[0], abs=0.1)
+
+
+def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() -> None:
+    context = a_context(actuator="realistic")
+    length, first = 100, 780
+    line = preview(context, length, 0.005, 0.015)
+    settings = {
+        "speed_kmh": 250.0,
+        "accuracy": "fast",
+        "actuator": {"delay": 0.005, "lag": 0.015},
+        "distance": 900.0,
+        "spans": 23,
+    }
+    task = Task(run_settings(settings), lanes=2, keep_samples=False)
+    task.reset(np.arange(2), np.random.default_rng(0))
+    entry = task.layout.index("contact force")
+    commands = np.random.default_rng(5).uniform(-4, 4, size=20)
+    answer, predicted = [], np.zeros(40 + length)
+    for k in range(first + 40):
+        force = commands[k - first] if first <= k < first + len(commands) else 0.0
+        if k >= first:
+            readings = 100 * task.results.observation[:, entry].astype(float)
+            answer.append(readings[1] - readings[0])
+            position = np.array([k * line.stride % context.span_length])
+            begin = k - first + 1
+            predicted[begin : begin + length] += force * line.response[line.step(position)[0]]
+        task.step(np.array([[0.0], [force / context.force_limit]]))
+    seen = np.array(answer)
+    assert np.std(seen) > 0.2
+    assert np.std(seen - predicted[: len(seen)]) < 0.05 * np.std(seen)
+
+
+# --- refusals ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("mpc:rate=0", "rate must be a positive number"),
+        ("lqg:gains=()", "gains must be finite numbers"),
+        ("skyhook:gains=(1,1e999)", "gains must be finite numbers"),
+        ("repetitive:gian=1", "gian"),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        find_policy(source)
+    assert words in str(caught.value)
+    assert f"'{source}'" in str(caught.value)

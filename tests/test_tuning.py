@@ -1,0 +1,269 @@
+"""The tuner, the files that it writes, and the fitted policies that read them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from panto_baselines.benchmark import seeds
+from panto_baselines.policies.fitted_fb_ff import COMMANDS, HISTORY, SIGNALS, FittedFeedback
+from panto_baselines.policies.gains import GAINS_FOLDER, find_gains, gain_file, load_gains
+from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
+from panto_baselines.policies.skyhook import Skyhook
+from panto_baselines.tuning.batch import Still, run_batch
+from panto_baselines.tuning.gauss_newton import fit
+from panto_baselines.tuning.store import check_gain_file, make_tuning, store
+from panto_baselines.tuning.tune import MEAN_TOLERANCE, MEAN_WEIGHT, residuals_of, tunable, tune_at
+from panto_env import InputError, simulate
+from panto_env.control import Task
+from panto_env.control.context import Context
+from panto_env.control.settings import run_settings
+
+Array = NDArray[np.float64]
+REAL: dict[str, Any] = {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"}
+
+
+def a_context(**settings: Any) -> Context:
+    task = Task(run_settings({"speed_kmh": 300.0, "accuracy": "fast"} | settings), keep_samples=False)
+    task.reset(0, np.random.default_rng(0))
+    return task.context(0)
+
+
+CONTEXT = a_context()
+
+
+def seen(context: Context = CONTEXT, angle: float = 0.0, **values: float) -> NDArray[np.float32]:
+    """An observation, (1, entries), at an angle of the span, with these values (spaces as underscores)."""
+    observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
+    values = {
+        "sine_of_span_position": np.sin(angle),
+        "cosine_of_span_position": np.cos(angle),
+        "speed": context.speed,
+    } | values
+    for name, value in values.items():
+        place = context.layout.index(name.replace("_", " "))
+        observation[0, place] = value / context.layout.entries[place].scale
+    return observation
+
+
+# --- seeds ---------------------------------------------------------------------------------------
+
+
+def test_no_seed_serves_two_purposes() -> None:
+    assert set(seeds.TEST).isdisjoint(seeds.SELECTION)
+    assert set(seeds.TEST).isdisjoint(seeds.TRAINING)
+    assert set(seeds.SELECTION).isdisjoint(seeds.TRAINING)
+
+
+# --- the laws ------------------------------------------------------------------------------------
+
+
+def test_periodic_force_is_its_fourier_series_ahead_by_the_lead() -> None:
+    gains = np.random.default_rng(0).normal(size=2 * HARMONICS)
+    policy = Periodic(gains=gains.tolist())
+    policy.reset(CONTEXT)
+    for angle in (0.0, 1.3, 5.9):
+        ahead = angle + 2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.span_length
+        expected = sum(
+            gains[k - 1] * np.cos(k * ahead) + gains[HARMONICS + k - 1] * np.sin(k * ahead)
+            for k in range(1, HARMONICS + 1)
+        )
+        assert policy.forces(seen(angle=angle))[0] == pytest.approx(expected, abs=1e-4)
+        assert policy.act(seen(angle=angle)[0])[0] == pytest.approx(expected / CONTEXT.force_limit, abs=1e-6)
+
+
+def test_without_the_place_within_the_span_there_is_no_series() -> None:
+    policy = Periodic(gains=[1.0] * 2 * HARMONICS)
+    policy.reset(CONTEXT)
+    with pytest.raises(InputError, match="needs the place within the span"):
+        policy.forces(seen(sine_of_span_position=0.0, cosine_of_span_position=0.0))
+
+
+def test_fitted_feedback_adds_past_signals_and_commands_to_the_series() -> None:
+    gains = np.zeros(2 * HARMONICS + HISTORY * len(SIGNALS) + COMMANDS)
+    gains[0] = 7.0  # of the first cosine
+    place = 2 * HARMONICS + len(SIGNALS) + list(SIGNALS).index("frame velocity")
+    gains[place] = -2.0  # of the frame's velocity one step ago, in units of 0.1 m/s
+    gains[-1] = 3.0  # of the command two steps ago, in units of 10 N
+    policy = FittedFeedback(gains=gains.tolist())
+    policy.begin(CONTEXT, 1)
+    angle = -2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.span_length  # where the series' angle is zero
+    forces = [policy.forces(seen(angle=angle, frame_velocity=each))[0] for each in (0.0, 0.2, 0.0, 0.0)]
+    assert forces[:2] == pytest.approx([7.0, 7.0], abs=1e-4)
+    # All but a hundredth of a signal is left of it after its slow average has taken its share.
+    assert forces[2] == pytest.approx(7.0 + 3.0 * 0.7 - 2.0 * 0.2 / 0.1, abs=0.1)
+    assert forces[3] == pytest.approx(7.0 + 3.0 * 0.7, abs=0.1)
+
+
+def test_constant_readings_move_no_feedback() -> None:
+    gains = np.concatenate([np.zeros(2 * HARMONICS), np.ones(HISTORY * len(SIGNALS)), np.zeros(COMMANDS)])
+    policy = FittedFeedback(gains=gains.tolist())
+    policy.begin(CONTEXT, 1)
+    for _ in range(3):
+        assert policy.forces(seen(contact_force=140.0, head_displacement=0.07))[0] == 0.0
+
+
+def test_skyhook_opposes_velocities() -> None:
+    policy = Skyhook(gains=(150.0, -20.0))
+    policy.begin(CONTEXT, 1)
+    force = policy.forces(seen(frame_velocity=0.2, head_velocity=-0.1))[0]
+    assert force == pytest.approx(-150 * 0.2 - 20 * 0.1, rel=1e-5)
+
+
+# --- files of gains ------------------------------------------------------------------------------
+
+
+def a_file(path: Path, policy: str = "skyhook") -> Path:
+    from panto_baselines.tuning.tune import Tuned
+
+    tuned = [
+        Tuned(speed, gains, (1.0, 0.5), 40, -0.1, 0.001)
+        for speed, gains in ((250.0, (100.0, 10.0)), (300.0, (200.0, 30.0)))
+    ]
+    store(path, policy, make_tuning(run_settings(REAL), ["frame", "head"], tuned, [2000], "panto tune"))
+    return path
+
+
+def test_stored_gains_are_found_and_interpolated_over_speed(tmp_path: Path) -> None:
+    path = a_file(tmp_path / "mine.toml")
+    policy = Skyhook(gains=str(path))
+    policy.reset(a_context(speed_kmh=275.0))
+    assert policy.gains == pytest.approx([150.0, 20.0])
+    policy.reset(a_context(speed_kmh=310.0))  # beyond, within half a step
+    assert policy.gains == pytest.approx([200.0, 30.0])
+    tuning = load_gains(path).tunings[0]
+    assert (tuning.command, tuning.seeds, tuning.passes) == ("panto tune", (2000,), 80)
+    assert tuning.actuator["lag"] == 0.015
+    assert load_gains(a_file(path)).tunings == (tuning,)  # the same case is replaced
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"speed_kmh": 330.0}, "from 250 to 300 km/h, not for 330 km/h"),
+        ({"catenary": "re330"}, "no gains for the pantograph 'en50318-2002' on the line 're330'"),
+        ({"actuator": {"place": "head"}}, "with an actuator at head"),
+    ],
+)
+def test_where_there_are_no_gains_a_sentence_says_so(
+    tmp_path: Path, settings: dict[str, Any], words: str
+) -> None:
+    path = a_file(tmp_path / "mine.toml")
+    with pytest.raises(InputError) as caught:
+        Skyhook(gains=str(path)).reset(a_context(**settings))
+    assert words in str(caught.value)
+
+
+def test_gains_of_another_policy_or_number_are_refused(tmp_path: Path) -> None:
+    path = a_file(tmp_path / "mine.toml")
+    with pytest.raises(InputError, match="not those of this policy"):
+        Periodic(gains=str(path)).reset(CONTEXT)
+    with pytest.raises(InputError, match="There must be 2 gains"):
+        Skyhook(gains=(1.0, 2.0, 3.0)).reset(CONTEXT)
+    with pytest.raises(InputError, match="holds gains of 'skyhook'"):
+        check_gain_file(path, "periodic")
+    with pytest.raises(InputError, match="There are no gains in"):
+        find_gains("nowhere", ["frame"], CONTEXT)
+
+
+@pytest.mark.parametrize("path", sorted(GAINS_FOLDER.glob("*.toml")), ids=lambda path: path.stem)
+def test_gains_that_come_with_the_project_are_of_their_policy_and_of_training_seeds(path: Path) -> None:
+    file = load_gains(path)
+    assert gain_file(file.policy) == path
+    for tuning in file.tunings:
+        context = a_context(catenary=tuning.catenary, pantograph=tuning.pantograph)
+        assert list(tuning.names) == tunable(file.policy).gain_names(context)
+        assert set(tuning.seeds) <= set(seeds.TRAINING)
+        assert all(change < 0 for change in tuning.std_change)
+        assert all(abs(change) < MEAN_TOLERANCE for change in tuning.mean_change)
+
+
+# --- Gauss-Newton --------------------------------------------------------------------------------
+
+
+def test_a_linear_problem_is_solved_at_once_a_bent_one_in_some_iterations() -> None:
+    rng = np.random.default_rng(1)
+    matrix, target = rng.normal(size=(40, 5)), rng.normal(size=40)
+    found = fit(lambda x: x @ matrix.T - target, np.zeros(5), np.full(5, 0.1), 5)
+    expected = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    assert found.gains == pytest.approx(expected, abs=2e-3)
+    assert list(found.history) == sorted(found.history, reverse=True)
+
+    def rosenbrock(x: Array) -> Array:
+        return np.stack([10 * (x[:, 1] - x[:, 0] ** 2), 1 - x[:, 0]], axis=1)
+
+    assert fit(rosenbrock, np.array([-0.5, 0.5]), np.full(2, 1e-4), 60).gains == pytest.approx(1, abs=0.02)
+
+
+def test_candidates_that_fail_are_not_taken() -> None:
+    def residuals(x: Array) -> Array:
+        return np.where(np.abs(x) < 0.5, x - 2.0, np.nan)
+
+    found = fit(residuals, np.zeros(1), np.array([0.1]), 20)
+    assert 0.3 < found.gains[0] < 0.5
+    with pytest.raises(InputError, match="cannot start"):
+        fit(residuals, np.ones(1), np.array([0.1]), 3)
+
+
+# --- batches and tuning --------------------------------------------------------------------------
+
+
+def test_a_batch_is_what_single_passes_are() -> None:
+    settings = {"speed_kmh": 300.0, "accuracy": "fast", "distance": 660.0, "spans": 19} | REAL
+    laws = [Still(), Skyhook(gains=(100.0, 0.0))]
+    force = run_batch(run_settings(settings), laws, [1000, 1001])
+    for row, policy in enumerate((None, "skyhook:gains=(100.0,0.0)")):
+        figures = simulate(policy=policy, seed=1001, **settings).summary()
+        assert force.mean[row, 1] == pytest.approx(figures.mean, rel=1e-3)
+        assert force.std[row, 1] == pytest.approx(figures.std, rel=1e-2)
+
+
+def test_residuals_are_of_sigma_and_of_the_mean_beside_the_passive_ones() -> None:
+    settings = {"speed_kmh": 300.0, "accuracy": "fast", "distance": 660.0, "spans": 19} | REAL
+    force = run_batch(run_settings(settings), [Still(), Skyhook(gains=(100.0, 0.0))], [2000, 2001])
+    passive = force._replace(values=force.values[:1], mean=force.mean[:1], std=force.std[:1])
+    costs = (residuals_of(force, passive) ** 2).sum(axis=1)
+    off = (force.mean[1] / force.mean[0] - 1) / MEAN_TOLERANCE
+    expected = np.mean((force.std[1] / force.std[0]) ** 2 + MEAN_WEIGHT * off**2)
+    assert costs == pytest.approx([1.0, expected])
+
+
+def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen() -> None:
+    settings = run_settings({"distance": 660.0, "spans": 19, "accuracy": "fast"} | REAL)
+    tuned = tune_at("skyhook", settings, 350.0, 1, 60)
+    assert tuned.history[-1] < 0.8 < tuned.history[0]
+    assert tuned.std_change < -0.1
+    assert tuned.passes <= 60 + 11
+    with pytest.raises(InputError, match="'pd' has no gains to tune; policies that have are"):
+        tunable("pd")
+
+
+@pytest.mark.parametrize("name", ["periodic", "fitted-fb+ff"])
+def test_fitted_policies_take_a_third_off_sigma_at_the_same_mean(name: str) -> None:
+    settings: dict[str, Any] = {"speed_kmh": 350.0, "accuracy": "fast", "seed": 1003} | REAL
+    passive, figures = (simulate(policy=policy, **settings).summary() for policy in (None, name))
+    assert figures.std < 0.65 * passive.std
+    assert figures.mean == pytest.approx(passive.mean, rel=MEAN_TOLERANCE)
+
+
+def test_between_tuned_speeds_the_series_still_helps() -> None:
+    settings: dict[str, Any] = {"speed_kmh": 337.5, "accuracy": "fast", "seed": 1003} | REAL
+    passive, figures = (simulate(policy=policy, **settings).summary() for policy in (None, "periodic"))
+    assert figures.std < 0.85 * passive.std
+
+
+def test_repetitive_control_needs_no_gains_of_the_line() -> None:
+    settings: dict[str, Any] = {
+        "catenary": "shinkansen-simple",
+        "pantograph": "identified-2dof",
+        "speed_kmh": 350.0,
+        "accuracy": "fast",
+        "seed": 1003,
+    } | REAL
+    passive, figures = (simulate(policy=policy, **settings).summary() for policy in (None, "repetitive"))
+    assert figures.std < passive.std
+    assert figures.mean == pytest.approx(passive.mean, rel=MEAN_TOLERANCE)
