@@ -20,6 +20,7 @@ from panto_baselines.report.page import page
 from panto_baselines.report.result import parse_result
 from panto_baselines.report.tables import signed
 from panto_baselines.report.toml import as_toml
+from panto_configs import names
 from panto_env import InputError
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
@@ -160,7 +161,7 @@ def test_the_page_is_one_file_and_always_the_same():
     assert len(Reader(html(result(), result())).tables) == 2 * len(Reader(text).tables)
 
 
-@pytest.mark.parametrize("name", ["benchmark", "benchmark-realistic", "demo"])
+@pytest.mark.parametrize("name", names("benchmark"))
 def test_the_settings_shown_run_the_same_benchmark(tmp_path, name):
     settings = load_benchmark(name)
     settings = settings.model_copy(update={"title": 'a "title"\\ \x7f\n'})
