@@ -22,8 +22,9 @@ demo: $(READY)
 	$(BIN)/panto validate
 	$(BIN)/panto train configs/ppo-quick.toml --output $(DEMO)/ppo-en50318
 	$(BIN)/panto train configs/ppo-quick-shinkansen.toml --output $(DEMO)/ppo-shinkansen
-	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --plot $(DEMO)/benchmark.png
-	@echo "The picture is $(DEMO)/benchmark.png, every figure is in $(DEMO)/benchmark.json."
+	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --plot $(DEMO)/benchmark.png \
+	  --html $(DEMO)/benchmark.html
+	@echo "The page is $(DEMO)/benchmark.html, the picture $(DEMO)/benchmark.png; every figure is in $(DEMO)/benchmark.json."
 
 lint: $(READY)
 	$(BIN)/ruff check .

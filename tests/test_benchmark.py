@@ -18,6 +18,8 @@ from panto_baselines.benchmark import command, plot
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.report.page import page
+from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
@@ -240,6 +242,14 @@ def test_json_holds_everything_and_the_settings_that_make_it_again(
     assert parse(BenchmarkSettings, table["settings"], "it") == outcome.settings
     assert len(table["rows"]) == 4
     assert table["cells"][1]["rank"] in (1, 2)
+    assert [(each["policy"], each["seed"]) for each in table["traces"]] == [("passive", 0), (P, 0)]
+
+
+def test_command_writes_the_page_that_its_json_gives(tmp_path: Path) -> None:
+    files = tmp_path / "out.json", tmp_path / "out.html"
+    result = called("p", "--output", str(files[0]), "--html", str(files[1]))
+    assert result.exit_code == 0, result.output
+    assert files[1].read_text(encoding="utf-8") == page([read_result(files[0])])
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
@@ -304,6 +314,7 @@ def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> Non
         (["p", "--catenary", "nowhere"], "Unknown catenary"),
         (["p", "--actuator", "strong"], "key 'actuator'"),
         (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .parquet"),
+        (["p", "--html", "out.txt"], "out.txt must end in .html"),
         (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
     ],
 )

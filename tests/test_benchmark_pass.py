@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import drive, run_pass
@@ -112,3 +113,35 @@ def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
     run, _ = drive(given, LINE, Shouting(), SPEED_KMH, seed=0)
     inside = (run.position > 50.0) & (run.position < 150.0)
     assert row.power == pytest.approx(np.abs(run.frame_force * run.frame_velocity)[inside].mean(), rel=0.01)
+
+
+def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
+    given = settings(line_condition="new")
+    row, trace = run_pass(given, LINE, (1, 3), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)
+    run, _ = drive(given, LINE, "p:gain=0.5", SPEED_KMH, seed=3)
+    assert (trace.policy, trace.catenary, trace.speed_kmh, trace.seed) == (
+        *("p:gain=0.5", LINE.catenary, SPEED_KMH, 3),
+    )
+    position, force = np.array(trace.position), np.array(trace.force)
+    np.testing.assert_allclose(position, np.linspace(50.0, 150.0, 201), atol=0.01)  # spans of 50 m
+    filtered = signal.sosfiltfilt(
+        signal.butter(3, 20.0, fs=1 / run.time_step, output="sos"), run.contact_force
+    )
+    inside = (position > 60) & (position < 140)
+    expected = np.interp(position, run.position, filtered)
+    np.testing.assert_allclose(force[inside], expected[inside], atol=0.02 * expected.std())
+    frequency, amplitude = np.array(trace.frequency), np.array(trace.amplitude)
+    assert frequency[-1] <= 20.0 < frequency[-1] + frequency[1]
+    raw = run.contact_force[run.position < 150.0]
+    _, power = signal.periodogram(raw, 1 / run.time_step, window="hann", scaling="spectrum")
+    np.testing.assert_allclose(amplitude, np.sqrt(2 * power[: len(amplitude)]), atol=0.01 * amplitude.max())
+    assert run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0).trace is None
+    assert row.figures.std == run.summary((1, 3)).std
+
+
+def test_a_slow_train_leaves_points_enough_for_a_peak_at_20_hz():
+    given = settings(line_condition="new")
+    trace = run_pass(given, LINE, (2, 2), "passive", 40.0, seed=0, traced=True).trace
+    steps = np.diff(trace.position)
+    assert steps.max() <= 40 / 3.6 / 80 + 0.011
+    assert (trace.position[0], trace.position[-1]) == (50.0, 100.0)

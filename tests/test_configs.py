@@ -61,6 +61,7 @@ def test_wheel_carries_every_module_and_every_toml_file(tmp_path):
     for package, folder in folders.items():
         wanted = {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.py")}
         wanted |= {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.toml")}
+        wanted |= {path.relative_to(ROOT / folder) for path in (ROOT / folder).glob("report/templates/*.*")}
         found = {path.relative_to(unpacked / package) for path in (unpacked / package).rglob("*.*")}
         assert wanted - found == set(), package
     code = (

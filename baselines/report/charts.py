@@ -13,6 +13,8 @@ LEFT, RIGHT, TOP, BOTTOM = 44.0, 8.0, 10.0, 38.0
 TICKS = 5
 LETTER, LINE = 6.0, 12.0
 """About the width and height of a label's letters."""
+RADIUS, GAP = 5.0, 7.0
+"""Of a dot, and from its middle to its label."""
 
 
 class Tick(NamedTuple):
@@ -64,7 +66,7 @@ class Scale(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
-        """Place of a value, rounded to a tenth."""
+        """The place of a value, in units of the view box."""
         share = (value - self.lowest) / (self.highest - self.lowest)
         return round(self.begin + share * (self.end - self.begin), 1)
 
@@ -125,20 +127,22 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
         return None
     x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
     y_ticks, y = _axis(min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP)
-    taken: list[tuple[float, float, float]] = []
+    taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in known]
     drawn = []
     for policy, across, up, hollow in known:
         at, height, width = x(across), y(up), LETTER * len(policy)
-        before = at + 6 + width > WIDTH
-        begin = at - 6 - width if before else at + 6
-        room = begin >= LEFT and not any(
-            abs(height - other) < LINE and begin < right and begin + width > left
-            for left, right, other in taken
-        )
-        if room:
-            taken.append((begin, begin + width, height))
-        drawn.append(Dot(policy, at, height, policy if room else "", before, hollow))
+        sides = ((at + GAP, False), (at - GAP - width, True))
+        free = [side for side in sides if _is_free(side[0], side[0] + width, height, taken)]
+        if free:
+            taken.append((free[0][0], free[0][0] + width, height))
+        drawn.append(Dot(policy, at, height, policy if free else "", bool(free) and free[0][1], hollow))
     return Chart(title, *labels, x_ticks, y_ticks, [], drawn, [], None)
+
+
+def _is_free(begin: float, end: float, height: float, taken: Sequence[tuple[float, float, float]]) -> bool:
+    """Whether a label from begin to end lies in the chart, and over nothing that has been written there."""
+    clear = all(abs(height - at) >= LINE or begin >= right or end <= left for left, right, at in taken)
+    return clear and begin >= LEFT and end <= WIDTH
 
 
 def _axis(lowest: float, highest: float, begin: float, end: float) -> tuple[list[Tick], Scale]:

@@ -1,4 +1,4 @@
-"""What a policy is, in a sentence or two, from its name in a result: no code of a user's is run for it."""
+"""What a policy is, in a sentence or two, from its name in a result; nothing of a user's own is run."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from panto_env.base.files import PAGES, check_output, write_whole
 
 from ..benchmark.report import LEGEND
-from .charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH
+from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH
 from .result import Result
-from .tables import BAR
+from .tables import BAR, signed
 from .track import track
 
 
@@ -28,6 +28,7 @@ def page(results: Sequence[Result]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["signed"] = signed
     return environment.get_template("page.html.jinja").render(
         tracks=[track(result) for result in results],
         legend=LEGEND,
@@ -38,6 +39,7 @@ def page(results: Sequence[Result]) -> str:
             "right": WIDTH - RIGHT,
             "top": TOP,
             "bottom": HEIGHT - BOTTOM,
+            "gap": GAP,
         },
         bar=BAR,
     )

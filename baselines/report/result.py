@@ -138,8 +138,8 @@ class Result(Part):
     def _whole(self) -> Self:
         if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
             raise ValueError("must have cells, and spans of each of their lines")
-        shown = {one.policy for one in self.standings} | {one.policy for one in self.traces}
-        if not shown <= set(self.policies):
+        named = {one.policy for one in self.standings} | {one.policy for one in self.traces}
+        if not named <= set(self.policies):
             raise ValueError("must have a cell of every policy")
         return self
 

@@ -1,4 +1,4 @@
-"""Tables of a page, as what their cells say and how they sort: leaderboard, and one per line and speed."""
+"""Tables of a page: what their cells say and how they sort. The leaderboard, and one per line and speed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from .result import Cell, Result, Standing
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
+FAR_OFF = 25.0
+"""Change of σ (%) from which on a disqualified policy is left out of pictures' and colours' scales."""
 R = TypeVar("R", Standing, Cell)
 
 
@@ -70,7 +72,7 @@ def leaderboard(result: Result) -> Table:
     }
     columns: list[Column[Standing]] = [
         *_first_columns(result.standings),
-        Column("worst cell, Δσ (%)", lambda one: _figure(one.worst, 1, f"at {one.worst_at}")),
+        Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
         Column("power (W)", lambda one: _figure(one.power, 1)),
@@ -134,12 +136,12 @@ def _of_figure(name: str, decimals: int) -> Column[Cell]:
     )
 
 
-def _figure(value: float, decimals: int, note: str = "") -> Entry:
-    return Entry(number(value, decimals), _key(value), note)
+def _figure(value: float, decimals: int) -> Entry:
+    return Entry(number(value, decimals), _key(value))
 
 
-def _signed(value: float, decimals: int) -> Entry:
-    return Entry(signed(value, decimals), _key(value))
+def _signed(value: float, decimals: int, note: str = "") -> Entry:
+    return Entry(signed(value, decimals), _key(value), note)
 
 
 def signed(value: float, decimals: int) -> str:
@@ -165,13 +167,18 @@ def _change(one: Standing | Cell, scale: Scale) -> Entry:
         return Entry("–")
     low, high = one.interval or (one.change, one.change)
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
-    places = (scale(min(max(value, scale.lowest), scale.highest)) for value in (0.0, low, high, one.change))
-    return Entry(signed(one.change, 1), _key(one.change), note, Bar(*places))
+    inside = scale.lowest <= low and high <= scale.highest
+    bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
+    return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
 def _scale(rows: Sequence[Standing | Cell]) -> Scale:
-    """Of the pictures of intervals: that of the policies that qualify, so that others can't flatten them."""
-    shown = [one for one in rows if not one.disqualified] or rows
-    ends = [end for one in shown for end in (one.change, *(one.interval or ())) if isfinite(end)]
+    """Of the pictures of intervals: no policy that is far off flattens those that qualify."""
+    ends = [
+        end
+        for one in rows
+        for end in (one.change, *(one.interval or ()))
+        if isfinite(end) and (abs(end) <= FAR_OFF or not one.disqualified)
+    ]
     lowest, highest = min([-1.0, *ends]), max([1.0, *ends])
     return Scale(lowest, highest, 4.0, BAR - 4.0)

@@ -11,7 +11,7 @@ from ..benchmark.settings import REFERENCE
 from .charts import Chart, Line, Point, curves, dots
 from .descriptions import what_is
 from .result import Cell, Place, Result, Trace
-from .tables import Table, leaderboard, signed, table_of_cells
+from .tables import FAR_OFF, Table, leaderboard, signed, table_of_cells
 from .toml import as_toml
 
 STRONGEST = 0.6
@@ -103,10 +103,10 @@ def track(result: Result) -> Track:
 
 
 def _heat(result: Result) -> dict[str, list[Shade | None]]:
-    """Changes of σ; the strongest colour is the largest change of a policy that qualifies there."""
+    """Changes of σ; the strongest colour is the largest change that is not far off."""
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
-    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change) and not cell.disqualified]
-    largest = max([1.0, *sizes])
+    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
+    largest = min(max([1.0, *sizes]), FAR_OFF)
     return {
         policy: [_shade(cells.get((policy, place)), largest) for place in result.places]
         for policy in result.policies
@@ -150,7 +150,7 @@ def _section(result: Result, place: Place) -> Section:
     return Section(
         place=place,
         title=title,
-        table=table_of_cells(cells, f"{title}: spans {first}–{last}, {count}"),
+        table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
         charts=[
             *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
             *([over_effort] if over_effort else []),

@@ -16,10 +16,10 @@ for (const table of document.querySelectorAll("table.sorts")) {
     heading.setAttribute("aria-sort", down ? "descending" : "ascending");
   }));
 }
-// A track's charts show the policies that are ticked; without this script they show all.
+// A track's forces and spectra are those of the policies that are ticked; without this script, of all.
 for (const track of document.querySelectorAll(".track")) {
   for (const box of track.querySelectorAll("input[data-policy]")) {
-    const drawn = track.querySelectorAll(`svg [data-policy="${box.dataset.policy}"]`);
+    const drawn = track.querySelectorAll(`polyline[data-policy="${box.dataset.policy}"]`);
     const show = () => drawn.forEach((each) => each.classList.toggle("off", !box.checked));
     box.addEventListener("change", show);
     show();

@@ -1,0 +1,285 @@
+"""The page of a benchmark: what it shows, that it is one file and escapes all, that it sorts in a browser."""
+
+import itertools
+import json
+import os
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.report import charts
+from panto_baselines.report.command import report
+from panto_baselines.report.descriptions import what_is
+from panto_baselines.report.page import page
+from panto_baselines.report.result import parse_result
+from panto_baselines.report.tables import signed
+from panto_baselines.report.toml import as_toml
+from panto_env import InputError
+
+HOSTILE = "</title><script>alert('\"1')</script>&amp;"
+VOID = {"meta", "input"}
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+POLICIES = {"passive": (0.0, ""), "p": (-10.0, ""), "pd": (-9.0, ""), HOSTILE: (-20.0, "it cheats")}
+CHROMIUM = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"),
+    *("--virtual-time-budget=2000", "--dump-dom"),
+]
+
+
+def result(**changes):
+    """What `panto benchmark` writes, of one line at two speeds, by hand."""
+    names = list(POLICIES)
+    cells, traces, standings = [], [], []
+    for speed in (250.0, 300.0):
+        for rank, (policy, (change, reason)) in enumerate(POLICIES.items(), 1):
+            where = {"policy": policy, "catenary": "ln2", "pantograph": "cx", "speed_kmh": speed}
+            figures = {"std": 30 + change, "effort": abs(change), "mean": None}
+            cells.append(
+                where
+                | {"seeds": 2, "nominal_force": 120.0, "figures": figures, "change": change, "interval": None}
+                | {"cost_change": change, "mean_change": 0.5, "improved": 1.0, "disqualified": reason}
+                | {"rank": None if reason else rank, "spread": 1.0}
+            )
+            along = {"position": [0.0, 50.0, 100.0], "force": [100.0, 120.0 + change, 140.0]}
+            traces.append(where | {"seed": 0} | along | {"frequency": [0.0, 20.0], "amplitude": [0.0, 9.0]})
+    for rank, (policy, (change, reason)) in enumerate(POLICIES.items(), 1):
+        standings.append(
+            {"policy": policy, "change": change, "interval": [change - 1, change + 1], "worst": change}
+            | {"worst_at": "ln2, 250 km/h", "improved": 1.0, "effort": abs(change), "power": 2.0}
+            | {"saturation": 0.25, "better_than": {other: 0.75 for other in names if other != policy}}
+            | {"disqualified": reason, "rank": None if reason else 4 - rank}
+        )
+    settings = BenchmarkSettings(title=HOSTILE).model_dump(mode="json")
+    whole = {"version": "1", "settings": settings, "spans": [[3, 5]], "standings": standings}
+    return whole | {"cells": cells, "rows": [], "traces": traces} | changes
+
+
+def html(*tables):
+    return page([parse_result(table, "it") for table in tables or (result(),)])
+
+
+class Reader(HTMLParser):
+    """Tables as lists of rows of texts; tags that are opened and not closed raise."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.tables, self.open = [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "table":
+            self.tables.append([])
+        elif tag == "tr":
+            self.tables[-1].append([])
+        elif tag in ("td", "th"):
+            self.tables[-1][-1].append("")
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and {"td", "th"} & set(self.open):
+            self.tables[-1][-1][-1] += data.strip()
+
+
+def test_leaderboard_shows_the_ranked_first_and_why_others_are_not():
+    headings, *rows = Reader(html()).tables[0]
+    assert headings[:3] == ["rank", "policy", "Δσ (%)"]
+    assert [row[0] for row in rows] == ["1", "2", "3", "–"]
+    assert [row[1] for row in rows] == ["pd", "p", "passive", f"{HOSTILE}disqualified: it cheats"]
+    assert rows[1][2:] == [
+        *("-10.0-11.0 to -9.0", "-10.0at ln2, 250 km/h", "100 %", "10.0", "2.0", "25 %", "+0.5")
+    ]
+
+
+def test_the_share_of_an_oracle_is_shown_where_there_was_one():
+    table = result()
+    table["standings"][1]["oracle_share"] = 0.42
+    headings, *rows = Reader(html(table)).tables[0]
+    assert headings[3] == "of the oracle's gain"
+    assert [row[3] for row in rows] == ["–", "42 %", "–", "–"]
+    assert "oracle&#39;s gain" not in html()
+
+
+def test_heat_map_and_pairs_are_tables():
+    reader = Reader(html())
+    heat, pairs = (table for table in reader.tables if table[0][0] in ("", "better than"))
+    assert heat[0] == ["", "cx on ln2"]
+    assert heat[1] == ["policy", "250 km/h", "300 km/h"]
+    assert heat[3] == ["p", "-10.0", "-10.0"]
+    assert heat[5] == [HOSTILE, "(-20.0)", "(-20.0)"]
+    assert pairs[2] == ["p", "75 %", "", "75 %", "75 %"]
+
+
+def test_charts_draw_every_policy_in_its_place():
+    reader = Reader(html())
+    lines = [attributes for tag, attributes in reader.tags if tag == "polyline"]
+    assert len(lines) == 2 * 2 * len(POLICIES)  # force and spectrum at two speeds
+    assert [line["data-policy"] for line in lines[:4]] == ["0", "1", "2", "3"]
+    x, y = zip(*(map(float, point.split(",")) for point in lines[0]["points"].split()), strict=True)
+    assert (x[0], x[-1]) == (charts.LEFT, charts.WIDTH - charts.RIGHT)
+    assert x[1] == pytest.approx((x[0] + x[2]) / 2, abs=0.1)
+    assert y[0] - y[1] == pytest.approx(y[1] - y[2], abs=0.11)  # 100, 120 and 140 N: upwards
+    assert y[0] > y[2]
+    boxes = [attributes for tag, attributes in reader.tags if tag == "input"]
+    assert [box["data-policy"] for box in boxes] == ["0", "1", "2", "3"]
+
+
+def test_a_result_without_traces_says_so():
+    table = result()
+    del table["traces"]
+    assert "run the benchmark anew to have them here" in html(table)
+    assert "polyline class" not in html(table)
+
+
+def test_nothing_of_a_result_becomes_markup():
+    reader = Reader(html(result(version="<b>1</b>")))
+    assert sum(tag == "script" for tag, _ in reader.tags) == 1
+    assert "b" not in {tag for tag, _ in reader.tags}
+    assert HOSTILE not in html()
+
+
+def test_the_page_is_one_file_and_always_the_same():
+    text = html()
+    assert not re.search(r"https?:|\bsrc=|<link|@import|url\(", text)
+    assert text == html()
+    assert len(Reader(html(result(), result())).tables) == 2 * len(Reader(text).tables)
+
+
+@pytest.mark.parametrize("name", ["benchmark", "benchmark-realistic", "demo"])
+def test_the_settings_shown_run_the_same_benchmark(tmp_path, name):
+    settings = load_benchmark(name)
+    settings = settings.model_copy(update={"title": 'a "title"\\ \x7f\n'})
+    path = tmp_path / "settings.toml"
+    path.write_text(as_toml(settings.model_dump(mode="json")))
+    assert load_benchmark(path) == settings
+
+
+def test_policies_are_described_and_none_of_a_users_own_is_run(tmp_path):
+    assert what_is("p:gain=0.3") == "Force proportional to the nominal force minus the contact force."
+    assert what_is("blind of pd").startswith("A control: pd without its senses")
+    mine = tmp_path / "mine.py"
+    mine.write_text("raise SystemExit('it ran')")
+    assert "Python file" in what_is(f"{mine}:Mine")
+    assert what_is("unheard-of") == "It is not installed where this page was made."
+
+
+def test_labels_of_points_lie_apart_and_inside():
+    points = [charts.Point(f"p{k}", k % 15 + k // 15 / 9, 1.0 + k % 3, False) for k in range(20)]
+    chart = charts.dots("", ("", ""), points)
+    spans = []
+    for dot in chart.dots:
+        if dot.label:
+            width = charts.LETTER * len(dot.label)
+            begin = dot.x - charts.GAP - width if dot.before else dot.x + charts.GAP
+            assert charts.LEFT <= begin <= begin + width <= charts.WIDTH
+            spans.append((dot.y, begin, begin + width))
+    assert 5 < len(spans) < 20
+    spans.sort()
+    assert all(a[0] != b[0] or a[2] <= b[1] for a, b in itertools.pairwise(spans))
+
+
+def test_changes_have_a_sign_unless_they_are_nothing():
+    assert [signed(value, 1) for value in (1.04, -2.0, -0.04, float("nan"))] == ["+1.0", "-2.0", "0.0", "–"]
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def called(*arguments):
+    app = typer.Typer()
+    app.command()(report)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_command_writes_the_page_beside_the_first_file(tmp_path):
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    for path in (first, second):
+        path.write_text(json.dumps(result()))
+    done = called(first, second)
+    assert done.exit_code == 0, done.output
+    assert done.stdout == f"The page is {tmp_path / 'a.html'}.\n"
+    assert (tmp_path / "a.html").read_text(encoding="utf-8") == html(result(), result())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("run.parquet", "", "run.parquet must end in .json"),
+        ("out.json", None, "there is no such file"),
+        ("out.json", "{", "is not JSON"),
+        ("out.json", "[1]", "is no result of `panto benchmark --output RESULT.json`"),
+        ("out.json", '{"rows": []}', "'version' is missing or wrong"),
+        ("out.json", json.dumps(result(cells=[])), "do not fit together"),
+        ("out.json", json.dumps(result(traces=[{"policy": 1}])), "'traces.0.policy' is missing or wrong"),
+        ("out.json", json.dumps(result(spans=[])), "do not fit together"),
+    ],
+)
+def test_what_is_no_result_is_refused_in_one_sentence(tmp_path, name, text, words):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    done = called(tmp_path / name, "--output", tmp_path / "page.html")
+    assert isinstance(done.exception, InputError)
+    assert words in str(done.exception)
+    assert "\n" not in str(done.exception)
+    assert not (tmp_path / "page.html").exists()
+
+
+# --- in a browser --------------------------------------------------------------------------------
+
+
+def opened(tmp_path, script):
+    """The page after a script of the test has run in it, as a browser has it."""
+    path = tmp_path / "page.html"
+    path.write_text(html().replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
+    command = [BROWSER, *CHROMIUM, f"--user-data-dir={tmp_path / 'profile'}", path.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+
+
+@pytest.mark.skipif(
+    BROWSER is None and "CI" not in os.environ, reason="no browser; the Debian package chromium is one"
+)
+def test_a_browser_sorts_by_a_click_and_hides_by_a_tick(tmp_path):
+    text = opened(
+        tmp_path,
+        """
+        const buttons = [...document.querySelectorAll("th button")];
+        const effort = buttons.find((each) => each.innerText === "effort (N)");
+        effort.click();
+        document.title = effort.closest("table").tBodies[0].rows[1].cells[1].innerText.trim();
+        effort.click();
+        document.querySelector("input[data-policy='1']").click();
+        """,
+    )
+    reader = Reader(text)
+    headings, *rows = reader.tables[0]
+    assert [row[1].removesuffix("disqualified: it cheats") for row in rows] == [HOSTILE, "p", "pd", "passive"]
+    assert re.search("<title>pd</title>", text)  # the second from below, when it rose
+    column = headings.index("effort (N)")
+    assert [row[column] for row in rows] == ["20.0", "10.0", "9.0", "0.0"]
+    sorts = [a.get("aria-sort") for tag, a in reader.tags if tag == "th"][: len(headings)]
+    assert sorts == [None] * column + ["descending"] + [None] * (len(headings) - column - 1)
+    off = {a["data-policy"] for _, a in reader.tags if "data-policy" in a and "off" in a.get("class", "")}
+    assert off == {"1", "3"}  # the unticked one, and the disqualified one, which is not shown at first
+
+
+@pytest.mark.skipif(
+    BROWSER is None and "CI" not in os.environ, reason="no browser; the Debian package chromium is one"
+)
+def test_a_column_with_gaps_keeps_them_last(tmp_path):
+    text = opened(tmp_path, 'const b = document.querySelector("th button"); b.click();')
+    assert [row[0] for row in Reader(text).tables[0][1:]] == ["3", "2", "1", "–"]
