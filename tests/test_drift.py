@@ -89,7 +89,8 @@ def test_figures_kept_as_it_runs_are_those_of_the_record(line, tmp_path):
     steady = np.trapezoid(np.abs(run.contact_force - run.nominal_force), run.position)
     assert recorded["cost_function"] == pytest.approx(steady, rel=1e-9)
     run.save(tmp_path / "run.parquet")
-    assert Trajectory.load(tmp_path / "run.parquet").summary("all") == run.summary("all")
+    loaded = Trajectory.load(tmp_path / "run.parquet").summary("all").as_dict()
+    assert loaded == pytest.approx(recorded, rel=0, abs=0, nan_ok=True)
 
 
 def test_terms_of_an_episode_sum_to_its_figures_after_a_run_in():

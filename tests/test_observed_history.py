@@ -36,6 +36,15 @@ def test_harmonics_are_sines_and_cosines_of_the_place_in_the_span(name):
             assert seen[:, layout.index(entry)] == pytest.approx(function(2 * np.pi * k * turns), abs=1e-6)
 
 
+@pytest.mark.parametrize("name", [NAME, LIGHT])
+def test_blind_sensors_tell_no_harmonic_of_the_place(name):
+    env = gymnasium.make(name, harmonics=14, sensors="blind").unwrapped
+    seen, _ = play(env, 20)
+    entries = [k for k, entry in enumerate(env.context.layout.entries) if "of span position" in entry.name]
+    assert len(entries) == 28
+    assert not seen[:, entries].any()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", [NAME, LIGHT])
 def test_history_is_what_was_seen_before(name, kind):

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number
@@ -35,8 +36,8 @@ class FeedbackFeedforward(ForceLaw):
     `shinkansen-simple` at 350 and 400 km/h; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 makes
     CF worse: `panto benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
 
-    A policy does not see where the train is: x begins at the position within the span, from its sine and
-    cosine, and grows by speed times control interval at each step.
+    A policy does not see where the train is: x is the position within the span, from its sine and cosine,
+    and grows by a span wherever that begins anew.
     """
 
     def __init__(
@@ -84,8 +85,8 @@ class FeedbackFeedforward(ForceLaw):
             speed = context.speed * SPEED_UNITS[self.speed_unit]
             w = 2 * speed / context.span_length  # Eq. 12
             self._wavenumber = w * math.pi / (2 * context.span_length)  # Eq. 11
-        self._start_distance: float | None = None
-        self._steps = 0
+        self._share: float | None = None  # of a span, when last seen
+        self._spans = 0  # begun since the start
 
     def force(self, observation: NDArray[np.float32]) -> float:
         """Force (N) for an observation, before the actuator's limit."""
@@ -104,11 +105,14 @@ class FeedbackFeedforward(ForceLaw):
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
         """Distance (m) from the support behind the start of the run."""
-        if self._start_distance is None:
-            sine = self.read(observation, "sine of span position")
-            cosine = self.read(observation, "cosine of span position")
-            share_of_span = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
-            self._start_distance = share_of_span * self.context.span_length
-        covered = self._steps * self.context.control_interval * self.context.speed
-        self._steps += 1
-        return self._start_distance + covered
+        sine = self.read(observation, "sine of span position")
+        cosine = self.read(observation, "cosine of span position")
+        if sine**2 + cosine**2 < 0.5:
+            raise InputError(
+                "It needs the place within the span, which these sensors do not tell; take p or pd."
+            )
+        share = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
+        if self._share is not None:
+            self._spans -= round(share - self._share)  # nearly a span back: the next has begun
+        self._share = share
+        return (self._spans + share) * self.context.span_length

@@ -153,7 +153,7 @@ def _harmonics(asked: Asked) -> list[tuple[str, float, str, int]]:
 @entries(MEASURED, _harmonics)
 def _span_harmonic(episode, own, task, now, number):
     turns = float(number // 2) * now[NOW.SPANS]
-    return sine_of_turns(turns + 0.25 * float(number % 2))
+    return episode.odometer.sight * sine_of_turns(turns + 0.25 * float(number % 2))
 
 
 @entry(MEASURED, "speed", 100.0, "m/s")
