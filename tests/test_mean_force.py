@@ -13,7 +13,7 @@ from panto_env import InputError, Trajectory, simulate
 from panto_env.analysis.sweep import sweep
 from panto_env.backend import cache_folder
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.control import Task, mean_force, passive_mean, trim_of_pass
+from panto_env.control import Task, kept, mean_force, passive_mean, trim_of_pass
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.en50367 import largest_mean
 from panto_env.plant.state import Row
@@ -26,7 +26,7 @@ LIGHT = {"catenary": "periodic-stiffness", "pantograph": "identified-2dof"}
 @pytest.fixture
 def empty_store(tmp_path, monkeypatch):
     """The folder of what is kept, empty; and how often a passive run has been made."""
-    monkeypatch.setattr(mean_force, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
     runs = []
     run_passively = Task.run_passively
     monkeypatch.setattr(Task, "run_passively", lambda self: (runs.append(1), run_passively(self))[1])

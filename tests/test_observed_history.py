@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.control import passive_run as passive
+from panto_env.control import kept
 from panto_env.control.task import Task
 from panto_env.envs import BARE
 
@@ -150,7 +150,7 @@ def test_a_policy_is_shown_what_it_asks_for():
 
 
 def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(passive, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
     runs, whole = [], Task.run_passively
     monkeypatch.setattr(Task, "run_passively", lambda self: (runs.append(1), whole(self))[1])
     make = lambda **given: gymnasium.make(LIGHT, normalise=300, **given).unwrapped.context.layout  # noqa: E731

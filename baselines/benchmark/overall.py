@@ -10,12 +10,10 @@ import numpy as np
 from .settings import REFERENCE
 from .single_pass import Row
 from .statistics import (
-    CONFIDENCE,
-    RESAMPLES,
-    TRIM,
     Array,
     Cell,
     Place,
+    bootstrap_interval,
     interquartile_mean,
     relative_changes,
 )
@@ -72,7 +70,7 @@ def _standing(policy: str, changes: Mapping[str, Mapping[Place, Array]], cells: 
     return Standing(
         policy=policy,
         change=100 * interquartile_mean(every),
-        interval=_interval(list(by_place.values())),
+        interval=bootstrap_interval(*(100 * found for found in by_place.values())),
         worst=worst.change,
         worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
         improved=float(np.mean([cell.improved for cell in own])),
@@ -97,20 +95,3 @@ def _oracle_share(cells: Sequence[Cell]) -> float | None:
 
 def _where(cell: Cell) -> str:
     return f"{cell.catenary} at {cell.speed_kmh:g} km/h"
-
-
-def _interval(groups: Sequence[Array]) -> tuple[float, float] | None:
-    """95 % percentile-bootstrap interval (%) of the interquartile mean of all; each group is drawn by itself.
-
-    None where the values say nothing about the spread.
-    """
-    from scipy.stats import trim_mean  # slow to import
-
-    every = np.concatenate(groups)
-    if np.isnan(every).any() or all(len(group) < 2 or np.ptp(group) == 0 for group in groups):
-        return None
-    random = np.random.default_rng(0)
-    drawn = np.concatenate([random.choice(group, size=(RESAMPLES, len(group))) for group in groups], axis=1)
-    tail = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(trim_mean(drawn, TRIM, axis=1), (tail, 1 - tail))
-    return 100 * float(low), 100 * float(high)

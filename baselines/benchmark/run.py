@@ -23,7 +23,7 @@ from ..oracle.stored import stored_ratio
 from .controls import policy_of
 from .overall import Standing, standings
 from .settings import BenchmarkSettings, Line
-from .single_pass import Row, run_pass
+from .single_pass import Row, along, run_pass
 from .statistics import Cell, Place, compare
 from .trace import Trace
 
@@ -107,30 +107,15 @@ def _bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> di
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            ratio = stored_ratio(_given(settings, line) | {"speed_kmh": speed}, spans=covered)
+            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, spans=covered)
             if ratio is not None:
                 found[line.catenary, line.pantograph, speed] = 100 * (ratio - 1)
     return found
 
 
-def _given(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
-    """Settings of the runs along a line, by name, but for the speed."""
-    return {
-        "catenary": line.catenary,
-        "pantograph": line.pantograph,
-        "actuator": settings.actuator,
-        "sensors": settings.sensors,
-        "line_condition": settings.line_condition,
-        "pantograph_scatter": settings.pantograph_scatter,
-        "speed_drift": settings.speed_drift,
-        "distance": line.distance,
-        "control_interval": settings.control_interval,
-    }
-
-
 def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
-    given = _given(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
+    given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))
     last = last_whole_span(task.distance, task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SETTLED, last)

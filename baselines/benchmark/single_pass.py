@@ -129,13 +129,11 @@ def _record(
     return run, recorder
 
 
-def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
-    """Arguments of ``simulate`` for a pass, but for its policy."""
+def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
+    """Settings of the runs along a line, by name, but for the speed."""
     return {
         "catenary": line.catenary,
         "pantograph": line.pantograph,
-        "speed_kmh": speed_kmh,
-        "seed": seed,
         "actuator": settings.actuator,
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
@@ -143,8 +141,12 @@ def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: 
         "speed_drift": settings.speed_drift,
         "control_interval": settings.control_interval,
         "distance": line.distance,
-        "record_droppers": False,
     }
+
+
+def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
+    """Arguments of ``simulate`` for a pass, but for its policy."""
+    return along(settings, line) | {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
 
 
 def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:

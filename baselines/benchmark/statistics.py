@@ -68,18 +68,23 @@ def interquartile_mean(values: Array) -> float:
     return float("nan") if np.isnan(values).any() else float(trim_mean(values, TRIM))
 
 
-def bootstrap_interval(values: Array) -> tuple[float, float] | None:
-    """95 % percentile-bootstrap interval of the interquartile mean of (n,) values.
+def bootstrap_interval(*groups: Array) -> tuple[float, float] | None:
+    """95 % percentile-bootstrap interval of the interquartile mean of all values; each group, (n,), is drawn
+    anew by itself.
 
-    None where the values say nothing about the spread: fewer than two, all equal, or one of them nan.
+    None where the values say nothing about the spread: one of them is nan, or every group has fewer than two
+    or all equal ones.
     """
     from scipy.stats import trim_mean
 
-    if len(values) < 2 or np.isnan(values).any() or np.ptp(values) == 0:
+    if any(np.isnan(group).any() for group in groups):
         return None
-    draws = np.random.default_rng(0).choice(values, size=(RESAMPLES, len(values)))
+    if all(len(group) < 2 or np.ptp(group) == 0 for group in groups):
+        return None
+    random = np.random.default_rng(0)
+    draws = [random.choice(group, size=(RESAMPLES, len(group))) for group in groups]
     tail = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(trim_mean(draws, TRIM, axis=1), (tail, 1 - tail))
+    low, high = np.quantile(trim_mean(np.concatenate(draws, axis=1), TRIM, axis=1), (tail, 1 - tail))
     return float(low), float(high)
 
 

@@ -6,21 +6,17 @@ found is kept on disk, under a hash of the sources and of all that the run is ma
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..backend import cache_folder
 from ..base.errors import InputError
-from ..base.files import write_whole
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from ..plant.line_condition import LineCondition
+from .kept import keep, kept_file, read_kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, far_enough
 
@@ -72,10 +68,10 @@ def trim_of_pass(
     if low != high or target_mean(settings, low) is None:
         return None
     file = _file(settings, seed, spans)
-    force = _read(file)
+    force = read_kept(file, "static_force")
     if force is None:
         force = _solve(settings, passive_mean(settings, seed, spans))
-        _write(file, force)
+        keep(file, "static_force", force)
     return Trim((low,), (force,))
 
 
@@ -139,25 +135,4 @@ def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path:
         "seed": seed,
         "spans": spans,
     }
-    text = json.dumps(inputs, sort_keys=True)
-    return cache_folder() / "mean_force" / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
-
-
-def _write(file: Path, force: float) -> None:
-    file.parent.mkdir(exist_ok=True)
-    with write_whole(file) as temporary:
-        temporary.write_text(json.dumps({"static_force": force, "check": _check(file, force)}))
-
-
-def _read(file: Path) -> float | None:
-    """What was kept; None where there is nothing or it is damaged."""
-    try:
-        kept: dict[str, Any] = json.loads(file.read_text())
-        force = float(kept["static_force"])
-        return force if kept["check"] == _check(file, force) else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-
-
-def _check(file: Path, force: float) -> str:
-    return hashlib.sha256(f"{file.stem} {force!r}".encode()).hexdigest()
+    return kept_file("mean_force", inputs)

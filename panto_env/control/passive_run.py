@@ -6,23 +6,20 @@ sources and of all that the runs are made of.
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..backend import cache_folder
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.files import write_whole
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.line_condition import LineCondition
 from ..plant.sensors import Reading
+from .kept import keep, kept_file, read_kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, far_enough
 
@@ -78,12 +75,10 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
     own |= AS_DESIGNED | {"speed_kmh": (3.6 * speed, 3.6 * speed)}
     designed = far_enough(RunSettings.model_construct(**own))
     file = _file(designed)
-    kept = _read(file)
+    kept: list[list[float]] | None = read_kept(file, "values")
     if kept is None:
         kept = _measured(run(designed))
-        file.parent.mkdir(exist_ok=True)
-        with write_whole(file) as temporary:
-            temporary.write_text(json.dumps({"values": kept, "check": _check(file, kept)}))
+        keep(file, "values", kept)
     return kept
 
 
@@ -99,20 +94,6 @@ def _measured(run: Trajectory) -> list[list[float]]:
 
 
 def _file(settings: RunSettings) -> Path:
-    table = settings.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
-    text = json.dumps(table, sort_keys=True)
-    return cache_folder() / "passive_run" / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
-
-
-def _read(file: Path) -> list[list[float]] | None:
-    """What was kept; None where there is nothing or it is damaged."""
-    try:
-        kept: dict[str, Any] = json.loads(file.read_text())
-        values: list[list[float]] = kept["values"]
-        return values if kept["check"] == _check(file, values) else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-
-
-def _check(file: Path, values: Sequence[Sequence[float]]) -> str:
-    return hashlib.sha256(f"{file.stem} {values!r}".encode()).hexdigest()
+    return kept_file(
+        "passive_run", settings.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
+    )
