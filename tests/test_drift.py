@@ -12,6 +12,7 @@ from panto_env.control.settings import run_settings
 from panto_env.metrics.trajectory import Trajectory
 from panto_env.plant.drift import ahead, draw_drift, largest_drift, largest_lag
 from panto_env.plant.trigonometry import sine_of_turns
+from tests.lanes import check_lanes_are_singles
 
 NAMES = ("panto_env:Pantograph-v0", "panto_env:PantographStiffness-v0")
 DRIFT = {"speed_drift": 4.0}
@@ -126,21 +127,7 @@ def test_without_drift_nothing_changes_and_nothing_is_drawn():
 @pytest.mark.parametrize("name", NAMES)
 def test_lanes_drift_each_on_its_own_as_single_environments_do(name):
     settings = {**DRIFT, "distance": 25.0, "speed_kmh": (200.0, 300.0)}
-    vector = gymnasium.make_vec(name, num_envs=3, autoreset_mode="SameStep", **settings)
-    singles = [gymnasium.make(name, **settings).unwrapped for _ in range(3)]
-    observations, _ = vector.reset(seed=5)
-    np.testing.assert_array_equal(observations, [env.reset(seed=5 + i)[0] for i, env in enumerate(singles)])
-    ends = 0
-    for actions in np.random.default_rng(0).uniform(-1, 1, (90, 3, 1)):
-        observations, rewards, *_ = vector.step(actions)
-        for i, env in enumerate(singles):
-            alone, reward, *over, _ = env.step(actions[i])
-            assert rewards[i] == reward
-            if any(over):
-                alone, _ = env.reset()
-                ends += 1
-            np.testing.assert_array_equal(observations[i], alone)
-    assert ends >= 5
+    assert check_lanes_are_singles(name, settings, steps=90).ends >= 5
 
 
 def test_the_same_seed_gives_the_same_drift():

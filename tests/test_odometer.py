@@ -9,6 +9,7 @@ import pytest
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.plant.sensors import sensor_settings
+from tests.lanes import check_lanes_are_singles
 
 NAME = "panto_env:PantographStiffness-v0"
 SPAN, SPEED = 50.0, 200 / 3.6
@@ -134,20 +135,7 @@ def test_each_episode_has_another_wheel():
 @pytest.mark.parametrize("drift", [0.0, 4.0])
 def test_lanes_have_odometers_of_their_own_as_single_environments_do(name, drift):
     settings = {"sensors": "realistic", "distance": 25.0, "run_in": 1.5, "speed_drift": drift}
-    vector = gymnasium.make_vec(name, num_envs=3, autoreset_mode="SameStep", **settings)
-    singles = [gymnasium.make(name, **settings).unwrapped for _ in range(3)]
-    observations, _ = vector.reset(seed=5)
-    np.testing.assert_array_equal(observations, [env.reset(seed=5 + i)[0] for i, env in enumerate(singles)])
-    ends = 0
-    for actions in np.random.default_rng(0).uniform(-1, 1, (130, 3, 1)):
-        observations, *_ = vector.step(actions)
-        for i, env in enumerate(singles):
-            alone, _, *over, _ = env.step(actions[i])
-            if any(over):
-                alone, _ = env.reset()
-                ends += 1
-            np.testing.assert_array_equal(observations[i], alone)
-    assert ends >= 8
+    assert check_lanes_are_singles(name, settings, steps=130).ends >= 8
 
 
 def test_a_copy_goes_on_as_the_original():

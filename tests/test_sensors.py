@@ -4,6 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 
+from tests.lanes import check_lanes_are_singles
+
 NAME = "panto_env:PantographStiffness-v0"
 TIME_STEP, STEPS = 1e-3, 10  # s; time steps in a control step
 SERIES = {
@@ -106,17 +108,4 @@ def test_noise_follows_the_seed():
 def test_late_readings_of_each_lane_are_its_own():
     """Over the ends of episodes: a lane that begins anew has no readings of its last one."""
     settings = {"sensors": {"delay": 0.025}, "speed_kmh": (200, 300), "distance": 10.0}
-    vector = gymnasium.make_vec(NAME, num_envs=3, autoreset_mode="SameStep", **settings)
-    singles = [gymnasium.make(NAME, **settings).unwrapped for _ in range(3)]
-    observations, _ = vector.reset(seed=5)
-    np.testing.assert_array_equal(observations, [env.reset(seed=5 + i)[0] for i, env in enumerate(singles)])
-    ends = 0
-    for actions in np.random.default_rng(0).uniform(-1, 1, (60, 3, 1)):
-        observations, *_ = vector.step(actions)
-        for i, env in enumerate(singles):
-            alone, _, terminated, truncated, _ = env.step(actions[i])
-            if terminated or truncated:
-                alone, _ = env.reset()
-                ends += 1
-            np.testing.assert_array_equal(observations[i], alone)
-    assert ends >= 9
+    assert check_lanes_are_singles(NAME, settings, steps=60).ends >= 9
