@@ -14,6 +14,7 @@ from .base_policy import PolicyLanes
 from .residual import ResidualVecEnv
 from .settings import Training
 from .vec_env import PantographVecEnv
+from .washout import WashoutVecEnv
 
 
 def make_lanes(training: Training) -> Any:
@@ -30,6 +31,8 @@ def make_lanes(training: Training) -> Any:
     if training.residual_of is not None:
         base = PolicyLanes(training.residual_of, native.task)
         lanes = ResidualVecEnv(lanes, base, training.residual_share)
+    if training.washout is not None:
+        lanes = WashoutVecEnv(lanes, native.task.context(0).control_interval, training.washout)
     return VecMonitor(lanes)
 
 

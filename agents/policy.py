@@ -15,6 +15,7 @@ from panto_env.policies import Policy, find_policy
 from .actor import Actor
 from .model_file import Facts, Needs, read_model
 from .residual_policy import Residual
+from .washout_policy import WashedOut
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by what its actions drive."""
@@ -26,9 +27,7 @@ class TrainedPolicy:
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
         """path: of the model file, for messages of errors."""
         self.path, self.facts = path, facts
-        self._policy: Policy = actor
-        if facts.residual_of is not None:
-            self._policy = Residual(find_policy(facts.residual_of), actor, facts.residual_share)
+        self._policy = policy_of(actor, facts)
         needs = facts.needs
         self.observation, self.harmonics, self.history = needs.observation, needs.harmonics, needs.history
         self.normalise = needs.normalise
@@ -44,6 +43,14 @@ class TrainedPolicy:
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
         return self._policy.act(observation)
+
+
+def policy_of(actor: Actor, facts: Facts) -> Policy:
+    """What a network does as the model's facts say: without its slow average, added to a policy's action."""
+    policy: Policy = actor if facts.washout is None else WashedOut(actor, facts.washout)
+    if facts.residual_of is None:
+        return policy
+    return Residual(find_policy(facts.residual_of), policy, facts.residual_share)
 
 
 def load(path: str | Path) -> TrainedPolicy:

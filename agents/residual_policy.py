@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from panto_env.control.context import Context
 from panto_env.policies import Policy
 
-from .actor import Actor
-
 
 def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
     """Action of a base policy and, to a share, an agent's: both in -1..1, as is what comes out."""
@@ -17,17 +15,18 @@ def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float)
 
 
 class Residual:
-    """A policy whose action is a base policy's and, to a share, a network's."""
+    """A policy whose action is a base policy's and, to a share, an agent's."""
 
-    def __init__(self, base: Policy, actor: Actor, share: float) -> None:
-        """share: of the actuator's force limit that the network may add."""
-        self._base, self._actor, self._share = base, actor, share
+    def __init__(self, base: Policy, agent: Policy, share: float) -> None:
+        """share: of the actuator's force limit that the agent may add."""
+        self._base, self._agent, self._share = base, agent, share
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
         self._base.reset(context)
+        self._agent.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
         base = np.clip(np.asarray(self._base.act(observation.copy()), dtype=np.float64), -1.0, 1.0)
-        return added(base, self._actor.act(observation), self._share)
+        return added(base, self._agent.act(observation), self._share)

@@ -60,6 +60,9 @@ class Training(Settings):
     residual_share: Share = Field(
         0.3, description="of the actuator's force limit that the agent may add to that policy's action"
     )
+    washout: Positive | None = Field(
+        None, description="time constant (s) of the slow average that is taken off the agent's action, if any"
+    )
     hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
 
     @property

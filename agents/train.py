@@ -15,7 +15,6 @@ from stable_baselines3.common.logger import configure
 from panto_baselines.benchmark.seeds import SELECTION, check_seeds
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.policies import find_policy
 
 from .base_policy import PolicyLanes
 from .callbacks import EpisodeLog, EveryNSteps, ProgressBar
@@ -23,7 +22,7 @@ from .demonstrations import demonstrate
 from .evaluation import Comparison, Pair, verdict
 from .lanes import lane_seeds, make_lanes
 from .model_file import Facts, Needs, read_model, restore, write_model
-from .residual_policy import Residual
+from .policy import policy_of
 from .run_folder import RunFolder
 from .settings import Training
 
@@ -146,8 +145,7 @@ class Run:
     def _policy(self) -> Any:
         """The policy as it is now, as its model file would have it."""
         actor = self.training.hyperparameters.actor(self.model)
-        base = self.training.residual_of
-        return actor if base is None else Residual(find_policy(base), actor, self.training.residual_share)
+        return policy_of(actor, self._facts(actor))
 
     def checkpoint(self) -> None:
         """Write a checkpoint and remove the oldest one."""
@@ -157,8 +155,11 @@ class Run:
 
     def _save(self, path: Path, replay: bool = False) -> None:
         actor = self.training.hyperparameters.actor(self.model)
+        write_model(path, self.model, actor, self._facts(actor), replay)
+
+    def _facts(self, actor: Any) -> Facts:
         ratio, qualified = verdict(self.pairs) if self.pairs else (math.inf, False)
-        facts = Facts(
+        return Facts(
             algorithm=self.training.algorithm,
             seed=self.training.seed,
             steps=self.model.num_timesteps,
@@ -167,12 +168,12 @@ class Run:
             needs=self._needs,
             residual_of=self.training.residual_of,
             residual_share=self.training.residual_share,
+            washout=self.training.washout,
             ratio=ratio if math.isfinite(ratio) else None,
             qualified=qualified,
             activation=actor.activation,
             squashed=actor.squashed,
         )
-        write_model(path, self.model, actor, facts, replay)
 
 
 @contextmanager
