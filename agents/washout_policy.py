@@ -32,9 +32,10 @@ class Washout:
 
     def __call__(self, actions: NDArray[np.floating]) -> NDArray[np.float64]:
         """What is left of actions in -1..1, likewise in -1..1; it moves the averages."""
-        left: NDArray[np.float64] = actions - self._average
+        left: NDArray[np.float64] = np.clip(actions - self._average, -1.0, 1.0)
+        # By what comes out, not by what went in: limited more on one side, it would have a mean.
         self._average += self._share * left
-        return np.clip(left, -1.0, 1.0)
+        return left
 
 
 class WashedOut:
