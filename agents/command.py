@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +18,7 @@ from panto_env.base.errors import InputError
 from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
-from panto_env.terminal import Json, Plot, console, number, print_json, progress_console
+from panto_env.terminal import Json, Plot, console, number, print_json, progress_console, writable
 
 if TYPE_CHECKING:
     from .evaluation import Pair
@@ -67,7 +69,7 @@ def train(
         from .model_file import read_model
         from .train import train as run
     try:
-        paths = run(training, folder, resume=resume)
+        paths = run(training, folder, resume=resume, command=shlex.join(["panto", *sys.argv[1:]]))
     except KeyboardInterrupt as error:
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({folder}).")
         raise typer.Exit(130) from error
@@ -84,6 +86,19 @@ def train(
         note = "" if report[f"{name}_qualified"] else ", F_m out of range: disqualified"
         console.print(f"{label} (step {steps_learnt}): {report[name]}: {change}{note}", soft_wrap=True)
     console.print(f"panto evaluate {report['best']}", soft_wrap=True)
+
+
+def export(
+    model: Annotated[Path, typer.Argument(help="Model file that `panto train` wrote.")],
+    output: Annotated[str, typer.Argument(help="Model file to write (.zip).", callback=writable((".zip",)))],
+) -> None:
+    """Write a model file for others: what a policy needs, arrays and JSON, and nothing that is pickled.
+
+    It is a policy as it was; it cannot be trained further.
+    """
+    from .model_file import export_model
+
+    export_model(model, Path(output))
 
 
 @with_settings(

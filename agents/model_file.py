@@ -70,6 +70,8 @@ class Facts(Settings):
 
     format: Literal[2] = 2
     version: str = __version__  # of panto_env
+    commit: str | None = None  # of the checkout that it was trained with
+    command: str | None = None  # that trained it
     algorithm: str
     seed: int
     steps: int  # environment steps that it has learnt from
@@ -98,6 +100,17 @@ def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool
                 arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY_ARRAYS}
                 arrays["position"] = np.array([buffer.pos, buffer.full])
                 _write_arrays(archive, REPLAY, arrays)
+
+
+def export_model(source: Path, target: Path) -> None:
+    """Write the parts of a model file that a policy needs, facts and arrays, and nothing that is pickled.
+
+    Raises InputError, naming the file, where ``source`` is damaged or ``target`` cannot be written.
+    """
+    facts, actor = read_model(source)
+    with write_whole(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(FACTS, facts.model_dump_json(indent=1))
+        _write_arrays(archive, ACTOR, _arrays_of(actor))
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:

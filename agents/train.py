@@ -13,6 +13,7 @@ from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 
 from panto_baselines.benchmark.seeds import SELECTION, check_seeds
+from panto_env.base.version import commit
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 
@@ -30,20 +31,25 @@ LOGGED_FIGURES = ("mean", "std", "contact_loss", "cost_function")
 
 
 def train(
-    training: Training, output: str | Path, *, resume: bool = False, progress: bool = True
+    training: Training,
+    output: str | Path,
+    *,
+    resume: bool = False,
+    progress: bool = True,
+    command: str | None = None,
 ) -> RunFolder:
     """Train a model into the folder ``output``; returns the folder's paths.
 
     resume: continue from the newest undamaged checkpoint of the run in ``output`` (from the beginning,
     if there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
     episodes are not, so a resumed run is as good as an uninterrupted one, but not identical to it.
-    progress: show a bar on stderr. Raises InputError where the run exists already (or, with ``resume``,
-    does not exist) or has other settings.
+    progress: show a bar on stderr. command: to be noted in the model files. Raises InputError where the run
+    exists already (or, with ``resume``, does not exist) or has other settings.
     """
     with _torch_on_one_thread(), ExitStack() as stack:
         lanes = make_lanes(training)
         stack.callback(lanes.close)
-        run = Run(training, RunFolder(output), lanes)
+        run = Run(training, RunFolder(output), lanes, command)
         if resume:
             run.folder.resume(training)
             run.restore()
@@ -57,9 +63,9 @@ def train(
 class Run:
     """A learner and its folder, and what happens with both between two rollouts."""
 
-    def __init__(self, training: Training, folder: RunFolder, lanes: Any) -> None:
-        """lanes: ``VecEnv`` to learn from."""
-        self.training, self.folder = training, folder
+    def __init__(self, training: Training, folder: RunFolder, lanes: Any, command: str | None = None) -> None:
+        """lanes: ``VecEnv`` to learn from. command: to be noted in the model files."""
+        self.training, self.folder, self._command = training, folder, command
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation
         self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
@@ -160,6 +166,8 @@ class Run:
     def _facts(self, actor: Any) -> Facts:
         ratio, qualified = verdict(self.pairs) if self.pairs else (math.inf, False)
         return Facts(
+            commit=commit(),
+            command=self._command,
             algorithm=self.training.algorithm,
             seed=self.training.seed,
             steps=self.model.num_timesteps,

@@ -1,0 +1,127 @@
+"""An agent whose action has no slow part, in lanes and as a policy."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from typer.testing import CliRunner
+
+from panto_agents import train
+from panto_agents.model_file import export_model, read_model
+from panto_agents.policy import TrainedPolicy, load
+from panto_agents.washout_policy import Washout
+from panto_env import InputError, simulate
+from panto_env.cli import make_app
+
+from .test_agents import LINE, settings
+
+INTERVAL = 0.01  # s
+
+
+def constant(model, value, facts=None):
+    """A model file's policy, its network answering a constant; with other facts if some are given."""
+    own, actor = read_model(model)
+    last = np.zeros_like(actor.weights[-1]), np.full_like(actor.biases[-1], value)
+    actor = replace(actor, weights=(*actor.weights[:-1], last[0]), biases=(*actor.biases[:-1], last[1]))
+    return TrainedPolicy(model, facts or own, actor)
+
+
+@pytest.fixture(scope="module", params=[None, "fb+ff"])
+def washed(request, tmp_path_factory):
+    """A finished training whose agent has a washout, alone or added to a policy; read only."""
+    training = settings("ppo", washout=0.5, residual_of=request.param)
+    return train.train(
+        training, tmp_path_factory.mktemp("runs") / "washed", progress=False, command="panto train it"
+    )
+
+
+def test_it_is_the_filter_of_its_equation():
+    from scipy.signal import lfilter
+
+    actions = 0.3 * np.random.default_rng(0).standard_normal((400, 2)).clip(-1, 1)
+    washout = Washout(INTERVAL, 0.5, (2,))
+    ours = np.array([washout(each) for each in actions])
+    pole = np.exp(-INTERVAL / 0.5)
+    np.testing.assert_allclose(ours, lfilter([1.0, -1.0], [1.0, -pole], actions, axis=0), atol=1e-12)
+
+
+def test_no_mean_is_left_where_the_limit_cuts_one_side():
+    washout = Washout(INTERVAL, 0.5, (1,))
+    peaks = np.array([1.0, -0.2, -0.3, -0.2])  # 0.075 on average, whose highest is cut once the mean is off
+    actions = np.concatenate([np.ones(200), np.tile(peaks, 2000)])
+    left = np.array([washout(np.array([each])) for each in actions])[-4000:]
+    assert np.abs(left).max() <= 1.0
+    assert abs(left.mean()) < 1e-3
+
+
+def test_a_constant_action_leaves_the_mean_force_alone(washed):
+    given = settings("ppo").arguments | {"distance": 600.0}
+    base = read_model(washed.model)[0].residual_of or "passive"
+    pressed, nothing = (
+        simulate(**given, policy=policy, seed=3).summary() for policy in (constant(washed.model, 0.3), base)
+    )
+    assert abs(pressed.mean / nothing.mean - 1) < 0.003
+    facts, _ = read_model(washed.model)
+    without = constant(washed.model, 0.3, facts.model_copy(update={"washout": None}))
+    assert simulate(**given, policy=without, seed=3).summary().mean > 1.02 * nothing.mean
+
+
+def test_lanes_do_as_the_policy_does(washed):
+    """Two episodes of a training lane under the trained network are the policy's, bit for bit."""
+    import gymnasium
+
+    facts, actor = read_model(washed.model)
+    training = settings("ppo", washout=0.5, residual_of=facts.residual_of)
+    lanes, policy = train.make_lanes(training), load(washed.model)
+    lanes.seed(2000)
+    seen = lanes.reset()
+    arguments = {key: value for key, value in LINE.items() if key != "id"}
+    single = gymnasium.make(f"panto_env:{LINE['id']}", **arguments)
+    observation, _ = single.reset(seed=2001)
+    policy.reset(single.unwrapped.context)
+    ends = 0
+    for _ in range(150):
+        np.testing.assert_array_equal(seen[1], observation)
+        seen, *_ = lanes.step(np.array([actor.act(each) for each in seen]))
+        observation, _, terminated, truncated, _ = single.step(policy.act(observation))
+        if terminated or truncated:
+            observation, _ = single.reset()
+            policy.reset(single.unwrapped.context)
+            ends += 1
+    assert ends == 1
+
+
+def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, tmp_path):
+    target = tmp_path / "mine.zip"
+    result = CliRunner().invoke(make_app(), ["export", str(washed.best), str(target)])
+    assert result.exit_code == 0, result.output
+    with zipfile.ZipFile(target) as archive:
+        assert sorted(archive.namelist()) == ["actor.npz", "panto.json"]
+    facts, actor = read_model(target)
+    before, same = read_model(washed.best)
+    assert facts == before
+    assert facts.command == "panto train it"
+    for ours, theirs in zip((*actor.weights, *actor.biases), (*same.weights, *same.biases), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    given = settings("ppo").arguments
+    forces = [simulate(**given, policy=str(path)).contact_force for path in (target, washed.best)]
+    np.testing.assert_array_equal(*forces)
+
+
+def test_a_damaged_model_is_not_exported(washed, tmp_path):
+    damaged = tmp_path / "damaged.zip"
+    damaged.write_bytes(washed.best.read_bytes()[:-200])
+    with pytest.raises(InputError, match="not a whole model file"):
+        export_model(damaged, tmp_path / "out.zip")
+    assert not (tmp_path / "out.zip").exists()
+
+
+def test_its_time_constant_is_positive():
+    with pytest.raises(InputError, match="washout"):
+        settings("ppo", washout=0.0)
