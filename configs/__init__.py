@@ -1,4 +1,4 @@
-"""Trainings, benchmarks and oracles of the project; commands take them by name, any file by its path."""
+"""Trainings, benchmarks and more that come with the project; commands take them by name, files by path."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
 
 FOLDER = Path(__file__).parent
-Kind = Literal["training", "benchmark", "oracle"]
-KINDS: dict[Kind, str] = {"training": "algorithm", "benchmark": "lines", "oracle": "cells"}
+Kind = Literal["training", "benchmark", "oracle", "ablation"]
+KINDS: dict[Kind, str] = {
+    "training": "algorithm",
+    "benchmark": "lines",
+    "oracle": "cells",
+    "ablation": "variants",
+}
 """A key that every file of a kind has."""
 
 

@@ -1,0 +1,111 @@
+"""What each part of an agent is worth: the same training without it, or with another, under several seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from panto_baselines.benchmark.run import Benchmark
+from panto_baselines.benchmark.run import run as run_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_configs import find
+from panto_env.analysis.pool import Progress, in_processes
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.settings import Settings, parse
+
+from .algorithm import Count
+from .run_folder import RunFolder
+from .settings import Training, parse_training
+
+REFERENCE = "as it is"
+"""The variant that nothing is changed in."""
+
+
+class Ablation(Settings):
+    """A training and its variants."""
+
+    training: str = Field(description="name or path of the training that is varied")
+    total_steps: Count = Field(description="environment steps of each run")
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
+        min_length=2, description="of the runs of each variant"
+    )
+    judged_by: str = Field(description="name or path of the benchmark that compares the runs' best models")
+    judged_on: Count = Field(description="number of the benchmark's seeds")
+    variants: dict[str, dict[str, Any]] = Field(
+        min_length=1,
+        description="by name: settings of the training that are changed, in tables as there; a value of "
+        '"default" takes a setting out',
+    )
+
+    def trainings(self) -> dict[tuple[str, int], Training]:
+        """Trainings by variant and seed. Raises InputError, naming the variant, where one is not valid."""
+        base = read_toml(find(self.training, "training"))
+        made = {}
+        as_it_is: dict[str, dict[str, Any]] = {REFERENCE: {}}
+        for name, changes in (as_it_is | self.variants).items():
+            varied = _changed(base, changes)
+            for seed in self.seeds:
+                table = varied | {"seed": seed, "total_steps": self.total_steps}
+                made[name, seed] = parse_training(table, f"The variant '{name}'")
+        return made
+
+    def benchmark(self, models: Mapping[tuple[str, int], Path]) -> BenchmarkSettings:
+        """Settings of the benchmark of the models."""
+        settings = load_benchmark(self.judged_by).model_dump()
+        settings |= {"policies": [str(path) for path in models.values()], "seeds": self.judged_on}
+        return parse(BenchmarkSettings, settings, self.judged_by)
+
+
+def load_ablation(source: str | Path) -> Ablation:
+    """Read an ablation from a TOML file, given by its path or by a name of ``configs/``.
+
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    """
+    ablation = parse(Ablation, read_toml(find(source, "ablation")), str(source))
+    if REFERENCE in ablation.variants:
+        raise InputError(f"{source}: '{REFERENCE}' is the training itself; give the variant another name.")
+    ablation.trainings()
+    return ablation
+
+
+def run(
+    ablation: Ablation, output: Path, workers: int | None = None, progress: Progress | None = None
+) -> tuple[dict[tuple[str, int], Path], Benchmark]:
+    """Train every variant under every seed, each into a folder of its own, and compare the best models.
+
+    Runs that ``output`` holds already are not repeated, and one that was broken off goes on: the same call
+    again finishes what was begun. Returns each run's best model, and the benchmark of all.
+    """
+    folders = {(name, seed): _folder(output, name, seed) for name, seed in ablation.trainings()}
+    jobs = [partial(_train, training, folders[key]) for key, training in ablation.trainings().items()]
+    in_processes(jobs, workers=workers, progress=progress)
+    models = {key: RunFolder(folder).best for key, folder in folders.items()}
+    return models, run_benchmark(ablation.benchmark(models), workers)
+
+
+def _folder(output: Path, name: str, seed: int) -> Path:
+    return output / name.replace(" ", "-") / f"seed{seed}"
+
+
+def _train(training: Training, folder: Path) -> None:
+    from .train import train  # slow to import
+
+    train(training, folder, resume=RunFolder(folder).settings.is_file(), progress=False)
+
+
+def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with changes, tables within it changed likewise."""
+    made = dict(table)
+    for key, value in changes.items():
+        if value == "default":
+            made.pop(key, None)
+        elif isinstance(value, Mapping):
+            made[key] = _changed(table.get(key, {}), value)
+        else:
+            made[key] = value
+    return made

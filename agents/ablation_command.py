@@ -1,0 +1,36 @@
+"""The command `panto ablation`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from panto_env.base.files import finite
+from panto_env.terminal import Json, console, counting, print_json
+
+
+def ablation(
+    config: Annotated[Path, typer.Argument(help="Ablation: a TOML file, or a name such as ablation.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    json: Json = False,
+) -> None:
+    """Train an agent with and without each of its parts, under several seeds, and compare the models."""
+    from .ablation import load_ablation, run
+    from .ablation_table import table, variants
+
+    settings = load_ablation(config)
+    with counting("trainings") as progress:
+        models, outcome = run(settings, output or Path("runs") / config.stem, workers, progress)
+    found = variants(models, outcome)
+    if json:
+        rows = [asdict(each) for each in found]
+        print_json(finite({"settings": settings.model_dump(mode="json"), "variants": rows}))
+        return
+    console.print(table(found, f"{settings.training}, {settings.total_steps:,} steps, {settings.judged_by}"))
