@@ -32,7 +32,7 @@ def make_lanes(training: Training) -> Any:
         base = PolicyLanes(training.residual_of, native.task)
         lanes = ResidualVecEnv(lanes, base, training.residual_share)
     if training.washout is not None:
-        lanes = WashoutVecEnv(lanes, native.task.context(0).control_interval, training.washout)
+        lanes = WashoutVecEnv(lanes, native.task.context(0), training.washout)
     return VecMonitor(lanes)
 
 

@@ -17,9 +17,10 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ValidationError
 
+from panto_baselines.policies.washout import WashoutSettings
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_whole
-from panto_env.base.settings import Positive, Settings
+from panto_env.base.settings import Settings
 from panto_env.base.version import __version__
 from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
@@ -80,7 +81,7 @@ class Facts(Settings):
     needs: Needs
     residual_of: str | None = None  # policy that its action is added to
     residual_share: float = 1.0  # to which share
-    washout: Positive | None = None  # time constant (s) of the average that is taken off its action
+    washout: WashoutSettings | None = None  # the slow average that is taken off its action
     ratio: float | None = None  # when last evaluated: mean of sigma over that of the passive pantograph
     qualified: bool = False  # when last evaluated: whether the mean force kept within its range
     activation: Literal["tanh", "relu"]

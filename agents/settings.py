@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
+from panto_baselines.policies.washout import WashoutSettings
 from panto_configs import find
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
@@ -60,8 +61,8 @@ class Training(Settings):
     residual_share: Share = Field(
         0.3, description="of the actuator's force limit that the agent may add to that policy's action"
     )
-    washout: Positive | None = Field(
-        None, description="time constant (s) of the slow average that is taken off the agent's action, if any"
+    washout: WashoutSettings | None = Field(
+        None, description="the slow average that is taken off the agent's action, if any"
     )
     hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
 

@@ -8,16 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from .washout_policy import Washout
+from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_env.control.context import Context
 
 
 class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
     """Lanes that act on what is left of an agent's actions without their slow averages."""
 
-    def __init__(self, lanes: VecEnv, interval: float, time_constant: float) -> None:
-        """interval: of control (s); time_constant: of the averages (s)."""
+    def __init__(self, lanes: VecEnv, context: Context, settings: WashoutSettings) -> None:
+        """context: of any of the lanes."""
         super().__init__(lanes)
-        self._washout = Washout(interval, time_constant, (lanes.num_envs, *lanes.action_space.shape))
+        self._limit = context.force_limit
+        shape = (lanes.num_envs, *lanes.action_space.shape)
+        self._washout = Washout(settings, context.control_interval, self._limit, shape)
 
     def reset(self) -> NDArray[np.float32]:
         """Start episodes in all lanes."""
@@ -27,7 +30,7 @@ class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep what is left of these actions, (lanes, actions), for ``step_wait``."""
-        self.venv.step_async(self._washout(actions))
+        self.venv.step_async(self._washout(actions.astype(np.float64) * self._limit) / self._limit)
 
     def step_wait(self) -> Any:
         """Step all lanes: observations, rewards, dones and one info per lane."""

@@ -124,8 +124,13 @@ def test_a_line_without_wires_is_refused() -> None:
 # --- repetitive control ----------------------------------------------------------------------------
 
 
-def repeated(policy: Repetitive, spans: int, sign: float = 1.0) -> tuple[Array, Array]:
-    """Sigma of each span of the model, under a force that repeats with the span, with and without control."""
+def repeated(
+    policy: Repetitive, spans: int, sign: float = 1.0, blind: bool = False, speed_error: float = 0.0
+) -> tuple[Array, Array]:
+    """Sigma of each span of the model, under a force that repeats with the span, with and without control.
+
+    blind: the place is not told. speed_error: share by which the speed is read too high.
+    """
     context = CONTEXT
     rate = context.speed / context.span_length * context.control_interval
     sampled = MODEL.sampled(context.control_interval)
@@ -140,9 +145,9 @@ def repeated(policy: Repetitive, spans: int, sign: float = 1.0) -> tuple[Array, 
         observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
         values = {
             "contact force": contact,
-            "sine of span position": np.sin(angle),
-            "cosine of span position": np.cos(angle),
-            "speed": context.speed,
+            "sine of span position": 0.0 if blind else np.sin(angle),
+            "cosine of span position": 0.0 if blind else np.cos(angle),
+            "speed": context.speed * (1 + speed_error),
         }
         for name, value in values.items():
             observation[0, entry(name)] = value / context.layout.entries[entry(name)].scale
@@ -161,6 +166,17 @@ def test_repetitive_control_learns_a_force_that_repeats_to_near_zero() -> None:
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.0, 0.05)), 25)
     assert controlled[: int(LISTENING) - 1] == pytest.approx(passive[: int(LISTENING) - 1], rel=1e-6)
     assert controlled[-1] < 0.05 * passive[-1]
+
+
+@pytest.mark.parametrize(("speed_error", "left"), [(0.0, 0.05), (0.005, 0.2)])
+def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_little_wrong(
+    speed_error: float, left: float
+) -> None:
+    policy = Repetitive(gains=(0.5, 0.0, 0.05), place="counted")
+    controlled, passive = repeated(policy, 25, blind=True, speed_error=speed_error)
+    assert controlled[-1] < left * passive[-1]
+    with pytest.raises(InputError, match="needs the place within the span"):
+        repeated(Repetitive(), 5, blind=True)
 
 
 def test_repetitive_control_backs_off_where_its_model_is_wrong() -> None:
@@ -295,6 +311,7 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
         ("lqg:gains=()", "gains must be finite numbers"),
         ("skyhook:gains=(1,1e999)", "gains must be finite numbers"),
         ("repetitive:gian=1", "gian"),
+        ("repetitive:place='guessed'", "place must be one of read, counted"),
     ],
 )
 def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:

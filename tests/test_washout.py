@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from panto_agents import train
 from panto_agents.model_file import export_model, read_model
 from panto_agents.policy import TrainedPolicy, load
-from panto_agents.washout_policy import Washout
+from panto_baselines.policies.washout import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 
@@ -35,7 +35,7 @@ def constant(model, value, facts=None):
 @pytest.fixture(scope="module", params=[None, "fb+ff"])
 def washed(request, tmp_path_factory):
     """A finished training whose agent has a washout, alone or added to a policy; read only."""
-    training = settings("ppo", washout=0.5, residual_of=request.param)
+    training = settings("ppo", washout={"time_constant": 0.5}, residual_of=request.param)
     return train.train(
         training, tmp_path_factory.mktemp("runs") / "washed", progress=False, command="panto train it"
     )
@@ -44,20 +44,28 @@ def washed(request, tmp_path_factory):
 def test_it_is_the_filter_of_its_equation():
     from scipy.signal import lfilter
 
-    actions = 0.3 * np.random.default_rng(0).standard_normal((400, 2)).clip(-1, 1)
-    washout = Washout(INTERVAL, 0.5, (2,))
-    ours = np.array([washout(each) for each in actions])
+    at_once = WashoutSettings(time_constant=0.5, lag=0.0, rate=1e9)
+    forces = 20 * np.random.default_rng(0).standard_normal((400, 2))
+    washout = Washout(at_once, INTERVAL, 100.0, (2,))
+    ours = np.array([washout(each) for each in forces])
     pole = np.exp(-INTERVAL / 0.5)
-    np.testing.assert_allclose(ours, lfilter([1.0, -1.0], [1.0, -pole], actions, axis=0), atol=1e-12)
+    np.testing.assert_allclose(ours, lfilter([1.0, -1.0], [1.0, -pole], forces, axis=0), atol=1e-10)
 
 
-def test_no_mean_is_left_where_the_limit_cuts_one_side():
-    washout = Washout(INTERVAL, 0.5, (1,))
-    peaks = np.array([1.0, -0.2, -0.3, -0.2])  # 0.075 on average, whose highest is cut once the mean is off
-    actions = np.concatenate([np.ones(200), np.tile(peaks, 2000)])
-    left = np.array([washout(np.array([each])) for each in actions])[-4000:]
-    assert np.abs(left).max() <= 1.0
-    assert abs(left.mean()) < 1e-3
+@pytest.mark.parametrize("rate", [1e9, 2500.0])
+def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side(rate):
+    """A pulse of 120 N for a quarter of the time, which limits of force and rate cut, and nothing between."""
+    washout = Washout(WashoutSettings(time_constant=0.5, rate=rate), INTERVAL, 100.0, (1,))
+    pulses = np.tile([120.0, 120.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1000)
+    left = np.array([washout(np.array([each])) for each in pulses])[:, 0]
+    assert np.abs(left).max() <= 100.0
+    force, forces, step = 0.0, [], 1e-4
+    for each in np.repeat(left, round(INTERVAL / step)):  # the actuator, in finer steps
+        force += step * np.clip((each - force) / 0.015, -rate, rate)
+        forces.append(force)
+    settled = np.array(forces[-round(40 / step) :])
+    assert settled.std() > 10
+    assert abs(settled.mean()) < 0.01 * settled.std()
 
 
 def test_a_constant_action_leaves_the_mean_force_alone(washed):
@@ -77,7 +85,7 @@ def test_lanes_do_as_the_policy_does(washed):
     import gymnasium
 
     facts, actor = read_model(washed.model)
-    training = settings("ppo", washout=0.5, residual_of=facts.residual_of)
+    training = settings("ppo", washout={"time_constant": 0.5}, residual_of=facts.residual_of)
     lanes, policy = train.make_lanes(training), load(washed.model)
     lanes.seed(2000)
     seen = lanes.reset()
@@ -124,4 +132,4 @@ def test_a_damaged_model_is_not_exported(washed, tmp_path):
 
 def test_its_time_constant_is_positive():
     with pytest.raises(InputError, match="washout"):
-        settings("ppo", washout=0.0)
+        settings("ppo", washout={"time_constant": 0.0})

@@ -61,8 +61,8 @@ class LanesLaw(ABC):
         cosine = self.read(observations, "cosine of span position")
         if (sine**2 + cosine**2 < 0.5).any():
             raise InputError(
-                "It needs the place within the span, which these sensors do not tell; take skyhook or "
-                "h-infinity."
+                "It needs the place within the span, which these sensors do not tell; take skyhook, "
+                "h-infinity, or repetitive:place='counted'."
             )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.span_length
         angle: Array = np.arctan2(sine, cosine) + ahead

@@ -24,6 +24,8 @@ from panto_env.plant.pantograph.build import STRIP_STIFFNESS, matrices
 Array = NDArray[np.float64]
 DELAY, LAG = 0.010, 0.015
 """Of actuator and sensors together, and of the actuator (s): those of the presets "realistic"."""
+RATE = 2500.0
+"""N/s: limit of the actuator's rate, likewise."""
 SHORTEST_LAG = 1e-3
 """A lag below this (s) is taken for this: it matters to nobody at 100 Hz."""
 OUTPUTS = ("contact force", "head displacement", "frame displacement", "head velocity", "frame velocity")

@@ -11,15 +11,13 @@ from panto_env.control.context import Context
 
 from .gains import Source
 from .lanes_law import Array, FromAverage, Observations, TunableLaw
-from .line_model import DELAY, LAG
+from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 
 HORIZON = 30
 """Control steps looked ahead: 0.3 s, about a period of the frame under the wire."""
 LENGTH = 120
 """Control steps in which the answer to a command has died out."""
-RATE = 2500.0
-"""N/s: largest change of the command, that of the actuator "realistic"."""
 HELD = 0.4
 """Hz: below this the integral of the command costs more than a force of the command's size would."""
 TOLERANCE = 1e-3

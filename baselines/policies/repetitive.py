@@ -10,9 +10,10 @@ from panto_env.control.context import Context
 from .gains import Source
 from .lanes_law import Array, FromAverage, Observations, TunableLaw
 from .line_model import DELAY, LAG, line_model, mean_line
+from .washout import Washout, WashoutSettings
 
-HIGHEST = 8.0
-"""Hz: harmonics of the span up to this are learnt. Above, a force at the frame moves little."""
+HIGHEST = 16.0
+"""Hz: harmonics of the span up to this are learnt. Sigma counts up to 20 Hz."""
 LISTENING = 3.0
 """Spans without control at the start, of which the last two say what the passive sigma is about."""
 TOLERATED = 1.05
@@ -20,8 +21,17 @@ TOLERATED = 1.05
 BACK_OFF, RECOVERY = 0.5, 1.05
 """What is left of the learnt force, and of learning, after each span in which it backs off; by how much
 learning grows after any other, up to what it was."""
-GAINS = (0.5, 0.01, 0.4)
-"""Learning per span, forgetting per span, and the response (N/N) below which learning slows down."""
+PLACES = ("read", "counted")
+"""Where the place within the span comes from."""
+OVER = 1.5
+"""Times the actuator's limit that the learnt force may peak at: a little is gained by cutting it."""
+PEAKS = 128
+"""Places of a span at which the learnt force is looked at for its peak."""
+WASHED = WashoutSettings(time_constant=2.0)
+"""Of the force, whose mean the actuator's limits would let drift."""
+GAINS = (0.65, 0.01, 0.5)
+"""Learning per span, forgetting per span, and the response (N/N) below which learning slows down: the
+best of some on training seeds of four lines."""
 
 
 class Repetitive(TunableLaw):
@@ -40,17 +50,24 @@ class Repetitive(TunableLaw):
     sigma is above 1.05 times that of the first spans, or in which, by the model, the force would vary less
     without its own part.
 
-    It needs to know the pantograph, tension and mass of the wires (for the model), delays, and the place
-    within the span; nothing of droppers or stiffness along the span. It needs some spans to learn.
+    It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
+    spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
+    learn. Where no sensor tells the place, ``place="counted"`` goes by the speed that is read: what repeats
+    is learnt wherever the count begins, and learning follows the drift of a speed that is slightly wrong.
     """
 
-    def __init__(self, gains: Source = GAINS, delay: float = DELAY, lag: float = LAG) -> None:
+    def __init__(
+        self, gains: Source = GAINS, delay: float = DELAY, lag: float = LAG, place: str = PLACES[0]
+    ) -> None:
         """gains: (3,): learning (-), forgetting (-), response (N/N); or a file of gains by name or path.
 
-        delay of actuator and sensors together, lag of the actuator: s.
+        delay of actuator and sensors together, lag of the actuator: s. place: "read", or "counted" from the
+        speed.
         """
         super().__init__(gains)
-        self._delays = delay, lag
+        if place not in PLACES:
+            raise ValueError(f"place must be one of {', '.join(PLACES)}, not {place!r}")
+        self._delays, self._counts = (delay, lag), place == "counted"
 
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in so many lanes."""
@@ -67,13 +84,18 @@ class Repetitive(TunableLaw):
         self._state = np.zeros((self._sampled.size, lanes))
         self._learnt: NDArray[np.complex128] = np.zeros((lanes, len(self._numbers)), dtype=complex)
         self._from_average = FromAverage(context.control_interval, 1 / span_rate)
+        self._washout = Washout(WASHED, context.control_interval, context.force_limit, (lanes,))
+        self._counted, self._interval = np.zeros(lanes), context.control_interval
+        around = np.linspace(0, 2 * np.pi, PEAKS, endpoint=False)
+        self._around = np.exp(1j * np.multiply.outer(self._numbers, around))
         self._ledger, self._trust = _Ledger(lanes), np.ones(lanes)
         self._share = share
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         error = self._from_average(self.read(observations, "contact force"))
-        turns = np.exp(1j * np.multiply.outer(self.span_angle(observations), self._numbers))
+        angle = self._count(observations) if self._counts else self.span_angle(observations)
+        turns = np.exp(1j * np.multiply.outer(angle, self._numbers))
         free = error - self._sampled.c[0] @ self._state
         worse = self._ledger.add(error, free, self._share)
         if worse is not None:
@@ -83,10 +105,22 @@ class Repetitive(TunableLaw):
             self._learnt = self._kept * self._learnt - self._towards * (
                 (self._trust * error)[:, None] * np.conj(turns)
             )
-        limit = self.context.force_limit
-        force: Array = np.clip((self._learnt * turns).real.sum(axis=1), -limit, limit)
+            self._hold_within(OVER * self.context.force_limit)
+        force = self._washout((self._learnt * turns).real.sum(axis=1))
         self._state = self._sampled.a @ self._state + np.multiply.outer(self._sampled.b, force)
         return force
+
+    def _hold_within(self, limit: float) -> None:
+        """Scale down what has a higher peak than the actuator: else it would be learnt without end."""
+        if (np.abs(self._learnt).sum(axis=1) > limit).any():
+            peaks = np.abs((self._learnt @ self._around).real).max(axis=1)
+            self._learnt *= np.minimum(1.0, limit / np.maximum(peaks, limit))[:, None]
+
+    def _count(self, observations: Observations) -> Array:
+        """Angle of the place within a span, (lanes,), rad, counted from where the episode began."""
+        way = self.read(observations, "speed") * self._interval
+        self._counted = self._counted + 2 * np.pi * way / self.context.span_length
+        return self._counted
 
     @classmethod
     def gain_names(cls, context: Context) -> list[str]:
