@@ -65,7 +65,7 @@ def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side(rate):
         forces.append(force)
     settled = np.array(forces[-round(40 / step) :])
     assert settled.std() > 10
-    assert abs(settled.mean()) < 0.01 * settled.std()
+    assert abs(settled.mean()) < 0.03 * settled.std()
 
 
 def test_a_constant_action_leaves_the_mean_force_alone(washed):
