@@ -37,11 +37,15 @@ class RunFolder:
 
     def begin(self, training: Training) -> None:
         """Make the folder of a new run. Raises InputError where the folder holds something already."""
-        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+        self.check_new()
+        self._write_settings(training)
+
+    def check_new(self) -> None:
+        """Raise InputError where the folder holds something already."""
+        if self.path.exists() and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
             raise InputError(
                 f"{self.path} exists already; go on with it by --resume, or give another --output."
             )
-        self._write_settings(training)
 
     def resume(self, training: Training) -> None:
         """Check that the folder holds a run with these settings. Raises InputError where it does not."""
@@ -81,9 +85,11 @@ class RunFolder:
         return parse_training(table, str(self.settings))
 
     def _write_settings(self, training: Training) -> None:
-        make_folder(self.checkpoints)
+        # First of all, so that whatever a killed run leaves is either nothing or can be resumed.
+        make_folder(self.path)
         with write_whole(self.settings) as temporary:
             temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        make_folder(self.checkpoints)
 
     def note_cloning(self, policy: str, told: Any) -> None:
         """Write how far the agent is from the policy that it starts from (``CloningError``)."""
@@ -126,7 +132,7 @@ class RunFolder:
         self._write_rows(rows)
 
     def drop_evaluations_after(self, steps: int) -> None:
-        """Forget evaluations that a run resumed at ``steps`` will repeat."""
+        """Forget evaluations that a run resumed at ``steps`` will repeat; -1: all."""
         if self.evaluations.is_file():
             self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
 
@@ -143,6 +149,11 @@ class RunFolder:
         writer.writerows(rows)
         with write_whole(self.evaluations) as temporary:
             temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
+
+
+def _counts(path: Path) -> bool:
+    """Whether something in a folder is more than a file that a killed process was about to write."""
+    return not path.name.startswith(".")
 
 
 def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -61,7 +61,8 @@ class Run:
         """lanes: ``VecEnv`` to learn from."""
         self.training, self.folder = training, folder
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
-        self.pairs: list[Pair] = []  # of the last evaluation
+        self.pairs: list[Pair] = []  # of the last evaluation since the run was begun or resumed
+        self._verdict = (math.inf, False)  # of the last evaluation of all
         self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
@@ -73,14 +74,16 @@ class Run:
         """Load the newest undamaged checkpoint, if there is one."""
         newest = self.folder.newest_checkpoint()
         if newest is not None:
-            restore(newest, self.model)
+            facts = restore(newest, self.model)
+            self._verdict = (math.inf if facts.ratio is None else facts.ratio, facts.qualified)
             # Otherwise lanes and exploration would repeat the random numbers of the first part.
             self.model.set_random_seed(self.training.seed + self.model.num_timesteps)
             self._seed_lanes()
         if self.folder.best.is_file():
             facts, _ = read_model(self.folder.best)
             self._best_score = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
-        self.folder.drop_evaluations_after(self.model.num_timesteps)
+        # Without a checkpoint the run begins anew, with the evaluation of what it begins as.
+        self.folder.drop_evaluations_after(-1 if newest is None else self.model.num_timesteps)
 
     def _seed_lanes(self) -> None:
         """Give the lanes seeds that are for training: the learner would number them from its own."""
@@ -130,7 +133,7 @@ class Run:
         """Compare the policy with the passive pantograph; note it in table and log; keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
         self.pairs = self._comparison.run(self._policy())
-        ratio, qualified = verdict(self.pairs)
+        self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)
         for pair in self.pairs:
@@ -158,7 +161,7 @@ class Run:
         write_model(path, self.model, actor, self._facts(actor), replay)
 
     def _facts(self, actor: Any) -> Facts:
-        ratio, qualified = verdict(self.pairs) if self.pairs else (math.inf, False)
+        ratio, qualified = self._verdict
         return Facts(
             algorithm=self.training.algorithm,
             seed=self.training.seed,
