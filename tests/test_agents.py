@@ -23,7 +23,7 @@ pytest.importorskip("stable_baselines3")
 
 import stable_baselines3
 
-from panto_agents import command, train
+from panto_agents import command, packages, train
 from panto_agents.demonstrations import Demonstrations, returns
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
 from panto_agents.lanes import lane_seeds
@@ -384,7 +384,7 @@ class TestCommand:
         assert isinstance(unknown.exception, InputError)
 
     def test_says_what_is_missing(self, panto, config, monkeypatch):
-        monkeypatch.setattr(command, "find_spec", lambda name: None)
+        monkeypatch.setattr(packages, "find_spec", lambda name: None)
         result = panto("train", config)
         assert isinstance(result.exception, InputError)
         assert "panto-env[agents]" in str(result.exception)
