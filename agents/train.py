@@ -38,17 +38,20 @@ def train(
     if there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
     episodes are not, so a resumed run is as good as an uninterrupted one, but not identical to it.
     progress: show a bar on stderr. Raises InputError where the run exists already (or, with ``resume``,
-    does not exist) or has other settings.
+    does not exist), has other settings, or is being trained by another process.
     """
     with _torch_on_one_thread(), ExitStack() as stack:
         lanes = make_lanes(training)
         stack.callback(lanes.close)
         run = Run(training, RunFolder(output), lanes)
         if resume:
-            run.folder.resume(training)
-            run.restore()
+            run.folder.check_resumable(training)
         else:
-            run.folder.begin(training)
+            run.folder.check_new()
+        stack.enter_context(run.folder.alone())
+        run.folder.write_settings(training)
+        if resume:
+            run.restore()
         run.begin_with_policy()
         run.learn(stack, progress)
     return run.folder

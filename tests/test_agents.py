@@ -89,7 +89,7 @@ def weights(path: Path) -> list[np.ndarray]:
 
 class TestRun:
     def test_folder(self, finished):
-        names = sorted(path.name for path in finished.path.iterdir())
+        names = sorted(path.name for path in finished.path.iterdir() if path.name != ".lock")
         assert names == [
             "best.zip", "checkpoints", "evaluations.csv", "model.zip", "settings.json", "tensorboard",
         ]  # fmt: skip
@@ -505,7 +505,8 @@ class TestStart:
         cloning = {"steps": 10_000, "batch_size": 128}
         training = settings("ppo", environment=LINE | SEEING, start_from=linear, cloning=cloning)
         run = train.Run(training, RunFolder(tmp_path / "run"), train.make_lanes(training))
-        run.folder.begin(training)
+        run.folder.path.mkdir()
+        run.folder.write_settings(training)
         run.begin_with_policy()
         actor, (name, _, cls) = training.hyperparameters.actor(run.model), linear.rpartition(":")
         own, theirs = (

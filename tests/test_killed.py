@@ -122,6 +122,16 @@ def test_a_training_killed_while_its_folder_was_made_begins_anew(tmp_path):
     assert read_model(folder.model)[0].steps == 128
 
 
+def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
+    folder = train.train(settings(total_steps=128), tmp_path / "run", progress=False)
+    before = folder.model.read_bytes(), folder.settings.read_text()
+    with folder.alone(), pytest.raises(InputError, match="Another process trains into"):
+        train.train(settings(), folder.path, resume=True, progress=False)
+    assert (folder.model.read_bytes(), folder.settings.read_text()) == before
+    train.train(settings(), folder.path, resume=True, progress=False)
+    assert steps_evaluated(folder.path) == [128, 256, 384, 512]
+
+
 class TestTrainings:
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
         planned = {tmp_path / "one": settings(), tmp_path / "other": settings(seed=2)}
