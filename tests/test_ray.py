@@ -147,6 +147,24 @@ def test_a_benchmark_whose_worker_is_killed_is_that_of_processes(two_nodes, tmp_
     assert len(spread_out.rows) == 2 * 3 * 2
 
 
+def test_a_machine_that_dies_loses_no_job(tmp_path):
+    cluster = Cluster(initialize_head=True, head_node_args=NODE)
+    try:
+        doomed = cluster.add_node(**NODE)
+        jobs = [partial(node, tmp_path / "a"), partial(node, tmp_path / "b")]
+        jobs += [partial(later, 3.0, str(k)) for k in range(4)]
+
+        def kill_after_two(done, count):
+            if done == 2:
+                cluster.remove_node(doomed, allow_graceful=False)
+
+        results = spread(jobs, ray=cluster.address, progress=kill_after_two)
+    finally:
+        cluster.shutdown()
+    assert results[0] != results[1]  # both machines had begun to work
+    assert results[2:] == ["0", "1", "2", "3"]
+
+
 def test_gains_are_those_that_processes_find(two_nodes):
     settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
     given = {"speeds_kmh": (250.0, 300.0), "seeds": 1, "passes": 40}
