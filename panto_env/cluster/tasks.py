@@ -19,6 +19,8 @@ LOCAL = "local"
 """The address of a cluster of this machine alone, which is started for the jobs and ends with them."""
 RETRIES = 5
 """How often a job is run again whose worker or machine died."""
+PATIENCE = 10.0
+"""Seconds within which the head of a cluster must answer."""
 OBJECT_STORE = 256 * 2**20
 """Bytes of shared memory of a local cluster: results are small, Ray would take a third of all memory."""
 
@@ -102,6 +104,9 @@ def _connected(ray: Any, address: str) -> Iterator[None]:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         settings |= {"num_cpus": cores(), "include_dashboard": False, "object_store_memory": OBJECT_STORE}
     try:
+        host, colon, port = address.rpartition(":")
+        if colon and port.isdigit() and "/" not in host:  # otherwise Ray itself tries for many minutes
+            socket.create_connection((host, int(port)), PATIENCE).close()
         ray.init(address=address, **settings)
     except (ImportError, OSError, RuntimeError, ValueError) as error:  # a ConnectionError is an OSError
         raise InputError(
