@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs coverage mutants same nonsense oldest ptx rllib libraries clean
+.PHONY: demo test lint proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -75,7 +75,15 @@ ptx:
 	  nvidia-nvvm==13.5.37 nvidia-cuda-cccl==13.3.5.0.6 pytest --editable .
 	$(PTX)/bin/pytest tests/test_ptx.py
 
-# RLlib on the native vector environment: Ray is large and pins a Gymnasium of its own.
+# Benchmark, tuning and trainings on a Ray cluster of two nodes, which both are this machine.
+RAY := .venv-ray
+ray:
+	$(PYTHON) -m venv $(RAY)
+	$(RAY)/bin/pip install -qq --constraint constraints.txt torch
+	$(RAY)/bin/pip install -qq --constraint constraints.txt pytest --editable '.[agents,ray]'
+	$(RAY)/bin/pytest tests/test_ray.py
+
+# RLlib trains on the native vector environment; it pins a Gymnasium of its own.
 RLLIB := .venv-rllib
 rllib:
 	$(PYTHON) -m venv $(RLLIB)
@@ -94,4 +102,4 @@ libraries:
 	$(LIBRARIES)/bin/pytest tests/test_libraries.py
 
 clean:
-	rm -rf $(VENV) $(OLDEST) $(PTX) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

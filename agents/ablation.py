@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +12,7 @@ from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_configs import find
-from panto_env.analysis.pool import Progress, in_processes
+from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
@@ -21,6 +20,7 @@ from panto_env.base.settings import Settings, parse
 from .algorithm import Count
 from .run_folder import RunFolder
 from .settings import Training, parse_training
+from .trainings import train_all
 
 REFERENCE = "as it is"
 """The variant that nothing is changed in."""
@@ -74,28 +74,28 @@ def load_ablation(source: str | Path) -> Ablation:
 
 
 def run(
-    ablation: Ablation, output: Path, workers: int | None = None, progress: Progress | None = None
+    ablation: Ablation,
+    output: Path,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+    command: str | None = None,
 ) -> tuple[dict[tuple[str, int], Path], Benchmark]:
     """Train every variant under every seed, each into a folder of its own, and compare the best models.
 
     Runs that ``output`` holds already are not repeated, and one that was broken off goes on: the same call
-    again finishes what was begun. Returns each run's best model, and the benchmark of all.
+    again finishes what was begun. workers, ray, command: as ``train_all`` takes them. Returns each run's best
+    model, and the benchmark of all.
     """
     folders = {(name, seed): _folder(output, name, seed) for name, seed in ablation.trainings()}
-    jobs = [partial(_train, training, folders[key]) for key, training in ablation.trainings().items()]
-    in_processes(jobs, workers=workers, progress=progress)
+    trainings = {folders[key]: training for key, training in ablation.trainings().items()}
+    train_all(trainings, resume=True, workers=workers, ray=ray, progress=progress, command=command)
     models = {key: RunFolder(folder).best for key, folder in folders.items()}
-    return models, run_benchmark(ablation.benchmark(models), workers)
+    return models, run_benchmark(ablation.benchmark(models), workers, ray=ray)
 
 
 def _folder(output: Path, name: str, seed: int) -> Path:
     return output / name.replace(" ", "-") / f"seed{seed}"
-
-
-def _train(training: Training, folder: Path) -> None:
-    from .train import train  # slow to import
-
-    train(training, folder, resume=RunFolder(folder).settings.is_file(), progress=False)
 
 
 def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

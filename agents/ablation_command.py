@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +11,10 @@ from typing import Annotated
 import typer
 
 from panto_env.base.files import finite
+from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, console, counting, print_json
+
+from .packages import check_packages
 
 
 def ablation(
@@ -19,15 +24,18 @@ def ablation(
         typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    ray: RayAddress = None,
     json: Json = False,
 ) -> None:
     """Train an agent with and without each of its parts, under several seeds, and compare the models."""
+    check_packages()
     from .ablation import load_ablation, run
     from .ablation_table import table, variants
 
     settings = load_ablation(config)
     with counting("trainings") as progress:
-        models, outcome = run(settings, output or Path("runs") / config.stem, workers, progress)
+        folder, command = output or Path("runs") / config.stem, shlex.join(["panto", *sys.argv[1:]])
+        models, outcome = run(settings, folder, workers, ray, progress, command)
     found = variants(models, outcome)
     if json:
         rows = [asdict(each) for each in found]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,16 +13,16 @@ from rich.table import Table
 
 from panto_env.analysis.options import with_settings
 from panto_env.analysis.requirements import print_criteria
-from panto_env.base.errors import InputError
 from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.terminal import Json, Plot, console, number, print_json, progress_console, writable
 
+from .packages import check_packages
+
 if TYPE_CHECKING:
     from .evaluation import Pair
 
-REQUIRED_PACKAGES = ("torch", "stable_baselines3", "tensorboard")
 ROWS = (
     "mean",
     "std",
@@ -55,16 +54,12 @@ def train(
     json: Json = False,
 ) -> None:
     """Train a model; the benchmark takes its file as a policy."""
-    missing = [name for name in REQUIRED_PACKAGES if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"Training needs {', '.join(missing)}, which is not installed; install panto-env with its "
-            "extra: pip install 'panto-env[agents]'."
-        )
+    check_packages()
     from .settings import load_training
+    from .trainings import run_name
 
     training = load_training(config, seed=seed, total_steps=steps)
-    folder = output or Path("runs") / f"{config.stem}-{training.algorithm}-seed{training.seed}"
+    folder = output or Path("runs") / run_name(config, training)
     with progress_console.status("loading torch"):
         from .model_file import read_model
         from .train import train as run

@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
@@ -35,16 +38,15 @@ class RunFolder:
         self.tensorboard = self.path / "tensorboard"
         self.checkpoints = self.path / "checkpoints"
 
-    def begin(self, training: Training) -> None:
-        """Make the folder of a new run. Raises InputError where the folder holds something already."""
-        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+    def check_new(self) -> None:
+        """Raise InputError where the folder holds something already."""
+        if self.path.exists() and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
             raise InputError(
                 f"{self.path} exists already; go on with it by --resume, or give another --output."
             )
-        self._write_settings(training)
 
-    def resume(self, training: Training) -> None:
-        """Check that the folder holds a run with these settings. Raises InputError where it does not."""
+    def check_resumable(self, training: Training) -> None:
+        """Raise InputError unless the folder holds a run with these settings, but for more steps."""
         if not self.settings.is_file():
             raise InputError(
                 f"{self.path} holds no run to resume (no {self.settings.name}); train without --resume."
@@ -66,7 +68,27 @@ class RunFolder:
                 f"The run in {self.path} has total_steps = {before.total_steps}; a resumed run may have "
                 f"more, but not fewer ({training.total_steps})."
             )
-        self._write_settings(training)
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Within the body no other process trains into the folder, as far as files can be locked there.
+
+        The system opens the lock of a process that is killed. Raises InputError where another one holds it.
+        """
+        make_folder(self.path)
+        lock = FileLock(self.path / ".lock")
+        try:
+            lock.acquire(timeout=0)
+        except Timeout as error:
+            raise InputError(
+                f"Another process trains into {self.path}; wait until it has ended, or end it."
+            ) from error
+        except (OSError, NotImplementedError):
+            pass  # files cannot be locked here
+        try:
+            yield
+        finally:
+            lock.release()
 
     def read_settings(self) -> Training:
         """Settings of the run. Raises InputError where the file is damaged."""
@@ -80,10 +102,12 @@ class RunFolder:
             ) from error
         return parse_training(table, str(self.settings))
 
-    def _write_settings(self, training: Training) -> None:
-        make_folder(self.checkpoints)
+    def write_settings(self, training: Training) -> None:
+        """Note what the run is; with it a new run begins."""
+        # First of all, so that whatever a killed run leaves is either nothing or can be resumed.
         with write_whole(self.settings) as temporary:
             temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        make_folder(self.checkpoints)
 
     def note_cloning(self, policy: str, told: Any) -> None:
         """Write how far the agent is from the policy that it starts from (``CloningError``)."""
@@ -126,7 +150,7 @@ class RunFolder:
         self._write_rows(rows)
 
     def drop_evaluations_after(self, steps: int) -> None:
-        """Forget evaluations that a run resumed at ``steps`` will repeat."""
+        """Forget evaluations that a run resumed at ``steps`` will repeat; -1: all."""
         if self.evaluations.is_file():
             self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
 
@@ -143,6 +167,11 @@ class RunFolder:
         writer.writerows(rows)
         with write_whole(self.evaluations) as temporary:
             temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
+
+
+def _counts(path: Path) -> bool:
+    """Whether it is more than a lock, or a file that a killed process left half-written."""
+    return not path.name.startswith(".")
 
 
 def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -44,17 +44,21 @@ def train(
     if there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
     episodes are not, so a resumed run is as good as an uninterrupted one, but not identical to it.
     progress: show a bar on stderr. command: to be noted in the model files. Raises InputError where the run
-    exists already (or, with ``resume``, does not exist) or has other settings.
+    exists already (or, with ``resume``, does not exist), has other settings, or is being trained by another
+    process.
     """
     with _torch_on_one_thread(), ExitStack() as stack:
         lanes = make_lanes(training)
         stack.callback(lanes.close)
         run = Run(training, RunFolder(output), lanes, command)
         if resume:
-            run.folder.resume(training)
-            run.restore()
+            run.folder.check_resumable(training)
         else:
-            run.folder.begin(training)
+            run.folder.check_new()
+        stack.enter_context(run.folder.alone())
+        run.folder.write_settings(training)
+        if resume:
+            run.restore()
         run.begin_with_policy()
         run.learn(stack, progress)
     return run.folder
@@ -67,7 +71,8 @@ class Run:
         """lanes: ``VecEnv`` to learn from. command: to be noted in the model files."""
         self.training, self.folder, self._command = training, folder, command
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
-        self.pairs: list[Pair] = []  # of the last evaluation
+        self.pairs: list[Pair] = []  # of the last evaluation since the run was begun or resumed
+        self._verdict = (math.inf, False)  # of the last evaluation of all
         self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
@@ -79,14 +84,16 @@ class Run:
         """Load the newest undamaged checkpoint, if there is one."""
         newest = self.folder.newest_checkpoint()
         if newest is not None:
-            restore(newest, self.model)
+            facts = restore(newest, self.model)
+            self._verdict = (math.inf if facts.ratio is None else facts.ratio, facts.qualified)
             # Otherwise lanes and exploration would repeat the random numbers of the first part.
             self.model.set_random_seed(self.training.seed + self.model.num_timesteps)
             self._seed_lanes()
         if self.folder.best.is_file():
             facts, _ = read_model(self.folder.best)
             self._best_score = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
-        self.folder.drop_evaluations_after(self.model.num_timesteps)
+        # Without a checkpoint the run begins anew, with the evaluation of what it begins as.
+        self.folder.drop_evaluations_after(-1 if newest is None else self.model.num_timesteps)
 
     def _seed_lanes(self) -> None:
         """Give the lanes seeds that are for training: the learner would number them from its own."""
@@ -136,7 +143,7 @@ class Run:
         """Compare the policy with the passive pantograph; note it in table and log; keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
         self.pairs = self._comparison.run(self._policy())
-        ratio, qualified = verdict(self.pairs)
+        self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)
         for pair in self.pairs:
@@ -164,7 +171,7 @@ class Run:
         write_model(path, self.model, actor, self._facts(actor), replay)
 
     def _facts(self, actor: Any) -> Facts:
-        ratio, qualified = verdict(self.pairs) if self.pairs else (math.inf, False)
+        ratio, qualified = self._verdict
         return Facts(
             commit=commit(),
             command=self._command,

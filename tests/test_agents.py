@@ -23,7 +23,7 @@ pytest.importorskip("stable_baselines3")
 
 import stable_baselines3
 
-from panto_agents import command, train
+from panto_agents import command, packages, train
 from panto_agents.demonstrations import Demonstrations, returns
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
 from panto_agents.lanes import lane_seeds
@@ -89,7 +89,7 @@ def weights(path: Path) -> list[np.ndarray]:
 
 class TestRun:
     def test_folder(self, finished):
-        names = sorted(path.name for path in finished.path.iterdir())
+        names = sorted(path.name for path in finished.path.iterdir() if path.name != ".lock")
         assert names == [
             "best.zip", "checkpoints", "evaluations.csv", "model.zip", "settings.json", "tensorboard",
         ]  # fmt: skip
@@ -384,7 +384,7 @@ class TestCommand:
         assert isinstance(unknown.exception, InputError)
 
     def test_says_what_is_missing(self, panto, config, monkeypatch):
-        monkeypatch.setattr(command, "find_spec", lambda name: None)
+        monkeypatch.setattr(packages, "find_spec", lambda name: None)
         result = panto("train", config)
         assert isinstance(result.exception, InputError)
         assert "panto-env[agents]" in str(result.exception)
@@ -505,7 +505,8 @@ class TestStart:
         cloning = {"steps": 10_000, "batch_size": 128}
         training = settings("ppo", environment=LINE | SEEING, start_from=linear, cloning=cloning)
         run = train.Run(training, RunFolder(tmp_path / "run"), train.make_lanes(training))
-        run.folder.begin(training)
+        run.folder.path.mkdir()
+        run.folder.write_settings(training)
         run.begin_with_policy()
         actor, (name, _, cls) = training.hyperparameters.actor(run.model), linear.rpartition(":")
         own, theirs = (

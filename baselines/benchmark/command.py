@@ -9,6 +9,7 @@ import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.base.files import PAGES
+from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, Plot, counting, print_json, writable
 
 from .run import SUFFIXES, run
@@ -34,6 +35,7 @@ def benchmark(
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    ray: RayAddress = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -71,7 +73,7 @@ def benchmark(
         **given,
     )
     with counting("passes") as progress:
-        outcome = run(settings, workers, progress)
+        outcome = run(settings, workers, progress, ray)
     if output is not None:
         outcome.save(output)
     if plot is not None:

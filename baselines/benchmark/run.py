@@ -9,11 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from panto_env.analysis.pool import Progress, check_passes, in_processes, one_by_one
+from panto_env.analysis.pool import Progress, check_passes, one_by_one
 from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
 from panto_env.base.machine import cores
 from panto_env.base.version import __version__
+from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
@@ -68,17 +69,21 @@ class Benchmark:
 
 
 def run(
-    settings: BenchmarkSettings, workers: int | None = None, progress: Progress | None = None
+    settings: BenchmarkSettings,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    ray: str | None = None,
 ) -> Benchmark:
     """Run every policy on every line at every speed under every seed.
 
     workers: number of processes, by default one per core; the outcome does not depend on it. With more
     than one, a script must call this under ``if __name__ == "__main__":``. progress: called with the
-    number of passes done and the number of all. Raises InputError for settings that are not valid and,
-    naming it, for a policy that fails.
+    number of passes done and the number of all. ray: address of a Ray cluster that runs the passes instead.
+    Raises InputError for settings that are not valid and, naming it, for a policy that fails.
     """
-    workers = cores() if workers is None else workers
-    if workers < 1:
+    if ray is None and workers is None:
+        workers = cores()
+    if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     count = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
     check_passes(count * len(settings.seeds), "This benchmark")
@@ -92,10 +97,10 @@ def run(
         for policy in settings.policies_on(line)
         for seed in settings.seeds
     ]
-    if workers == 1:
+    if workers == 1 and ray is None:
         passes = one_by_one(jobs, progress=progress)
     else:
-        passes = in_processes(jobs, workers=workers, progress=progress)
+        passes = spread(jobs, workers=workers, ray=ray, progress=progress)
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
     cells = compare(rows, _bounds(settings, spans))

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from panto_env.analysis.options import with_settings
+from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, counting, print_json, print_table
 
 
@@ -27,6 +28,7 @@ def tune(
         int | None, typer.Option(min=1, help="Simulated passes at each speed, at most.")
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    ray: RayAddress = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -61,10 +63,9 @@ def tune(
     check_gain_file(path, policy)
     names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS
+    speeds = sorted(set(speed or SPEEDS_KMH))
     with counting("speeds") as progress:
-        tuned = run(
-            policy, settings, sorted(set(speed or SPEEDS_KMH)), count, passes or PASSES, workers, progress
-        )
+        tuned = run(policy, settings, speeds, count, passes or PASSES, workers, progress, ray)
     command = shlex.join(["panto", *sys.argv[1:]])
     tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
     store(path, policy, tuning)

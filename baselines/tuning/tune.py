@@ -9,8 +9,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.analysis.pool import Progress, in_processes
+from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
+from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.settings import RunSettings
 from panto_env.policies import maker_of, policy_names
@@ -66,15 +67,17 @@ def tune(
     passes: int = PASSES,
     workers: int | None = None,
     progress: Progress | None = None,
+    ray: str | None = None,
 ) -> list[Tuned]:
     """Gains of a policy for the settings' line, pantograph, actuator and sensors, at each speed.
 
     seeds: how many training seeds. passes: budget of one speed. Training runs with ``accuracy="fast"``, the
-    selection seeds run as the settings say. Raises InputError for a policy without gains.
+    selection seeds run as the settings say. workers, ray: as ``spread`` takes them; the gains depend on
+    neither. Raises InputError for a policy without gains.
     """
     tunable(policy)
     jobs = [partial(tune_at, policy, settings, speed, seeds, passes) for speed in speeds_kmh]
-    return in_processes(jobs, workers=workers, progress=progress)
+    return spread(jobs, workers=workers, ray=ray, progress=progress)
 
 
 def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -43,7 +43,7 @@ def in_processes(
         # Spawned, not forked: threads of Numba and torch do not survive a fork.
         executor = ProcessPoolExecutor(workers_for(len(jobs), workers), mp_context=get_context("spawn"))
         try:
-            return _collect(executor, jobs, progress)
+            return _through(executor, jobs, progress)
         except BrokenProcessPool as error:
             raise InputError(
                 "A worker process died; in a script, make this call under `if __name__ == '__main__':`."
@@ -57,7 +57,7 @@ def in_threads(
 
     Kernels run without Python's lock. Raises what a job raises, after cancelling those not begun.
     """
-    return _collect(
+    return _through(
         ThreadPoolExecutor(workers_for(len(jobs), workers), thread_name_prefix="panto"), jobs, progress
     )
 
@@ -77,15 +77,19 @@ def workers_for(jobs: int, workers: int | None) -> int:
     return max(1, min(cores() if workers is None else workers, jobs))
 
 
-def _collect(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:
-    """Submit all jobs, report as each is done, and shut the executor down."""
+def collect(futures: Sequence[Future[T]], progress: Progress | None) -> list[T]:
+    """Results of futures, in their order, with a report as each is done; raises the first error at once."""
+    for done, future in enumerate(as_completed(futures), start=1):
+        future.result()
+        if progress is not None:
+            progress(done, len(futures))
+    return [future.result() for future in futures]
+
+
+def _through(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:
+    """Submit all jobs, collect their results, and shut the executor down."""
     try:
-        futures = [executor.submit(job) for job in jobs]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            if progress is not None:
-                progress(done, len(jobs))
-        return [future.result() for future in futures]
+        return collect([executor.submit(job) for job in jobs], progress)
     finally:
         executor.shutdown(cancel_futures=True)
 

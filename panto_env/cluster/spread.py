@@ -1,0 +1,44 @@
+"""One call for jobs that run in processes here, or as tasks of a Ray cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, TypeVar
+
+import typer
+
+from ..analysis.pool import Job, Progress, in_processes
+from ..base.errors import InputError
+from .tasks import on_ray
+
+T = TypeVar("T")
+RayAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--ray",
+        metavar="ADDRESS",
+        help='Work on a Ray cluster instead: its address, "auto", or "local" for one of this machine alone.',
+    ),
+]
+"""The option of a command whose work may go over a cluster."""
+
+
+def spread(
+    jobs: Sequence[Job[T]],
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> list[T]:
+    """Results of jobs, in their order, which must not depend on where a job runs.
+
+    workers: processes of this machine, one per core by default. ray: address of a cluster to work on
+    instead. Raises InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
+    """
+    if ray is None:
+        return in_processes(jobs, workers=workers, progress=progress)
+    if workers is not None:
+        raise InputError(
+            "The workers of a Ray cluster are as many as its CPUs; leave out either workers or ray."
+        )
+    return on_ray(jobs, ray, progress=progress)

@@ -1,0 +1,119 @@
+"""Jobs as tasks of a Ray cluster. Ray, an extra, is imported only when it is asked for."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, collect
+from ..backend.cache import source_hash
+from ..base.errors import InputError
+from ..base.machine import cores
+
+T = TypeVar("T")
+LOCAL = "local"
+"""The address of a cluster of this machine alone, which is started for the jobs and ends with them."""
+RETRIES = 5
+"""How often a job is run again whose worker or machine died."""
+PATIENCE = 10.0
+"""Seconds within which the head of a cluster must answer."""
+OBJECT_STORE = 256 * 2**20
+"""Bytes of shared memory of a local cluster: results are small, Ray would take a third of all memory."""
+
+
+class Home(NamedTuple):
+    """Where the jobs come from."""
+
+    sources: str  # hash of our source files
+    folder: Path  # to which relative paths of jobs refer
+
+
+def on_ray(jobs: Sequence[Job[T]], address: str, *, progress: Progress | None = None) -> list[T]:
+    """Results of jobs, in their order, that run as tasks of a Ray cluster, one on each of its CPUs.
+
+    address: of the cluster's head, as "10.0.0.5:6379"; "auto", the one that runs on this machine; or LOCAL. A
+    job whose worker or machine dies is run again, so that a job must give the same when it is begun anew.
+
+    Raises what a job raises, and InputError where Ray is not installed, this process is connected to it
+    already, there is no cluster, a machine of it cannot load a job or has other sources than this one, or a
+    job lost its worker more than RETRIES times. What has not ended by then is stopped.
+    """
+    ray = _ray()
+    home = Home(source_hash(), Path.cwd())
+    with _connected(ray, address):
+        # An error of the job itself is final: it would be the same again.
+        task = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(_run)
+        try:
+            return collect([task.remote(job, home).future() for job in jobs], progress)
+        except ray.exceptions.RayTaskError as error:
+            if isinstance(error.cause, ray.exceptions.RaySystemError):
+                raise InputError(
+                    f"A machine of the Ray cluster could not load a job ({_reason(error.cause)}); install "
+                    "the same packages everywhere."
+                ) from error
+            raise error.cause from error
+        except ray.exceptions.RayError as error:
+            raise InputError(
+                f"A job was begun {RETRIES + 1} times on the Ray cluster and lost each time "
+                f"({_reason(error)}); see that a worker has enough memory, or run it without --ray."
+            ) from error
+
+
+def _run(job: Job[T], home: Home) -> T:
+    """In a worker: the job, if it would be the same as at home."""
+    if source_hash() != home.sources:
+        raise InputError(
+            f"The machine {socket.gethostname()} of the Ray cluster has other sources of panto-env, or "
+            "another Numba, than this one; install the same everywhere."
+        )
+    # Where the folder is not shared, a job with a relative path finds no file, and says so.
+    if home.folder.is_dir():
+        os.chdir(home.folder)
+    return job()
+
+
+def _reason(error: Exception) -> str:
+    """The first line of Ray's many, as part of a sentence."""
+    return str(error).strip().partition("\n")[0].rstrip(".")
+
+
+def _ray() -> Any:
+    """The package. Raises InputError where it is not installed."""
+    try:
+        import ray
+    except ImportError as error:
+        raise InputError(
+            f"A cluster needs Ray, which is not installed ({error}); install panto-env with its extra 'ray'."
+        ) from error
+    return ray
+
+
+@contextmanager
+def _connected(ray: Any, address: str) -> Iterator[None]:
+    """Within the body this process is connected to a cluster; to leave it ends what still runs there."""
+    if ray.is_initialized():
+        raise InputError("This process is connected to a Ray cluster already; call ray.shutdown() before.")
+    variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # the reason is in `in_processes`
+    settings: dict[str, Any] = {"logging_level": "ERROR", "runtime_env": {"env_vars": variables}}
+    if address == LOCAL:
+        # Ray reports each cluster to its makers, unless told not to.
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        settings |= {"num_cpus": cores(), "include_dashboard": False, "object_store_memory": OBJECT_STORE}
+    try:
+        host, colon, port = address.rpartition(":")
+        if colon and port.isdigit() and "/" not in host:  # otherwise Ray itself tries for many minutes
+            socket.create_connection((host, int(port)), PATIENCE).close()
+        ray.init(address=address, **settings)
+    except (ImportError, OSError, RuntimeError, ValueError) as error:  # a ConnectionError is an OSError
+        raise InputError(
+            f"No Ray cluster could be joined at {address!r} ({_reason(error)}); start one by "
+            f"`ray start --head`, or give {LOCAL!r}."
+        ) from error
+    try:
+        yield
+    finally:
+        ray.shutdown()
