@@ -104,6 +104,12 @@ class Sampled:
         self.c = np.hstack([model.c, np.zeros((len(model.c), late))])
         self.d_height = model.d[:, 1]
 
+    def response(self, turns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Outputs for a periodic command of 1 N, complex, (5, n); turns: of an interval, e^(i w T), (n,)."""
+        eye = np.eye(self.size)
+        columns = [self.c @ np.linalg.solve(each * eye - self.a, self.b) for each in turns]
+        return np.array(columns).T
+
     @cached_property
     def size(self) -> int:
         """States."""
