@@ -67,12 +67,12 @@ class LineModel:
     d: Array  # (5, 2)
     delay: float  # s
 
-    def response(self, frequency: Array) -> Array:
+    def response(self, frequency: Array) -> NDArray[np.complex128]:
         """Contact force for a command (N/N), complex, (n,), at frequencies (Hz), the delay included."""
         s = 2j * np.pi * np.asarray(frequency, dtype=float)
         eye = np.eye(len(self.a))
         force = [self.c[0] @ np.linalg.solve(each * eye - self.a, self.b[:, 0]) for each in s]
-        return np.array(force) * np.exp(-s * self.delay)
+        return np.asarray(np.array(force) * np.exp(-s * self.delay))
 
     def sampled(self, interval: float) -> Sampled:
         """The model at a controller's interval (s), commands and heights held in between."""

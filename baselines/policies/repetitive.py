@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from panto_env.control.context import Context
 
 from .gains import Source
 from .lanes_law import Array, FromAverage, Observations, TunableLaw
-from .line_model import DELAY, LAG, line_model, mean_line
+from .line_model import DELAY, LAG, LineModel, line_model, mean_line
 from .span_learner import PACE, Pace, SpanLearner, harmonics
 from .span_place import PLACES, SpanPlace
 from .washout import Washout, WashoutSettings
@@ -20,8 +21,11 @@ WASHED = WashoutSettings(time_constant=2.0)
 class Repetitive(TunableLaw):
     """Adaptive cancellation of the span's harmonics, from the measured contact force.
 
-    What it learns, and when it backs off, is said at ``SpanLearner``; the answers G_k of the contact force to
-    a command are those of the pantograph under the mean line, delays included (``line_model``).
+    Its learning, which backs off where it does not help, is that of ``SpanLearner``: s dc_k/dx =
+    - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k for the
+    force Re sum_k c_k e^(ik phi), phi the angle of the place within the span (Bodson and Douglas, Automatica
+    33:2213, 1997). G_k, the answer of the contact force to a command, is that of the pantograph under the
+    mean line, delays included (``line_model``).
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
@@ -46,8 +50,9 @@ class Repetitive(TunableLaw):
         model = line_model(context, mean_line(context), *self._delays)
         span_rate, interval = context.speed / context.span_length, context.control_interval
         numbers, limit = harmonics(span_rate), context.force_limit
-        answers = model.response(numbers * span_rate)
-        self._learner = SpanLearner(Pace(*self.gains), numbers, answers, interval * span_rate, limit, lanes)
+        answers = self.answers(model, numbers * span_rate)
+        pace = Pace(*self.gains[-len(Pace._fields) :])
+        self._learner = SpanLearner(pace, numbers, answers, interval * span_rate, limit, lanes)
         self._sampled = model.sampled(interval)
         self._state = np.zeros((self._sampled.size, lanes))
         self._from_average = FromAverage(interval, 1 / span_rate)
@@ -58,9 +63,18 @@ class Repetitive(TunableLaw):
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         error = self._from_average(self.read(observations, "contact force"))
         angle = self._place.angle(self, observations)
-        force = self._washout(self._learner(error, self._sampled.c[0] @ self._state, angle))
+        learnt = self._learner(error, self._sampled.c[0] @ self._state, angle)
+        force = self._washout(self.whole(observations, learnt))
         self._state = self._sampled.a @ self._state + np.multiply.outer(self._sampled.b, force)
         return force
+
+    def answers(self, model: LineModel, frequencies: Array) -> NDArray[np.complex128]:
+        """The contact force's answers to what is learnt (N/N), complex, (n,), at frequencies (Hz)."""
+        return model.response(frequencies)
+
+    def whole(self, observations: Observations, learnt: Array) -> Array:
+        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        return learnt
 
     @classmethod
     def gain_names(cls, context: Context) -> list[str]:

@@ -42,15 +42,16 @@ def harmonics(span_rate: float) -> Array:
 
 
 class SpanLearner:
-    """The force Re sum_k c_k e^(ik phi) in each lane, phi the angle of the place within the span, with
+    """Adaptive cancellation of the span's harmonics, from the measured contact force.
 
-    s dc_k/dx = - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k
-
-    for a contact force that answers to it with G_k (N/N, complex) at the k-th harmonic. Averaged over a span,
-    this is c_k - learning E_k / G_k for an error E_k: where the phase of G_k is right within 90 degrees, the
-    error falls, span by span; forgetting bounds what is learnt where it is not. (Bodson and Douglas,
-    Automatica 33:2213, 1997, for adaptive feed-forward cancellation; the same as repetitive control with a
-    model's inverse.)
+    The force is u = Re sum_k c_k e^(ik phi), phi the angle of the place within the span, and
+    s dc_k/dx = - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi)
+                - forgetting c_k,
+    where G_k is the contact force's answer to u at the k-th harmonic's frequency. Averaged over a span, this
+    is c_k - learning E_k / G_k for an error E_k: where the phase of G_k is right within 90 degrees, the error
+    falls, span by span; forgetting bounds what is learnt where it is not. (Bodson and Douglas, Automatica
+    33:2213, 1997, for adaptive feed-forward cancellation; the same as repetitive control with a model's
+    inverse.)
 
     It backs off, halving what it has learnt and how fast it learns, after each span in which the measured
     sigma is above 1.05 times that of the first spans, or in which, by the model, the force would vary less
@@ -58,7 +59,13 @@ class SpanLearner:
     """
 
     def __init__(
-        self, pace: Pace, numbers: Array, answers: NDArray[np.complex128], share: float, limit: float, lanes: int
+        self,
+        pace: Pace,
+        numbers: Array,
+        answers: NDArray[np.complex128],
+        share: float,
+        limit: float,
+        lanes: int,
     ) -> None:
         """numbers: of the harmonics, (k,); answers: G_k, (k,); share: of a span that passes in a control
         step; limit: of the actuator's force (N).
@@ -88,11 +95,6 @@ class SpanLearner:
             )
             self._hold_within_limit()
         return np.asarray((self._learnt * turns).real.sum(axis=1))
-
-    @property
-    def listens(self) -> bool:
-        """Whether the first spans are still passing, from which the passive sigma is told."""
-        return self._ledger.spans < LISTENING
 
     def _hold_within_limit(self) -> None:
         """Scale down what has a higher peak than the actuator: else it would be learnt without end."""
