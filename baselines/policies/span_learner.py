@@ -1,4 +1,4 @@
-"""What repeats with the span, learnt on the run from the contact force, and withdrawn where it does not help."""
+"""What repeats with the span, learnt on the run, and withdrawn where that does not help."""
 
 from __future__ import annotations
 

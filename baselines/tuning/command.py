@@ -12,7 +12,16 @@ from panto_env.terminal import Json, counting, print_json, print_table
 
 
 @with_settings(
-    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    only=(
+        "catenary",
+        "pantograph",
+        "pantograph_scatter",
+        "speed_drift",
+        "actuator",
+        "sensors",
+        "line_condition",
+        "control_interval",
+    ),
     defaults=False,
 )
 def tune(
