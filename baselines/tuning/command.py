@@ -66,7 +66,7 @@ def tune(
     settings = run_settings(
         {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
     )
-    kind, path = tunable(policy), gain_file(output or policy)
+    kind, path = tunable(policy), output or gain_file(policy)
     check_gain_file(path, policy)
     names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS
