@@ -52,15 +52,13 @@ def seen(**values: float) -> NDArray[np.float32]:
     return observation
 
 
-def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array, Array]:
-    """Sigma of each span of the model under a force that repeats with the span, with control and without; the
-    commands.
-    """
+def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array]:
+    """Sigma of each span of the model under a force that repeats with the span, with control and without."""
     rate = CONTEXT.speed / CONTEXT.span_length * CONTEXT.control_interval
     sampled = MODEL.sampled(CONTEXT.control_interval)
     policy.begin(CONTEXT, 1)
     state = np.zeros(sampled.size)
-    with_control, without, commands = [], [], []
+    with_control, without = [], []
     for k in range(int(spans / rate)):
         angle = 2 * np.pi * k * rate
         disturbance = 20 * np.cos(angle) + 15 * np.sin(2 * angle) - 8 * np.cos(3 * angle)
@@ -70,14 +68,13 @@ def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array, Array]:
         values = outputs | place | {"speed": CONTEXT.speed}
         force = float(policy.forces(seen(**{name.replace(" ", "_"): v for name, v in values.items()}))[0])
         state = sampled.a @ state + sampled.b * force
-        commands.append(force)
         with_control.append(outputs["contact force"])
         without.append(disturbance)
     whole = [slice(int(np.ceil(j / rate)), int((j + 1) / rate)) for j in range(spans - 1)]
     controlled, passive = (
         np.array([np.std(np.array(force)[each]) for each in whole]) for force in (with_control, without)
     )
-    return controlled, passive, np.array(commands)
+    return controlled, passive
 
 
 # --- the closed loop -------------------------------------------------------------------------------
@@ -109,23 +106,38 @@ def test_answers_of_the_closed_loop_are_those_of_a_simulation() -> None:
 
 
 def test_it_learns_beside_feedback_what_repeats_to_near_zero() -> None:
-    controlled, passive, _ = repeated(Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 25)
+    controlled, passive = repeated(Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 25)
     assert controlled[1] != pytest.approx(passive[1], rel=0.02)  # feedback acts from the start
     assert controlled[-1] < 0.05 * passive[-1]
 
 
-def test_feed_forward_acts_from_the_start_and_learning_goes_on_from_there() -> None:
+def test_learning_goes_on_from_the_feed_forward() -> None:
     series = np.zeros(2 * HARMONICS)
     series[[0, 15]] = 9.0, -6.0
-    pace = (0.5, 0.0, 0.05)
-    begun = AdaptiveFeedforward(gains=[*series, *np.zeros(COUNT), *pace])
-    controlled, passive, commands = repeated(begun, 25)
-    fitted = FittedFeedback(gains=[*series, *np.zeros(COUNT)])
-    fitted.begin(CONTEXT, 1)
-    first = fitted.forces(seen(sine_of_span_position=0.0, cosine_of_span_position=1.0, speed=CONTEXT.speed))
-    assert commands[0] == pytest.approx(first[0], rel=1e-6)
-    assert abs(controlled[int(LISTENING) - 2] / passive[int(LISTENING) - 2] - 1) > 0.02
+    begun = AdaptiveFeedforward(gains=[*series, *np.zeros(COUNT), 0.5, 0.0, 0.05])
+    controlled, passive = repeated(begun, 25)
+    listening = int(LISTENING) - 2
+    assert abs(controlled[listening] / passive[listening] - 1) > 0.02
     assert controlled[-1] < 0.05 * passive[-1]
+
+
+def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
+    """But for a washout of two seconds, of which a tenth of a second passes."""
+    gains = np.random.default_rng(2).normal(size=2 * HARMONICS + COUNT)
+    gains[-2:] = 4.0, -2.0
+    policies = AdaptiveFeedforward(gains=[*gains, 0.5, 0.0, 0.05]), FittedFeedback(gains=gains.tolist())
+    forces = []
+    for policy in policies:
+        policy.begin(CONTEXT, 1)
+        random = np.random.default_rng(4)
+        forces.append([])
+        for k in range(10):
+            place = {"sine_of_span_position": np.sin(0.1 * k), "cosine_of_span_position": np.cos(0.1 * k)}
+            readings = {"contact_force": random.normal(120, 30), "frame_velocity": random.normal(0, 0.1)}
+            observation = seen(**place, **readings, speed=CONTEXT.speed)
+            forces[-1].append(policy.forces(observation)[0])
+    assert np.std(forces[1]) > 2.0
+    assert forces[0] == pytest.approx(forces[1], abs=0.06 * np.abs(forces[1]).max())
 
 
 def test_gains_are_named_in_order() -> None:
