@@ -18,7 +18,8 @@ from panto_baselines.policies.lqg import Disturbed, kalman, regulator
 from panto_baselines.policies.mpc import HORIZON, Programs
 from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.preview import Preview, preview
-from panto_baselines.policies.repetitive import LISTENING, Repetitive
+from panto_baselines.policies.repetitive import Repetitive
+from panto_baselines.policies.span_learner import LISTENING
 from panto_baselines.tuning.batch import Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task

@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from panto_baselines.benchmark import seeds
-from panto_baselines.policies.fitted_fb_ff import COMMANDS, HISTORY, SIGNALS, FittedFeedback
+from panto_baselines.policies.fitted_fb_ff import FittedFeedback
 from panto_baselines.policies.gains import GAINS_FOLDER, find_gains, gain_file, load_gains
+from panto_baselines.policies.linear_feedback import COMMANDS, HISTORY, SIGNALS
 from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.skyhook import Skyhook
 from panto_baselines.tuning.batch import Still, run_batch

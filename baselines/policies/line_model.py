@@ -67,12 +67,12 @@ class LineModel:
     d: Array  # (5, 2)
     delay: float  # s
 
-    def response(self, frequency: Array) -> Array:
+    def response(self, frequency: Array) -> NDArray[np.complex128]:
         """Contact force for a command (N/N), complex, (n,), at frequencies (Hz), the delay included."""
         s = 2j * np.pi * np.asarray(frequency, dtype=float)
         eye = np.eye(len(self.a))
         force = [self.c[0] @ np.linalg.solve(each * eye - self.a, self.b[:, 0]) for each in s]
-        return np.array(force) * np.exp(-s * self.delay)
+        return np.asarray(np.array(force) * np.exp(-s * self.delay))
 
     def sampled(self, interval: float) -> Sampled:
         """The model at a controller's interval (s), commands and heights held in between."""
@@ -103,6 +103,12 @@ class Sampled:
         self.height = np.concatenate([transition @ height_before + height, np.zeros(late)])
         self.c = np.hstack([model.c, np.zeros((len(model.c), late))])
         self.d_height = model.d[:, 1]
+
+    def response(self, turns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Outputs for a periodic command of 1 N, complex, (5, n); turns: of an interval, e^(i w T), (n,)."""
+        eye = np.eye(self.size)
+        columns = [self.c @ np.linalg.solve(each * eye - self.a, self.b) for each in turns]
+        return np.array(columns).T
 
     @cached_property
     def size(self) -> int:

@@ -13,7 +13,16 @@ from panto_env.terminal import Json, counting, print_json, print_table
 
 
 @with_settings(
-    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    only=(
+        "catenary",
+        "pantograph",
+        "pantograph_scatter",
+        "speed_drift",
+        "actuator",
+        "sensors",
+        "line_condition",
+        "control_interval",
+    ),
     defaults=False,
 )
 def tune(
@@ -59,7 +68,7 @@ def tune(
     settings = run_settings(
         {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
     )
-    kind, path = tunable(policy), gain_file(output or policy)
+    kind, path = tunable(policy), output or gain_file(policy)
     check_gain_file(path, policy)
     names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS

@@ -1,0 +1,82 @@
+"""Fitted linear feedback beside what is learnt on the run of what repeats with the span."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.control.context import Context
+
+from .gains import Source
+from .lanes_law import Array, Observations
+from .line_model import DELAY, LAG, OUTPUTS, LineModel
+from .linear_feedback import COUNT, SIGNALS, LinearFeedback, feedback_names, feedback_steps, loop_gain
+from .repetitive import Repetitive
+from .span_learner import PACE, Pace
+from .span_place import PLACES
+
+OWN = COUNT + len(Pace._fields)
+"""Gains of feedback and learning, the last ones."""
+
+
+class Adaptive(Repetitive):
+    """``Repetitive`` with the linear feedback of ``FittedFeedback``, the gains of both fitted together.
+
+    The feedback changes how the contact force answers to what is learnt: G_k is that of the closed loop, by
+    the model. Feedback is against what differs from span to span, learning against what does not.
+
+    It needs to know what ``Repetitive`` needs, and gains for line, pantograph and speed; not the line's
+    stiffness along the span. ``place="counted"`` goes without a sensor that tells the place, as there, with
+    the same gains.
+    """
+
+    def __init__(
+        self, gains: Source = "adaptive", delay: float = DELAY, lag: float = LAG, place: str = PLACES[0]
+    ) -> None:
+        """gains: (20,): those of ``LinearFeedback``, then those of ``Repetitive``; or a file of gains by name
+        or path. delay of actuator and sensors together, lag of the actuator: s. place: "read", or "counted"
+        from the speed.
+        """
+        super().__init__(gains, delay, lag, place)
+
+    def begin(self, context: Context, lanes: int) -> None:
+        """Prepare for episodes in so many lanes."""
+        super().begin(context, lanes)
+        self._feedback = LinearFeedback(self._of_feedback, context.control_interval, lanes)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        force = super().forces(observations)
+        self._feedback.remember(force)
+        return force
+
+    def answers(self, model: LineModel, frequencies: Array) -> NDArray[np.complex128]:
+        """The contact force's answers to what is learnt (N/N), complex, (n,), at frequencies (Hz)."""
+        interval = self.context.control_interval
+        turns = np.exp(2j * np.pi * frequencies * interval)
+        opened = model.sampled(interval).response(turns)
+        signals = opened[[OUTPUTS.index(name) for name in SIGNALS]]
+        return np.asarray(opened[0] / (1 - loop_gain(self._of_feedback, signals, turns)))
+
+    def whole(self, observations: Observations, learnt: Array) -> Array:
+        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        return self._feedback(np.stack([self.read(observations, name) for name in SIGNALS]), learnt)
+
+    @property
+    def _of_feedback(self) -> Array:
+        return self.gains[-OWN : -OWN + COUNT]
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return [*feedback_names(), *Pace._fields]
+
+    @classmethod
+    def first_gains(cls, context: Context) -> Array:
+        """Gains from which a tuner starts: no feedback."""
+        return np.concatenate([np.zeros(COUNT), PACE])
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.concatenate([feedback_steps(), 0.2 * np.array(PACE)])

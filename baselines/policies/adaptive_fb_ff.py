@@ -1,0 +1,50 @@
+"""Fitted feed-forward and feedback, and learning on the run that goes on from there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from panto_env.control.context import Context
+
+from .adaptive import Adaptive
+from .gains import Source
+from .lanes_law import Array, Observations
+from .line_model import DELAY, LAG
+from .periodic import HARMONICS, LEAD, STEP, series, series_names
+
+
+class AdaptiveFeedforward(Adaptive):
+    """``Adaptive`` that begins with a fitted series of the span, as ``FittedFeedback`` has it.
+
+    What it learns on the run is added to the series: it is for a line that is known as designed, and built,
+    worn or ridden otherwise. Gains are to be fitted on such lines; on lines that are as designed there is
+    nothing to learn, and learning costs.
+
+    It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must tell the place.
+    """
+
+    def __init__(self, gains: Source = "adaptive-fb+ff", delay: float = DELAY, lag: float = LAG) -> None:
+        """gains: (48,): those of ``Periodic``, ``LinearFeedback`` and ``Repetitive``; or a file of gains by
+        name or path. delay of actuator and sensors together, lag of the actuator: s.
+        """
+        super().__init__(gains, delay, lag)
+
+    def whole(self, observations: Observations, learnt: Array) -> Array:
+        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        feedforward = series(self.span_angle(observations, LEAD)) @ self.gains[: 2 * HARMONICS]
+        return super().whole(observations, learnt + feedforward)
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return [*series_names(), *super().gain_names(context)]
+
+    @classmethod
+    def first_gains(cls, context: Context) -> Array:
+        """Gains from which a tuner starts: neither feedback nor feed-forward."""
+        return np.concatenate([np.zeros(2 * HARMONICS), super().first_gains(context)])
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.concatenate([np.full(2 * HARMONICS, STEP), super().gain_steps(context)])

@@ -1,0 +1,46 @@
+"""Paper 1's feedback and feed-forward with fitted gains."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from panto_env.control.context import Context
+
+from .fb_ff import FORCE_RANGE
+from .gains import Source
+from .lanes_law import Array, Observations, TunableLaw
+
+
+class TunedFeedbackFeedforward(TunableLaw):
+    """The law of ``fb+ff`` (paper 1, section 5) with gain, amplitude and phase fitted to a line, and a
+    constant force that keeps the mean where it was.
+
+    u = gain (F_N - F) + sine sin(2 pi x / s) + cosine cos(2 pi x / s) + bias, with F clipped to 0-300 N and x
+    the place within the span s: Eq. 11 as the paper's text describes it, A sin(2 pi x / s - theta) with
+    A^2 = sine^2 + cosine^2 and tan(theta) = - cosine / sine; no dead zone.
+
+    It needs to know the nominal force and the place within the span, and nothing of the line but its gains.
+    """
+
+    def __init__(self, gains: Source = "tuned-fb+ff") -> None:
+        """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains."""
+        super().__init__(gains)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        gain, sine, cosine, bias = self.gains
+        contact_force = np.clip(self.read(observations, "contact force"), *FORCE_RANGE)
+        angle = self.span_angle(observations)
+        feedforward = sine * np.sin(angle) + cosine * np.cos(angle)
+        force: Array = gain * (self.context.nominal_force - contact_force) + feedforward + bias
+        return force
+
+    @classmethod
+    def gain_names(cls, context: Context) -> list[str]:
+        """Names of the gains, in order."""
+        return ["gain", "sine", "cosine", "bias"]
+
+    @classmethod
+    def gain_steps(cls, context: Context) -> Array:
+        """Changes of the gains of like, small effect."""
+        return np.array([0.05, 2.0, 2.0, 1.0])

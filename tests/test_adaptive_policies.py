@@ -1,0 +1,197 @@
+"""Learning beside fitted feedback and feed-forward, and paper 1's laws with fitted gains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from panto_baselines.policies.adaptive import Adaptive
+from panto_baselines.policies.adaptive_fb_ff import AdaptiveFeedforward
+from panto_baselines.policies.fb_ff import FeedbackFeedforward
+from panto_baselines.policies.fitted_fb_ff import FittedFeedback
+from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
+from panto_baselines.policies.linear_feedback import COUNT, SIGNALS, LinearFeedback, feedback_names
+from panto_baselines.policies.pd import ProportionalDerivative
+from panto_baselines.policies.periodic import HARMONICS
+from panto_baselines.policies.repetitive import Repetitive
+from panto_baselines.policies.span_learner import LISTENING, Pace
+from panto_baselines.policies.tuned_fb_ff import TunedFeedbackFeedforward
+from panto_baselines.policies.tuned_pd import TunedProportionalDerivative
+from panto_baselines.tuning.batch import Still, run_batch
+from panto_baselines.tuning.tune import MEAN_TOLERANCE
+from panto_env import InputError
+from panto_env.control import Task
+from panto_env.control.context import Context
+from panto_env.control.settings import run_settings
+
+Array = NDArray[np.float64]
+SPEED_KMH = 250.0
+
+
+def a_context(**settings: Any) -> Context:
+    task = Task(run_settings({"speed_kmh": SPEED_KMH, "accuracy": "fast"} | settings), keep_samples=False)
+    task.reset(0, np.random.default_rng(0))
+    return task.context(0)
+
+
+CONTEXT = a_context()
+MODEL = line_model(CONTEXT, mean_line(CONTEXT))
+FEEDBACK = np.array([0.0, 2, 0, -12, -9, 0, 0, 3, -6, -4, 0, 0, 0, 0, 2, -1.5, -1])
+"""Gains that leave the loop stable and change its answers by a quarter and more."""
+
+
+def seen(**values: float) -> NDArray[np.float32]:
+    """An observation, (1, entries), of these values (spaces as underscores), the rest 0."""
+    observation = np.zeros((1, len(CONTEXT.layout.entries)), dtype=np.float32)
+    for name, value in values.items():
+        place = CONTEXT.layout.index(name.replace("_", " "))
+        observation[0, place] = value / CONTEXT.layout.entries[place].scale
+    return observation
+
+
+def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array]:
+    """Sigma of each span of the model under a force that repeats with the span, with control and without."""
+    rate = CONTEXT.speed / CONTEXT.span_length * CONTEXT.control_interval
+    sampled = MODEL.sampled(CONTEXT.control_interval)
+    policy.begin(CONTEXT, 1)
+    state = np.zeros(sampled.size)
+    with_control, without = [], []
+    for k in range(int(spans / rate)):
+        angle = 2 * np.pi * k * rate
+        disturbance = 20 * np.cos(angle) + 15 * np.sin(2 * angle) - 8 * np.cos(3 * angle)
+        outputs = dict(zip(OUTPUTS, sampled.c @ state, strict=True))
+        outputs["contact force"] += 115 + disturbance
+        place = {"sine of span position": np.sin(angle), "cosine of span position": np.cos(angle)}
+        values = outputs | place | {"speed": CONTEXT.speed}
+        force = float(policy.forces(seen(**{name.replace(" ", "_"): v for name, v in values.items()}))[0])
+        state = sampled.a @ state + sampled.b * force
+        with_control.append(outputs["contact force"])
+        without.append(disturbance)
+    whole = [slice(int(np.ceil(j / rate)), int((j + 1) / rate)) for j in range(spans - 1)]
+    controlled, passive = (
+        np.array([np.std(np.array(force)[each]) for each in whole]) for force in (with_control, without)
+    )
+    return controlled, passive
+
+
+# --- the closed loop -------------------------------------------------------------------------------
+
+
+def test_answers_of_the_closed_loop_are_those_of_a_simulation() -> None:
+    """Of the sampled model under the feedback itself, in time; slow averages are left out of the answers."""
+    policy, turn = Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 2 * np.pi * CONTEXT.control_interval
+    policy.begin(CONTEXT, 1)
+    interval, sampled = CONTEXT.control_interval, MODEL.sampled(CONTEXT.control_interval)
+    rows = [OUTPUTS.index(name) for name in SIGNALS]
+    for frequency in (4.0, 9.0):
+        feedback, state = LinearFeedback(FEEDBACK, interval, 1), np.zeros(sampled.size)
+        forces = []
+        for k in range(2000):
+            outputs = sampled.c @ state
+            forces.append(outputs[0])
+            command = feedback(outputs[rows][:, None], np.array([np.cos(turn * frequency * k)]))
+            feedback.remember(command)
+            state = sampled.a @ state + sampled.b * command[0]
+        late = np.arange(1000, 2000)
+        turns = np.exp(-1j * turn * frequency * late)
+        answer = 2 * np.mean(np.array(forces)[late] * turns)
+        expected = policy.answers(MODEL, np.array([frequency]))[0]
+        alone = sampled.response(np.exp(1j * turn * np.array([frequency])))[0, 0]
+        print(alone, answer, expected)
+        assert abs(expected - answer) < 0.04 * abs(answer)
+        assert abs(alone - answer) > 0.15 * abs(answer)
+
+
+def test_it_learns_beside_feedback_what_repeats_to_near_zero() -> None:
+    controlled, passive = repeated(Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 25)
+    assert controlled[1] != pytest.approx(passive[1], rel=0.02)  # feedback acts from the start
+    assert controlled[-1] < 0.05 * passive[-1]
+
+
+def test_learning_goes_on_from_the_feed_forward() -> None:
+    series = np.zeros(2 * HARMONICS)
+    series[[0, 15]] = 9.0, -6.0
+    begun = AdaptiveFeedforward(gains=[*series, *np.zeros(COUNT), 0.5, 0.0, 0.05])
+    controlled, passive = repeated(begun, 25)
+    listening = int(LISTENING) - 2
+    assert abs(controlled[listening] / passive[listening] - 1) > 0.02
+    assert controlled[-1] < 0.05 * passive[-1]
+
+
+def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
+    """But for a washout of two seconds, of which a tenth of a second passes."""
+    gains = np.random.default_rng(2).normal(size=2 * HARMONICS + COUNT)
+    gains[-2:] = 4.0, -2.0
+    policies = AdaptiveFeedforward(gains=[*gains, 0.5, 0.0, 0.05]), FittedFeedback(gains=gains.tolist())
+    forces = []
+    for policy in policies:
+        policy.begin(CONTEXT, 1)
+        random = np.random.default_rng(4)
+        forces.append([])
+        for k in range(10):
+            place = {"sine_of_span_position": np.sin(0.1 * k), "cosine_of_span_position": np.cos(0.1 * k)}
+            readings = {"contact_force": random.normal(120, 30), "frame_velocity": random.normal(0, 0.1)}
+            observation = seen(**place, **readings, speed=CONTEXT.speed)
+            forces[-1].append(policy.forces(observation)[0])
+    assert np.std(forces[1]) > 2.0
+    assert forces[0] == pytest.approx(forces[1], abs=0.06 * np.abs(forces[1]).max())
+
+
+def test_gains_are_named_in_order() -> None:
+    names = AdaptiveFeedforward.gain_names(CONTEXT)
+    assert names == [*FittedFeedback.gain_names(CONTEXT), *Pace._fields]
+    assert Adaptive.gain_names(CONTEXT) == [*feedback_names(), *Pace._fields]
+    for kind in (Adaptive, AdaptiveFeedforward):
+        assert (
+            len(kind.first_gains(CONTEXT)) == len(kind.gain_steps(CONTEXT)) == len(kind.gain_names(CONTEXT))
+        )
+
+
+# --- on the line -----------------------------------------------------------------------------------
+
+
+def test_without_a_place_it_takes_more_off_sigma_than_learning_alone() -> None:
+    settings = run_settings(
+        {"speed_kmh": 300.0, "actuator": "realistic", "sensors": "blind", "line_condition": "fair"}
+        | {"accuracy": "fast"}
+    )
+    laws = [Still(), Repetitive(place="counted"), Adaptive(place="counted")]
+    force = run_batch(settings, laws, [1003])
+    changes = force.std[1:, 0] / force.std[0, 0] - 1
+    assert changes[1] < -0.22
+    assert changes[1] < changes[0] - 0.01
+    assert force.mean[2, 0] == pytest.approx(force.mean[0, 0], rel=MEAN_TOLERANCE)
+    with pytest.raises(InputError, match="needs the place within the span"):
+        run_batch(settings, [Adaptive()], [1003])
+
+
+# --- paper 1's laws with fitted gains --------------------------------------------------------------
+
+
+def test_tuned_pd_is_pd_with_its_gains_and_a_bias() -> None:
+    tuned = TunedProportionalDerivative(gains=(0.8, 0.004, 120.0, -3.5))
+    plain = ProportionalDerivative(gain=0.8, derivative=0.004, damping=120.0)
+    tuned.reset(CONTEXT)
+    plain.reset(CONTEXT)
+    for force, velocity in ((100.0, 0.02), (130.0, -0.05), (124.0, 0.0)):
+        observation = seen(contact_force=force, frame_velocity=velocity)
+        expected = plain.force(observation[0]) - 3.5
+        assert tuned.forces(observation)[0] == pytest.approx(expected, abs=1e-4)
+
+
+def test_tuned_fb_ff_is_fb_ff_with_its_amplitude_and_phase() -> None:
+    amplitude, theta = 14.0, 0.7
+    sine, cosine = amplitude * np.cos(theta), -amplitude * np.sin(theta)
+    tuned = TunedFeedbackFeedforward(gains=(0.4, float(sine), float(cosine), 2.0))
+    plain = FeedbackFeedforward(gain=0.4, theta=theta, amplitude=amplitude)
+    tuned.reset(CONTEXT)
+    plain.reset(CONTEXT)
+    for force, angle in ((100.0, 0.1), (330.0, 2.2), (-20.0, 4.5)):
+        observation = seen(
+            contact_force=force, sine_of_span_position=np.sin(angle), cosine_of_span_position=np.cos(angle)
+        )
+        expected = plain.force(observation[0]) + 2.0
+        assert tuned.forces(observation)[0] == pytest.approx(expected, abs=1e-3)
