@@ -98,16 +98,16 @@ def run(
         passes = in_processes(jobs, workers=workers, progress=progress)
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows, _bounds(settings, spans))
+    cells = compare(rows, stored_bounds(settings, spans))
     return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
 
 
-def _bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
+def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
     """Change of sigma (%) of the stored oracles of exactly these cells, as far as there are any."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, spans=covered)
+            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, covered)
             if ratio is not None:
                 found[line.catenary, line.pantograph, speed] = 100 * (ratio - 1)
     return found

@@ -13,7 +13,7 @@ from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
-from .search import Oracle
+from .search import STARTS, Oracle
 from .solver import Iteration
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def summary(oracles: Sequence[Oracle]) -> Table:
     rows = []
     for each in oracles:
         passive, figures = each.problem.figures, each.figures
-        reached = [search.std for search in each.searches if search.start != "repeated"]
+        reached = [search.std for search in each.searches if search.start in STARTS]
         rows.append(
             (
                 title(each),
