@@ -323,55 +323,68 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
 
 
 LIST = """
-import sys
+import sys, time
 import typer
 from panto_baselines.oracle import command, search, solver
 
-def slow(*given, **more):
+forever = "forever" in sys.argv
+searched = 0
+
+def descend(*given, **more):
+    global searched
+    searched += 1
     print("searched", flush=True)
+    if forever and searched == 2:
+        time.sleep(600)
     return solver.descend(*given, **more | {"iterations": 3})
 
-search.descend = slow
+search.descend = descend
 app = typer.Typer()
 app.command()(command.oracle)
-sys.argv = ["panto", "--speed", "250", "--speed", "300", "--spans", "2-2", "--hops", "0", *sys.argv[1:]]
+line = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--actuator", "ideal"]
+cells = ["--line-condition", "new", "--speed", "250", "--speed", "300", "--spans", "2-2", "--hops", "0"]
+sys.argv = ["panto", *line, *cells, "--output", sys.argv[1]]
 app()
 """
 
 
 def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
     file = tmp_path / "list.json"
-    order = [sys.executable, "-c", LIST, "--output", str(file)]
-    with subprocess.Popen(order, cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+    order = [sys.executable, "-c", LIST, str(file)]
+    with subprocess.Popen([*order, "forever"], cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
         while not file.exists() and process.poll() is None:
-            time.sleep(0.005)
+            time.sleep(0.01)
         process.kill()  # SIGKILL, in the second cell
     assert process.returncode != 0
     (first,) = stored.read(file)["cells"]
 
-    def gone_on(*more: str) -> str:
-        return subprocess.run(
-            [*order, *more], cwd=tmp_path, text=True, check=True, capture_output=True
-        ).stdout
+    def output() -> str:
+        return subprocess.run(order, cwd=tmp_path, text=True, check=True, capture_output=True).stdout
 
-    output = gone_on()
-    assert output.count("searched") == 1
-    assert "1 of 2 cells are those that were in" in output
+    second_time = output()
+    assert second_time.count("searched") == 1
+    assert "1 of 2 cells are those that were in" in second_time
     cells = stored.read(file)["cells"]
     assert cells[0] == first
     assert [each["speed_kmh"] for each in cells] == [250.0, 300.0]
     whole = file.read_bytes()
-    assert "searched" not in gone_on()
+    assert "searched" not in output()
     assert file.read_bytes() == whole
-    # What is asked for otherwise is searched for anew.
-    assert gone_on("--seed", "1").count("searched") == 2
-    assert [each["asked"]["seeds"] for each in stored.read(file)["cells"]] == [[1], [1]]
 
 
-def test_another_method_is_searched_anew(monkeypatch: pytest.MonkeyPatch):
+def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.MonkeyPatch):
     settings = oracle_settings(None, {}, {})
     (before,) = stored.asked(settings)
     assert stored.asked(settings) == [before]
+    others: tuple[dict[str, Any], ...] = (
+        {"seeds": [1]},
+        {"spans": [2, 2]},
+        {"starts": ["random"]},
+        {"hops": 1},
+    )
+    for changes in others:
+        assert stored.asked(oracle_settings(None, changes, {})) != [before]
+    assert stored.asked(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
     monkeypatch.setattr(stored, "METHOD", search.METHOD + 1)
     assert stored.asked(settings) != [before]
 

@@ -94,19 +94,36 @@ def stored_table(data: Mapping[str, Any]) -> Table:
         preset = next(
             (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]
         )
+        alone = [
+            min(one["std"] for one in each["searches"] if not one["start"].startswith("hop"))
+            / each["passive"]["std"]
+            for each in passes
+        ]
         changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
         rows.append(
             (
                 cell["catenary"],
                 f"{preset}, {actuator.place}",
                 number(cell["speed_kmh"], 0),
+                in_words(tuple(cell["spans"])),
                 number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
                 number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
                 number(100 * (cell["ratio"] - 1), 1),
-                f"{min(changes):.1f} to {max(changes):.1f}",
+                number(100 * (float(np.mean(alone)) - 1), 1),
+                f"{min(changes):.1f} to {max(changes):.1f}" if len(changes) > 1 else "–",
             )
         )
-    headings = ("line", "actuator", "km/h", "passive σ (N)", "oracle σ (N)", "change (%)", "by seed (%)")
+    headings = (
+        "line",
+        "actuator",
+        "km/h",
+        "spans",
+        "passive σ (N)",
+        "oracle σ (N)",
+        "change (%)",
+        "without hops (%)",
+        "by seed (%)",
+    )
     return Table("Stored oracles", headings, rows, text_columns=2)
 
 
