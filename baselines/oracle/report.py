@@ -94,11 +94,6 @@ def stored_table(data: Mapping[str, Any]) -> Table:
         preset = next(
             (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]
         )
-        alone = [
-            min(one["std"] for one in each["searches"] if not one["start"].startswith("hop"))
-            / each["passive"]["std"]
-            for each in passes
-        ]
         changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
         rows.append(
             (
@@ -109,7 +104,6 @@ def stored_table(data: Mapping[str, Any]) -> Table:
                 number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
                 number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
                 number(100 * (cell["ratio"] - 1), 1),
-                number(100 * (float(np.mean(alone)) - 1), 1),
                 f"{min(changes):.1f} to {max(changes):.1f}" if len(changes) > 1 else "–",
             )
         )
@@ -121,7 +115,6 @@ def stored_table(data: Mapping[str, Any]) -> Table:
         "passive σ (N)",
         "oracle σ (N)",
         "change (%)",
-        "without hops (%)",
         "by seed (%)",
     )
     return Table("Stored oracles", headings, rows, text_columns=2)

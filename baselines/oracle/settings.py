@@ -46,7 +46,7 @@ class OracleSettings(Settings):
     )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
     hops: int = Field(
-        3, ge=0, description="searches that follow from the best so far, shaken: more find steadier forces"
+        0, ge=0, description="searches that follow from the best so far, shaken: more find steadier forces"
     )
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
