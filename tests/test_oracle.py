@@ -18,8 +18,9 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark.run import stored_bounds
+from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
 from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.benchmark.single_pass import along
 from panto_baselines.oracle import command, problem, report, search, solver, stored
 from panto_baselines.oracle.knots import Knots
 from panto_baselines.oracle.problem import Problem
@@ -215,15 +216,21 @@ def test_response_along_directions_is_that_of_their_knots(monkeypatch: pytest.Mo
     np.testing.assert_allclose(asked.response_along(knots, basis), asked.response(knots) @ basis, atol=1e-9)
 
 
-def test_hops_start_from_the_best_and_never_make_it_worse(short: Problem, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
-    alone, hopped = find(short), find(short, hops=2)
-    assert [each.start for each in hopped.searches] == ["zero", "hop 1", "hop 2"]
-    assert hopped.searches[0].iterations == alone.searches[0].iterations
-    assert hopped.best.std == min(each.std for each in hopped.searches) <= alone.best.std
-    begun = [each.iterations[0].std for each in hopped.searches[1:]]
-    assert begun[0] != begun[1]
-    assert all(alone.best.std < std < short.figures.std for std in begun)
+def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkeypatch: pytest.MonkeyPatch):
+    begun: list[np.ndarray] = []
+
+    def followed(asked: Problem, start: str, knots: np.ndarray, **more: Any) -> solver.Descent:
+        begun.append(knots)
+        return descend(asked, start, knots, iterations=2, **more)
+
+    monkeypatch.setattr(search, "descend", followed)
+    found = find(short, hops=2)
+    assert [each.start for each in found.searches] == ["zero", "hop 1", "hop 2"]
+    assert found.best.std == min(each.std for each in found.searches)
+    for hop in (1, 2):
+        before = min(found.searches[:hop], key=lambda each: each.std)
+        shaken = np.sqrt(np.mean((begun[hop] - before.knots) ** 2))
+        assert 0.5 * search.HOP_FORCE < shaken < 3 * search.HOP_FORCE  # more, where limits shrink the whole
 
 
 def test_what_repeats_from_span_to_span_does(short: Problem):
@@ -279,17 +286,26 @@ def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
 
 
 @pytest.mark.parametrize("track", ["known-line", "head", "high-speed"])
-def test_tracks_of_the_benchmark_find_their_oracles(track: str):
+def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
     settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
     (line,) = settings.lines
+    oracles = oracle_settings("oracle", {}, {})
+    known = {each["fingerprint"] for each in stored.asked(oracles)}
+    for speed in line.speeds_kmh:
+        assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
+    assert oracles.spans == evaluated_spans(settings, line)
+
+
+def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
+    settings = load_benchmark(find_config("benchmark/known-line", "benchmark"))
     kept = {
-        each["speed_kmh"]
+        each["speed_kmh"]: 100 * (each["ratio"] - 1)
         for each in stored.load()["cells"]
-        if (each["catenary"], each["actuator"]["kind"]) == (line.catenary, settings.actuator.kind)
+        if (each["catenary"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
     }
-    bounds = stored_bounds(settings, [(10, 19)])
     assert kept
-    assert {speed for _, _, speed in bounds} == kept & set(line.speeds_kmh)
+    found = stored_bounds(settings, [(10, 19)])
+    assert {speed: bound for (_, _, speed), bound in found.items()} == kept
     assert stored_bounds(settings, [(4, 9)]) == {}
 
 

@@ -84,7 +84,7 @@ def run(
     check_passes(count * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy_of(policy))
-    spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
+    spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
     jobs = [
         partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == settings.seeds[0])
         for line, covered in zip(settings.lines, spans, strict=True)
@@ -113,7 +113,7 @@ def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]])
     return found
 
 
-def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
+def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))
