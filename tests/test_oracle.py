@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import time
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -15,12 +18,16 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
+from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.benchmark.single_pass import along
 from panto_baselines.oracle import command, problem, report, search, solver, stored
 from panto_baselines.oracle.knots import Knots
 from panto_baselines.oracle.problem import Problem
 from panto_baselines.oracle.search import find, noise
 from panto_baselines.oracle.settings import oracle_settings
 from panto_baselines.oracle.solver import descend
+from panto_configs import find as find_config
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import actuator_settings
@@ -201,6 +208,31 @@ def test_broydens_correction_meets_what_was_seen():
     np.testing.assert_allclose(after @ across, response @ across)
 
 
+def test_response_along_directions_is_that_of_their_knots(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(problem, "LEAD", 0.6)
+    monkeypatch.setattr(problem, "MEMORY", 100.0)
+    asked = Problem(LINEAR, spans=(3, 3))
+    knots, basis = asked.knots.within(noise(asked)), search.span_periodic(asked)
+    np.testing.assert_allclose(asked.response_along(knots, basis), asked.response(knots) @ basis, atol=1e-9)
+
+
+def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkeypatch: pytest.MonkeyPatch):
+    begun: list[np.ndarray] = []
+
+    def followed(asked: Problem, start: str, knots: np.ndarray, **more: Any) -> solver.Descent:
+        begun.append(knots)
+        return descend(asked, start, knots, iterations=2, **more)
+
+    monkeypatch.setattr(search, "descend", followed)
+    found = find(short, hops=2)
+    assert [each.start for each in found.searches] == ["zero", "hop 1", "hop 2"]
+    assert found.best.std == min(each.std for each in found.searches)
+    for hop in (1, 2):
+        before = min(found.searches[:hop], key=lambda each: each.std)
+        shaken = np.sqrt(np.mean((begun[hop] - before.knots) ** 2))
+        assert 0.5 * search.HOP_FORCE < shaken < 3 * search.HOP_FORCE  # more, where limits shrink the whole
+
+
 def test_what_repeats_from_span_to_span_does(short: Problem):
     basis = search.span_periodic(short)
     per_span = short.passive.span_length / (short.passive.speed_kmh / 3.6 * short.interval)
@@ -217,27 +249,26 @@ def test_stored_oracles_are_what_simulate_says_today():
     assert cells
     for cell in cells:
         names = ("catenary", "pantograph", "speed_kmh", "actuator", "line_condition", "control_interval")
-        given = {name: cell[name] for name in names}
-        assert stored.fingerprint(given) == cell["fingerprint"]
+        given, spans = {name: cell[name] for name in names}, tuple(cell["spans"])
+        assert stored.fingerprint(given) == cell["asked"]["fingerprint"]
         ratios = [each["oracle"]["std"] / each["passive"]["std"] for each in cell["passes"]]
-        assert stored.stored_ratio(given) == pytest.approx(np.mean(ratios), rel=1e-12)
+        assert stored.stored_ratio(given, spans) == pytest.approx(np.mean(ratios), rel=1e-12)
         kept = cell["passes"][0]
-        asked = Problem(given, kept["seed"], tuple(cell["spans"]))
-        figures = asked.replay(np.array(kept["commands"])).summary(tuple(cell["spans"]))
+        asked = Problem(given, kept["seed"], spans)
+        figures = asked.replay(np.array(kept["commands"])).summary(spans)
         assert asked.begin == kept["first_step"]
         assert asked.figures.std == pytest.approx(kept["passive"]["std"], rel=1e-6)
         assert figures.std == pytest.approx(kept["oracle"]["std"], rel=1e-6)
         assert figures.mean == pytest.approx(asked.figures.mean, rel=search.MEAN_TOLERANCE)
 
 
-def test_share_is_of_exactly_these_settings():
-    given = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "fair"}
-    ratio = stored.stored_ratio(given)
+def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
+    given, spans = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "fair"}, (10, 19)
+    ratio = stored.stored_ratio(given, spans)
     assert ratio is not None
     assert 0.2 < ratio < 0.75
-    assert stored.share_of_oracle(given, 10.0 * ratio, 10.0) == pytest.approx(1.0)
-    assert stored.share_of_oracle(given, 10.0, 10.0) == 0.0
-    assert stored.stored_ratio(given | {"sensors": "realistic", "observation": "full"}) == ratio
+    assert stored.stored_ratio(given | {"sensors": "realistic", "observation": "full"}, spans) == ratio
+    assert stored.stored_ratio(given, (4, 9)) is None
     others: list[dict[str, Any]] = [
         {"speed_kmh": 301},
         {"actuator": "realistic:delay=0.006"},
@@ -251,8 +282,31 @@ def test_share_is_of_exactly_these_settings():
         {"time_step": 1e-3},
     ]
     for other in others:
-        assert stored.stored_ratio(given | other) is None
-        assert stored.share_of_oracle(given | other, 10.0, 10.0) is None
+        assert stored.stored_ratio(given | other, spans) is None
+
+
+@pytest.mark.parametrize("track", ["known-line", "head", "high-speed"])
+def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
+    settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
+    (line,) = settings.lines
+    oracles = oracle_settings("oracle", {}, {})
+    known = {each["fingerprint"] for each in stored.asked(oracles)}
+    for speed in line.speeds_kmh:
+        assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
+    assert oracles.spans == evaluated_spans(settings, line)
+
+
+def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
+    settings = load_benchmark(find_config("benchmark/known-line", "benchmark"))
+    kept = {
+        each["speed_kmh"]: 100 * (each["ratio"] - 1)
+        for each in stored.load()["cells"]
+        if (each["catenary"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
+    }
+    assert kept
+    found = stored_bounds(settings, [(10, 19)])
+    assert {speed: bound for (_, _, speed), bound in found.items()} == kept
+    assert stored_bounds(settings, [(4, 9)]) == {}
 
 
 # --- the command ---------------------------------------------------------------------------------
@@ -269,19 +323,96 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     file, picture = tmp_path / "o.json", tmp_path / "o.png"
     result = called(
         "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
-        "--start", "random", "--output", str(file), "--plot", str(picture),
+        "--start", "random", "--hops", "1", "--output", str(file), "--plot", str(picture),
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     for word in ("random", "seed 0", "iteration", "local optimum"):
         assert word in result.output
     cell = json.loads(file.read_text())["cells"][0]
     assert [each["seed"] for each in cell["passes"]] == [0, 1]
-    assert cell["passes"][1]["searches"][0]["start"] == "seed 0"
+    assert [each["start"] for each in cell["passes"][1]["searches"]] == ["seed 0", "hop 1"]
     given = {"speed_kmh": 300, "line_condition": "fair"}
-    assert stored.stored_ratio(given, file) == cell["ratio"]
+    assert stored.stored_ratio(given, SPANS, file) == cell["ratio"]
     again = simulate(**given, seed=1, distance=None).summary((2, 2))
     assert cell["passes"][1]["passive"]["std"] == again.std
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+LIST = """
+import sys, time
+import typer
+from panto_baselines.oracle import command, search, solver
+
+forever = "forever" in sys.argv
+searched = 0
+
+def descend(*given, **more):
+    global searched
+    searched += 1
+    print("searched", flush=True)
+    if forever and searched == 2:
+        time.sleep(600)
+    return solver.descend(*given, **more | {"iterations": 3})
+
+search.descend = descend
+app = typer.Typer()
+app.command()(command.oracle)
+line = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--actuator", "ideal"]
+cells = ["--line-condition", "new", "--speed", "250", "--speed", "300", "--spans", "2-2", "--hops", "0"]
+sys.argv = ["panto", *line, *cells, "--output", sys.argv[1]]
+app()
+"""
+
+
+def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
+    file = tmp_path / "list.json"
+    order = [sys.executable, "-c", LIST, str(file)]
+    with subprocess.Popen([*order, "forever"], cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+        while not file.exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.kill()  # SIGKILL, in the second cell
+    assert process.returncode != 0
+    (first,) = stored.read(file)["cells"]
+
+    def output() -> str:
+        return subprocess.run(order, cwd=tmp_path, text=True, check=True, capture_output=True).stdout
+
+    second_time = output()
+    assert second_time.count("searched") == 1
+    assert "1 of 2 cells are those that were in" in second_time
+    cells = stored.read(file)["cells"]
+    assert cells[0] == first
+    assert [each["speed_kmh"] for each in cells] == [250.0, 300.0]
+    whole = file.read_bytes()
+    assert "searched" not in output()
+    assert file.read_bytes() == whole
+
+
+def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.MonkeyPatch):
+    settings = oracle_settings(None, {}, {})
+    (before,) = stored.asked(settings)
+    assert stored.asked(settings) == [before]
+    others: tuple[dict[str, Any], ...] = (
+        {"seeds": [1]},
+        {"spans": [2, 2]},
+        {"starts": ["random"]},
+        {"hops": 1},
+    )
+    for changes in others:
+        assert stored.asked(oracle_settings(None, changes, {})) != [before]
+    assert stored.asked(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
+    monkeypatch.setattr(stored, "METHOD", search.METHOD + 1)
+    assert stored.asked(settings) != [before]
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"cells": [{"fingerprint": "0"}]}'])
+def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
+    file = tmp_path / "o.json"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"holds no oracles of this version; remove it"):
+        stored.read(file)
+    assert isinstance(called("--output", str(file)).exception, InputError)
+    assert file.read_text() == text
 
 
 def test_stored_oracles_are_printed_as_the_page_shows_them():
@@ -293,9 +424,10 @@ def test_stored_oracles_are_printed_as_the_page_shows_them():
 
 def test_a_file_s_cells_are_replaced_by_one_on_the_command_line():
     whole = oracle_settings("oracle", {}, {})
-    assert len(list(whole.passes())) == len(whole.seeds) * sum(len(cell.speeds_kmh) for cell in whole.cells)
+    assert len(list(whole.runs())) == sum(len(cell.speeds_kmh) for cell in whole.cells)
     one = oracle_settings("oracle", {"seeds": [5]}, {"speeds_kmh": [310]})
-    assert [(given["speed_kmh"], seed) for given, seed in one.passes()] == [(310.0, 5)]
+    assert [given["speed_kmh"] for given in one.runs()] == [310.0]
+    assert one.seeds == (5,)
     assert one.spans == whole.spans
 
 

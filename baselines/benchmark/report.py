@@ -43,6 +43,11 @@ LEGEND = (
     "at most."
 )
 
+ORACLE = (
+    "oracle: the smallest σ that was found for the same actuator, knowing the line, over the same spans "
+    "(`panto oracle --stored`), under seeds of its own. A local optimum: a share above 100 % is possible."
+)
+
 
 def tables(outcome: Benchmark) -> RenderableType:
     """One table per line, one over all of them, and a legend."""
@@ -51,7 +56,8 @@ def tables(outcome: Benchmark) -> RenderableType:
     for (names, cells_of_line), (first, last) in zip(cells, outcome.spans, strict=True):
         title = f"{' on '.join(reversed(names))}, spans {first}–{last}"
         parts += [*_table_of_line(list(cells_of_line), title), ""]
-    return Group(*parts, _overall(outcome), Text(LEGEND, style="dim"))
+    legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
+    return Group(*parts, _overall(outcome), Text(legend, style="dim"))
 
 
 def _overall(outcome: Benchmark) -> Table:

@@ -89,7 +89,7 @@ def run(
     check_passes(count * len(settings.seeds), "This benchmark")
     for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
         find_policy(policy_of(policy))
-    spans = tuple(_evaluated_spans(settings, line) for line in settings.lines)
+    spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
     jobs = [
         partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == settings.seeds[0])
         for line, covered in zip(settings.lines, spans, strict=True)
@@ -103,22 +103,22 @@ def run(
         passes = spread(jobs, workers=workers, ray=ray, progress=progress)
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows, _bounds(settings, spans))
+    cells = compare(rows, stored_bounds(settings, spans))
     return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
 
 
-def _bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
+def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
     """Change of sigma (%) of the stored oracles of exactly these cells, as far as there are any."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, spans=covered)
+            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, covered)
             if ratio is not None:
                 found[line.catenary, line.pantograph, speed] = 100 * (ratio - 1)
     return found
 
 
-def _evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
+def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))

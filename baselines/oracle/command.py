@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from panto_env.analysis.options import parse_spans, with_settings
+from panto_env.base.errors import InputError
 from panto_env.terminal import Json, Plot, console, print_json, print_table, progress_console, writable
 
 if TYPE_CHECKING:
@@ -35,6 +36,9 @@ def oracle(
     start: Annotated[
         list[str] | None, typer.Option(help="Where a search starts: zero, periodic or random; repeatable.")
     ] = None,
+    hops: Annotated[
+        int | None, typer.Option(min=0, help="Searches that follow from the best one so far, shaken.")
+    ] = None,
     output: Annotated[
         str | None, typer.Option(help="File to write: everything as .json.", callback=writable((".json",)))
     ] = None,
@@ -48,7 +52,9 @@ def oracle(
 
     The least σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
     what control can be asked for. It is a local optimum that is reached, not a proof that nothing is better.
-    Seeds after the first start where the one before ended. The picture shows the first pass.
+    Seeds after the first start where the one before ended. The picture shows the first pass that was searched
+    for. Cells that are in the output already, asked for in the same way, are kept: a list that was broken off
+    is gone on with.
     """
     from panto_env.analysis.plots import save as save_plot
 
@@ -56,7 +62,7 @@ def oracle(
     from .problem import Problem
     from .search import find
     from .settings import oracle_settings
-    from .stored import as_data, load, save
+    from .stored import as_data, asked, cell, load, read, save
 
     if known:
         print_table(report.stored_table(load()))
@@ -66,26 +72,45 @@ def oracle(
         "seeds": seed or None,
         "spans": parse_spans(spans),
         "starts": start or None,
+        "hops": hops,
         "line_condition": given.pop("line_condition", None),
         "control_interval": given.pop("control_interval", None),
     }
-    cell = given | ({"speeds_kmh": speed} if speed else {})
-    settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, cell)
+    only = given | ({"speeds_kmh": speed} if speed else {})
+    settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
     command = shlex.join(["panto", *sys.argv[1:]])
+    wanted = asked(settings)
+    before = read(output)["cells"] if output is not None and Path(output).exists() else []
+    done: list[dict[str, Any] | None] = [
+        next((each for each in before if each["asked"] == one), None) for one in wanted
+    ]
+    kept = len(done) - done.count(None)
+    if plot is not None and kept == len(done):
+        raise InputError(f"{output} holds all of this already: no search is left to plot; leave it out.")
     found: list[Oracle] = []
-    for values, number in settings.passes():
-        same = found[-1] if found and found[-1].problem.given == values else None
-        found.append(find(Problem(values, number, settings.spans), settings.starts, _tell, same))
-        if output is not None:
-            save(found, output, command)  # as far as it is: a long list may be broken off
-        if not json:
-            print_table(report.convergence(found[-1]))
+    for k, values in enumerate(settings.runs()):
+        if done[k] is not None:
+            continue
+        passes: list[Oracle] = []
+        for number in settings.seeds:
+            neighbour = passes[-1] if passes else None
+            problem = Problem(values, number, settings.spans)
+            passes.append(find(problem, settings.starts, _tell, neighbour, settings.hops))
+            if not json:
+                print_table(report.convergence(passes[-1]))
+        done[k] = cell(wanted[k], passes)
+        found += passes
+        if output is not None:  # at once: a long list may be broken off, and is then gone on with
+            save([each for each in done if each is not None], output, command)
     if plot is not None:
         save_plot(report.plot(found[0]), plot)
     if json:
-        print_json(as_data(found, command))
+        print_json(as_data([each for each in done if each is not None], command))
         return
-    print_table(report.summary(found))
+    if kept:
+        console.print(f"{kept} of {len(done)} cells are those that were in {output} already.")
+    if found:
+        print_table(report.summary(found))
     console.print(report.LEGEND, style="dim")
 
 

@@ -88,6 +88,18 @@ class Problem:
         filtered = sosfilt(sections, changes, axis=2)[:, :, self.rows] / PUSH
         return np.asarray(filtered.reshape(-1, len(self.rows)).T)
 
+    def response_along(self, knots: Array, basis: Array) -> Array:
+        """The same for combinations of knots, (rows, directions).
+
+        basis: (knots of all places, directions). By one whole run for each, pushed by ``PUSH`` (rms)
+        along it: for a few directions that is far cheaper.
+        """
+        sizes = PUSH / np.sqrt(np.mean(basis**2, axis=0))
+        pushed = knots + (sizes * basis).T.reshape(-1, *knots.shape)
+        commands = self.knots.free_commands(np.concatenate([knots[None], pushed]))
+        forces = self._filtered(self._free.forces(commands))[:, self.rows]
+        return np.asarray(((forces[1:] - forces[0]) / sizes[:, None]).T)
+
     @property
     def rows(self) -> Any:
         """Samples of the least squares, counted from the first knot's."""

@@ -13,7 +13,7 @@ from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
-from .search import Oracle
+from .search import STARTS, Oracle
 from .solver import Iteration
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def summary(oracles: Sequence[Oracle]) -> Table:
     rows = []
     for each in oracles:
         passive, figures = each.problem.figures, each.figures
-        reached = [search.std for search in each.searches if search.start != "repeated"]
+        reached = [search.std for search in each.searches if search.start in STARTS]
         rows.append(
             (
                 title(each),
@@ -100,13 +100,23 @@ def stored_table(data: Mapping[str, Any]) -> Table:
                 cell["catenary"],
                 f"{preset}, {actuator.place}",
                 number(cell["speed_kmh"], 0),
+                in_words(tuple(cell["spans"])),
                 number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
                 number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
                 number(100 * (cell["ratio"] - 1), 1),
-                f"{min(changes):.1f} to {max(changes):.1f}",
+                f"{min(changes):.1f} to {max(changes):.1f}" if len(changes) > 1 else "–",
             )
         )
-    headings = ("line", "actuator", "km/h", "passive σ (N)", "oracle σ (N)", "change (%)", "by seed (%)")
+    headings = (
+        "line",
+        "actuator",
+        "km/h",
+        "spans",
+        "passive σ (N)",
+        "oracle σ (N)",
+        "change (%)",
+        "by seed (%)",
+    )
     return Table("Stored oracles", headings, rows, text_columns=2)
 
 

@@ -20,11 +20,15 @@ STARTS = ("zero", "periodic", "random")
 """No force; the best of what repeats from span to span, itself searched for; noise."""
 HARMONICS = 14
 """Of the span in what repeats."""
-PERIODIC_ITERATIONS = 6
+PERIODIC_ITERATIONS = 15
 RANDOM_FORCE, RANDOM_TIME = 20.0, 0.05
 """Rms of the noise (N), and the time over which it is smoothed (s)."""
+HOP_FORCE = 5.0
+"""Rms of the noise (N) by which the best knots are shaken for a hop."""
 DECIMALS = 2
 """Of the commands (N) that are replayed and kept."""
+METHOD = 2
+"""Version of the search: one more wherever other commands come of it, so that nothing older is kept."""
 MEAN_TOLERANCE = 1e-3
 """Largest difference of the mean force from the passive run's, as a share of it."""
 
@@ -56,9 +60,12 @@ def find(
     starts: Sequence[str] = STARTS[:1],
     progress: Progress | None = None,
     neighbour: Oracle | None = None,
+    hops: int = 0,
 ) -> Oracle:
     """The best of searches from starts, each one of ``STARTS``. progress: as of ``descend``.
 
+    hops: so often the best knots so far are shaken and searched from anew (basin hopping: Wales and Doye,
+    J. Phys. Chem. A 101 (1997) 5111): droppers that slacken and tighten leave many shallow optima.
     neighbour: of the same cell under another seed, from whose knots the only search then starts: lines of one
     condition differ little. Raises InputError where the pass that was found ends early or has another mean
     force.
@@ -68,6 +75,9 @@ def find(
     else:
         name = f"seed {neighbour.problem.seed}"
         searches = [descend(problem, name, neighbour.best.knots, progress=progress)]
+    for hop in range(1, hops + 1):
+        shaken = min(searches, key=_std).knots + noise(problem, HOP_FORCE, hop)
+        searches.append(descend(problem, f"hop {hop}", problem.knots.within(shaken), progress=progress))
     best = min(searches, key=_std)
     commands = np.round(problem.knots.commands(best.knots), DECIMALS)
     run = problem.replay(commands)
@@ -126,9 +136,11 @@ def span_periodic(problem: Problem) -> Array:
     return np.kron(np.stack(waves, axis=1), np.eye(problem.places))
 
 
-def noise(problem: Problem) -> Array:
-    """Smooth noise, (count, places) (N), the same for the same pass."""
+def noise(problem: Problem, force: float = RANDOM_FORCE, draw: int = 0) -> Array:
+    """Smooth noise of so much force (rms, N), (count, places) (N), the same for the same pass and draw."""
     length = max(1, round(RANDOM_TIME / problem.interval))
-    white = np.random.default_rng(problem.seed).standard_normal((problem.count + length, problem.places))
+    white = np.random.default_rng([problem.seed, draw]).standard_normal(
+        (problem.count + length, problem.places)
+    )
     total = np.cumsum(white, axis=0)
-    return np.asarray(RANDOM_FORCE / np.sqrt(length) * (total[length:] - total[:-length]))
+    return np.asarray(force / np.sqrt(length) * (total[length:] - total[:-length]))

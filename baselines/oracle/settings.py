@@ -45,6 +45,9 @@ class OracleSettings(Settings):
         None, description="first and last span over which σ is least; by default those after the start"
     )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
+    hops: int = Field(
+        0, ge=0, description="searches that follow from the best so far, shaken: more find steadier forces"
+    )
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
     )
@@ -52,12 +55,11 @@ class OracleSettings(Settings):
         default("control_interval"), description=description("control_interval")
     )
 
-    def passes(self) -> Iterator[tuple[dict[str, Any], int]]:
-        """Settings of the run and seed of each pass."""
+    def runs(self) -> Iterator[dict[str, Any]]:
+        """Settings of the run of each cell at each speed, by name."""
         for cell in self.cells:
             for speed in cell.speeds_kmh:
-                for seed in self.seeds:
-                    yield self.given(cell, speed), seed
+                yield self.given(cell, speed)
 
     def given(self, cell: Cell, speed_kmh: float) -> dict[str, Any]:
         """Settings of the run of a cell at a speed (km/h), by name."""

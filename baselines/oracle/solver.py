@@ -36,10 +36,10 @@ MEAN_WEIGHT = 2.0
 """Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
 MEAN_STIFFNESS = 1e3
 """Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
-WORTH, ENOUGH = 2e-2, 2e-3
+WORTH, ENOUGH = 2e-2, 5e-4
 """Relative gains of an iteration: below the first the response is taken anew, with a new one and below the
 second the search ends."""
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 20
 OSQP = {"verbose": False, "eps_abs": 1e-4, "eps_rel": 1e-4, "max_iter": 10_000}
 
 
@@ -91,22 +91,21 @@ def descend(
     found = [_iteration(problem, 0, knots, force, 0.0)]
     if progress is not None:
         progress(start, found[-1])
-    response, fresh = problem.response(knots), True
+    response, fresh = _response(problem, knots, basis), True
     while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
         before = merit(problem, force)
         model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
-        steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
-        tried = knots + np.array([share * step for step in steps for share in SHARES]).reshape(
-            -1, *knots.shape
-        )
+        best_steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
+        steps = np.array([share * step for step in best_steps for share in SHARES])
+        tried = knots + (steps if basis is None else steps @ basis.T).reshape(-1, *knots.shape)
         forces = problem.forces(tried)
         merits = [merit(problem, each) for each in forces]
         best = int(np.argmin(merits))
         share = SHARES[best % len(SHARES)] if merits[best] < before else 0.0
         if share > 0:
             change = (forces[best] - force)[:: problem.every]
-            response = corrected(response, (tried[best] - knots).ravel(), change)
+            response = corrected(response, steps[best], change)
             knots, force = tried[best], forces[best]
             damping = weights[best // len(SHARES)]
         else:
@@ -119,8 +118,12 @@ def descend(
             break
         fresh = gain < WORTH
         if fresh:
-            response = problem.response(knots)
+            response = _response(problem, knots, basis)
     return Descent(start, knots, tuple(found))
+
+
+def _response(problem: Problem, knots: Array, basis: Array | None) -> Array:
+    return problem.response(knots) if basis is None else problem.response_along(knots, basis)
 
 
 def merit(problem: Problem, force: Array) -> float:
@@ -144,10 +147,8 @@ class Model(NamedTuple):
 
     @classmethod
     def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
-        """About the present filtered force, (samples,) (N); response: (rows, knots) (N/N)."""
+        """About the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
         rest = force[:: problem.every]
-        if basis is not None:
-            response = response @ basis
         mean = response.mean(axis=0)
         stiffness = MEAN_STIFFNESS * len(rest)
         missing = problem.figures.mean - float(force.mean())
@@ -159,8 +160,9 @@ class Model(NamedTuple):
         return cls(square, slope, size, basis)
 
     def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
-        """Change of all knots, flat (N), that is best within the limits; damping: as of ``DAMPING``.
+        """Step along each direction (N) that is best within the limits; damping: as of ``DAMPING``.
 
+        knots: the present ones, flat (N). Without a basis a direction is a knot.
         Raises InputError where OSQP finds none.
         """
         now = limits.matrix @ knots
@@ -173,11 +175,11 @@ class Model(NamedTuple):
         answer = solver.solve(raise_error=False)
         if answer.x is None or not np.isfinite(answer.x).all():
             raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
-        return np.asarray(answer.x if self.basis is None else self.basis @ answer.x)
+        return np.asarray(answer.x)
 
 
 def corrected(response: Array, step: Array, change: Array) -> Array:
-    """The response, changed as little as can be to give the change, (rows,) (N), of a step, flat (N).
+    """The response, changed as little as can be to give the change, (rows,), of a step, (directions,) (N).
 
     Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
     """

@@ -1,4 +1,4 @@
-"""Oracles that are kept in a file, and the share of what they gain that a policy gains."""
+"""Oracles that are kept in a file, and how they are found again."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
 from panto_env.control.settings import run_settings
 
-from .search import Oracle
+from .search import METHOD, Oracle
+from .settings import OracleSettings
 
 RESULTS = Path(__file__).parent / "results.json"
 """Those that come with the project; ``command`` in it says how they were made."""
@@ -58,28 +59,39 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
-def as_data(oracles: Sequence[Oracle], command: str) -> dict[str, Any]:
-    """Oracles as plain data, one cell for each line, pantograph, actuator and speed; command: its text."""
-    cells = []
-    for print_, group in groupby(oracles, key=lambda oracle: fingerprint(oracle.problem.given)):
-        found = list(group)
-        settings = found[0].problem.settings
-        cells.append(
-            {
-                "catenary": settings.catenary.name,
-                "pantograph": settings.pantograph.name,
-                "speed_kmh": settings.speed_kmh[0],
-                "actuator": settings.actuator.model_dump(mode="json"),
-                "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
-                "control_interval": settings.control_interval,
-                "spans": found[0].problem.spans,
-                "ratio": float(np.mean([each.figures.std / each.problem.figures.std for each in found])),
-                "fingerprint": print_,
-                "passes": [_pass(each) for each in found],
-            }
-        )
-    data: dict[str, Any] = finite({"version": __version__, "command": command, "cells": cells})
-    return data
+def asked(settings: OracleSettings) -> list[dict[str, Any]]:
+    """What tells the cells that are asked for from others, as plain data, in their order.
+
+    Equal is what would be searched for in the same way: settings, spans, seeds, starts, hops, ``METHOD``.
+    """
+    table = settings.model_dump(mode="json", include={"spans", "seeds", "starts", "hops"})
+    return [{"method": METHOD, **table, "fingerprint": fingerprint(given)} for given in settings.runs()]
+
+
+def cell(asked: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
+    """A cell as plain data: its passes under all seeds; asked: its entry of ``asked``."""
+    first = passes[0].problem
+    settings = first.settings
+    table: dict[str, Any] = finite(
+        {
+            "catenary": settings.catenary.name,
+            "pantograph": settings.pantograph.name,
+            "speed_kmh": settings.speed_kmh[0],
+            "actuator": settings.actuator.model_dump(mode="json"),
+            "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
+            "control_interval": settings.control_interval,
+            "spans": first.spans,
+            "ratio": float(np.mean([each.figures.std / each.problem.figures.std for each in passes])),
+            "asked": dict(asked),
+            "passes": [_pass(each) for each in passes],
+        }
+    )
+    return table
+
+
+def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
+    """Cells of ``cell`` with the command that found them (its text), as they stand in a file."""
+    return {"version": __version__, "command": command, "cells": list(cells)}
 
 
 def _pass(oracle: Oracle) -> dict[str, Any]:
@@ -98,43 +110,41 @@ def _pass(oracle: Oracle) -> dict[str, Any]:
     }
 
 
-def save(oracles: Sequence[Oracle], path: str | Path, command: str) -> None:
-    """Write oracles as JSON, whole or not at all."""
-    text = json.dumps(as_data(oracles, command), separators=(",", ":"))
+def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> None:
+    """Write cells as JSON, whole or not at all."""
+    text = json.dumps(as_data(cells, command), separators=(",", ":"))
     with write_whole(path) as temporary:
         temporary.write_text(
             text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
         )
 
 
-@cache
-def load(path: Path = RESULTS) -> dict[str, Any]:
-    """What a file of ``save`` holds."""
-    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+def read(path: str | Path) -> dict[str, Any]:
+    """What a file of ``save`` holds. Raises InputError for another file."""
+    try:
+        data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        [one["fingerprint"] for one in (each["asked"] for each in data["cells"])]
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} holds no oracles of this version; remove it, or name another file."
+        ) from error
     return data
 
 
-def stored_ratio(
-    given: Mapping[str, Any], path: Path = RESULTS, spans: tuple[int, int] | None = None
-) -> float | None:
+@cache
+def load(path: Path = RESULTS) -> dict[str, Any]:
+    """What a file of ``save`` holds, read once."""
+    return read(path)
+
+
+def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int], path: Path = RESULTS) -> float | None:
     """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
 
     None where there is none of exactly this line, pantograph, speed, actuator, condition of the line, control
-    interval and computation, nor, where spans are named, of these; what is sensed does not matter.
+    interval and computation over exactly these spans; what is sensed does not matter.
     """
     wanted = fingerprint(given)
-    for cell in load(path)["cells"]:
-        if cell["fingerprint"] == wanted and spans in (None, tuple(cell["spans"])):
-            return float(cell["ratio"])
+    for one in load(path)["cells"]:
+        if one["asked"]["fingerprint"] == wanted and tuple(one["spans"]) == spans:
+            return float(one["ratio"])
     return None
-
-
-def share_of_oracle(
-    given: Mapping[str, Any], std: float, passive_std: float, path: Path = RESULTS
-) -> float | None:
-    """Share of what the stored oracle takes off σ that a policy does, from σ with it and without (N).
-
-    1 is the oracle, 0 the passive run, less than 0 worse than that. None as of ``stored_ratio``.
-    """
-    ratio = stored_ratio(given, path)
-    return None if ratio is None else (1.0 - std / passive_std) / (1.0 - ratio)
