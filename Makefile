@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -25,6 +25,14 @@ demo: $(READY)
 	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --plot $(DEMO)/benchmark.png \
 	  --html $(DEMO)/benchmark.html
 	@echo "The page is $(DEMO)/benchmark.html, the picture $(DEMO)/benchmark.png; every figure is in $(DEMO)/benchmark.json."
+
+# All tracks of the benchmark, with the agents that come with the project, and the page of all.
+TRACKS := known-line as-built without-position head high-speed unknown-line
+RESULTS := docs/benchmark
+benchmark: $(READY)
+	for track in $(TRACKS); do \
+	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json || exit 1; done
+	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json) --output $(RESULTS)/index.html
 
 lint: $(READY)
 	$(BIN)/ruff check .
