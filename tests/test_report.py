@@ -18,6 +18,7 @@ from panto_baselines.report.command import report
 from panto_baselines.report.descriptions import what_is
 from panto_baselines.report.page import page
 from panto_baselines.report.result import parse_result
+from panto_baselines.report.summary import summary
 from panto_baselines.report.tables import signed
 from panto_baselines.report.toml import as_toml
 from panto_configs import names
@@ -284,3 +285,28 @@ def test_a_browser_sorts_by_a_click_and_hides_by_a_tick(tmp_path):
 def test_a_column_with_gaps_keeps_them_last(tmp_path):
     text = opened(tmp_path, 'const b = document.querySelector("th button"); b.click();')
     assert [row[0] for row in Reader(text).tables[0][1:]] == ["3", "2", "1", "–"]
+
+
+def test_a_document_s_table_holds_every_policy_place_and_oracle():
+    table = result()
+    table["cells"][1]["oracle_share"] = 0.5  # of p at 250 km/h, whose change is -10
+    table["cells"][2] |= {"disqualified": "it presses", "mean_change": 3.2}  # pd at 250 km/h
+    made = summary(parse_result(table, "it"))
+    assert made.headings == ("policy", "250 km/h", "300 km/h", "all")
+    assert made.cells[0] == ("pd", "(-9.0; mean +3.2)", "-9.0", "-9.0")  # by the standings' ranks
+    assert ("p", "-10.0", "-10.0", "-10.0") in made.cells
+    assert made.cells[-2][0] == HOSTILE  # not ranked
+    assert made.cells[-1] == ("*oracle*", "-20.0", "–", "–")
+    passive = next(row for row in made.cells if row[0] == "passive")
+    assert passive[1] == "0.0 *"  # the first in the cells of this result by hand
+
+
+def test_panto_report_prints_it_and_writes_no_page(tmp_path):
+    file = tmp_path / "result.json"
+    file.write_text(json.dumps(result()))
+    app = typer.Typer()
+    app.command()(report)
+    told = CliRunner().invoke(app, [str(file), "--markdown"])
+    assert told.exit_code == 0, told.output
+    assert "| policy | 250 km/h | 300 km/h | all |" in told.output
+    assert list(tmp_path.iterdir()) == [file]
