@@ -116,6 +116,19 @@ def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay:
     assert x[: len(state)] == pytest.approx(state, rel=1e-6, abs=1e-10)
 
 
+def test_the_mean_line_is_two_half_strings_and_their_static_stiffness_over_a_span() -> None:
+    """EN 50318:2002: wires of 20 and 16 kN, 1.35 and 1.07 kg/m, spans of 60 m.
+
+    A half string moves at F / sqrt(T mu) under a force F at its end; two share the force.
+    """
+    line = mean_line(CONTEXT)
+    assert line.damper == pytest.approx(2 * np.sqrt((20e3 + 16e3) * (1.35 + 1.07)), rel=1e-9)
+    # Of a string between supports: 1 N at x bends it there by x (s - x) / (T s).
+    x = np.linspace(0, 60, 100_001)
+    deflection = x * (60 - x) / (36e3 * 60)
+    assert line.spring == pytest.approx(1 / deflection.mean(), rel=1e-4)
+
+
 def test_a_line_without_wires_is_refused() -> None:
     context = a_context(catenary="periodic-stiffness", speed_kmh=100.0)
     with pytest.raises(InputError, match="has no wires"):
