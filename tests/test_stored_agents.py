@@ -1,0 +1,74 @@
+"""The agents that come with the project: whole, safe, small, told what made them, better than nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from panto_agents.model_file import read_model
+from panto_agents.settings import load_training
+from panto_agents.stored import FOLDER
+from panto_env import simulate
+from panto_env.policies import find_policy, policy_names
+
+NAMES = sorted(path.stem for path in FOLDER.glob("*.zip"))
+GAINS = {"known-line": 0.72, "head": 0.40}
+"""Of sigma to the passive pantograph at 300 km/h on a test seed: at most."""
+CONFIGS = {"known-line": "agent-clone", "head": "agent-head"}
+
+
+def given(name):
+    """Settings of a pass as in the agent's training."""
+    environment = load_training(CONFIGS[name]).environment
+    kept = {key: environment[key] for key in ("actuator", "sensors") if key in environment}
+    return {"actuator": "realistic", "sensors": "realistic", "speed_kmh": 300.0, "seed": 0} | kept
+
+
+def test_each_file_is_a_policy_and_each_policy_has_its_file():
+    assert sorted(GAINS) == NAMES
+    agents = {each for each in policy_names() if each.startswith("agent-")}
+    assert agents == {f"agent-{name}" for name in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+class TestAgent:
+    def test_is_small_and_holds_nothing_pickled(self, name):
+        path = FOLDER / f"{name}.zip"
+        assert path.stat().st_size < 500_000
+        with zipfile.ZipFile(path) as archive:
+            assert sorted(archive.namelist()) == ["actor.npz", "panto.json"]
+
+    def test_says_what_made_it(self, name):
+        facts, _ = read_model(FOLDER / f"{name}.zip")
+        training = load_training(CONFIGS[name])
+        assert facts.qualified
+        assert facts.environment == training.environment
+        assert facts.seed == training.seed
+        assert facts.commit
+        assert "dirty" not in facts.commit
+        assert facts.command.split()[:3] == ["panto", "train", CONFIGS[name]]
+
+    def test_steadies_the_force_at_its_mean(self, name):
+        passive, steadied = (
+            simulate(**given(name), policy=policy, record_droppers=False).summary()
+            for policy in ("passive", f"agent-{name}")
+        )
+        assert steadied.std < GAINS[name] * passive.std
+        assert abs(steadied.mean / passive.mean - 1) < 0.015
+
+
+def test_they_need_no_torch():
+    code = (
+        "import sys, panto_env\n"
+        "panto_env.simulate(policy='agent-known-line', distance=120, record_droppers=False)\n"
+        "assert not {'torch', 'stable_baselines3'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_their_docstrings_are_what_the_list_shows():
+    for name in NAMES:
+        assert find_policy(f"agent-{name}").facts.needs.observation == "measured"
