@@ -210,6 +210,12 @@ def test_candidates_that_fail_are_not_taken() -> None:
         fit(residuals, np.ones(1), np.array([0.1]), 3)
 
 
+def test_where_all_candidates_are_worse_the_start_stays() -> None:
+    found = fit(lambda x: 1 + np.abs(x), np.zeros(1), np.array([0.1]), 3)
+    assert found.gains == [0.0]
+    assert found.history == (1.0,)
+
+
 # --- batches and tuning --------------------------------------------------------------------------
 
 
