@@ -155,15 +155,15 @@ def test_gains_are_named_in_order() -> None:
 
 def test_without_a_place_it_takes_more_off_sigma_than_learning_alone() -> None:
     settings = run_settings(
-        {"speed_kmh": 300.0, "actuator": "realistic", "sensors": "blind", "line_condition": "fair"}
+        {"speed_kmh": 325.0, "actuator": "realistic", "sensors": "blind", "line_condition": "fair"}
         | {"accuracy": "fast"}
     )
     laws = [Still(), Repetitive(place="counted"), Adaptive(place="counted")]
-    force = run_batch(settings, laws, [1003])
-    changes = force.std[1:, 0] / force.std[0, 0] - 1
-    assert changes[1] < -0.22
+    force = run_batch(settings, laws, [1000, 1003])
+    changes = (force.std[1:] / force.std[0]).mean(axis=1) - 1
+    assert changes[1] < -0.2
     assert changes[1] < changes[0] - 0.01
-    assert force.mean[2, 0] == pytest.approx(force.mean[0, 0], rel=MEAN_TOLERANCE)
+    assert force.mean[2] == pytest.approx(force.mean[0], rel=MEAN_TOLERANCE)
     with pytest.raises(InputError, match="needs the place within the span"):
         run_batch(settings, [Adaptive()], [1003])
 

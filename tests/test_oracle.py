@@ -199,6 +199,11 @@ def test_the_force_keeps_the_actuators_limits(short: Problem, descent: solver.De
     assert not force[: short.begin * short.steps].any()
 
 
+def test_a_mean_off_the_passive_one_counts_in_the_merit(short: Problem):
+    force = short.figures.mean + np.array([1.5, -0.5, 1.5, -0.5])
+    assert solver.merit(short, force) == pytest.approx(1.0 + solver.MEAN_WEIGHT * 0.5, rel=1e-9)
+
+
 def test_broydens_correction_meets_what_was_seen():
     random = np.random.default_rng(0)
     response, step, change = random.normal(size=(5, 3)), random.normal(size=3), random.normal(size=5)

@@ -210,6 +210,12 @@ def test_candidates_that_fail_are_not_taken() -> None:
         fit(residuals, np.ones(1), np.array([0.1]), 3)
 
 
+def test_where_all_candidates_are_worse_the_start_stays() -> None:
+    found = fit(lambda x: 1 + np.abs(x), np.zeros(1), np.array([0.1]), 3)
+    assert found.gains == [0.0]
+    assert found.history == (1.0,)
+
+
 # --- batches and tuning --------------------------------------------------------------------------
 
 
@@ -217,6 +223,7 @@ def test_a_batch_is_what_single_passes_are() -> None:
     settings = {"speed_kmh": 300.0, "accuracy": "fast", "distance": 660.0, "spans": 19} | REAL
     laws = [Still(), Skyhook(gains=(100.0, 0.0))]
     force = run_batch(run_settings(settings), laws, [1000, 1001])
+    assert (force.std[:, 0] != force.std[:, 1]).all()  # a line of its own for each seed
     for row, policy in enumerate((None, "skyhook:gains=(100.0,0.0)")):
         figures = simulate(policy=policy, seed=1001, **settings).summary()
         assert force.mean[row, 1] == pytest.approx(figures.mean, rel=1e-3)
