@@ -30,6 +30,7 @@ demo: $(READY)
 TRACKS := known-line as-built without-position head high-speed unknown-line
 RESULTS := docs/benchmark
 benchmark: $(READY)
+	mkdir -p $(RESULTS)
 	for track in $(TRACKS); do \
 	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json || exit 1; done
 	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json) --output $(RESULTS)/index.html
