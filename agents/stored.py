@@ -25,3 +25,11 @@ def head() -> TrainedPolicy:
     It began as ``periodic`` of the head and learnt on by PPO; realistic sensors.
     """
     return load(FOLDER / "head.zip")
+
+
+def high_speed() -> TrainedPolicy:
+    """One agent for shinkansen-simple under identified-2dof, 250 to 400 km/h, as lines are built.
+
+    It learnt by PPO from nothing but rewards; realistic actuator, on the frame, and sensors.
+    """
+    return load(FOLDER / "high-speed.zip")

@@ -15,15 +15,16 @@ from panto_env import simulate
 from panto_env.policies import find_policy, policy_names
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.zip"))
-GAINS = {"known-line": 0.72, "head": 0.40}
+KEPT = ("catenary", "pantograph", "actuator", "sensors")
+GAINS = {"known-line": 0.72, "head": 0.40, "high-speed": 0.75}
 """Of sigma to the passive pantograph at 300 km/h on a test seed: at most."""
-CONFIGS = {"known-line": "agent-clone", "head": "agent-head"}
+CONFIGS = {"known-line": "agent-clone", "head": "agent-head", "high-speed": "agent-high-speed"}
 
 
 def given(name):
     """Settings of a pass as in the agent's training."""
     environment = load_training(CONFIGS[name]).environment
-    kept = {key: environment[key] for key in ("actuator", "sensors") if key in environment}
+    kept = {key: environment[key] for key in KEPT if key in environment}
     return {"actuator": "realistic", "sensors": "realistic", "speed_kmh": 300.0, "seed": 0} | kept
 
 
