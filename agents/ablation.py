@@ -87,9 +87,10 @@ def run(
     again finishes what was begun. workers, ray, command: as ``train_all`` takes them. Returns each run's best
     model, and the benchmark of all.
     """
-    folders = {(name, seed): _folder(output, name, seed) for name, seed in ablation.trainings()}
-    trainings = {folders[key]: training for key, training in ablation.trainings().items()}
-    train_all(trainings, resume=True, workers=workers, ray=ray, progress=progress, command=command)
+    trainings = ablation.trainings()
+    folders = {(name, seed): _folder(output, name, seed) for name, seed in trainings}
+    runs = {folders[key]: training for key, training in trainings.items()}
+    train_all(runs, resume=True, workers=workers, ray=ray, progress=progress, command=command)
     models = {key: RunFolder(folder).best for key, folder in folders.items()}
     return models, run_benchmark(ablation.benchmark(models), workers, ray=ray)
 

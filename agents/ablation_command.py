@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from panto_env.base.files import finite
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, console, counting, print_json
+from panto_env.terminal import Json, counting, print_json, print_table, this_command
 
 from .packages import check_packages
 
@@ -34,11 +31,11 @@ def ablation(
 
     settings = load_ablation(config)
     with counting("trainings") as progress:
-        folder, command = output or Path("runs") / config.stem, shlex.join(["panto", *sys.argv[1:]])
+        folder, command = output or Path("runs") / config.stem, this_command()
         models, outcome = run(settings, folder, workers, ray, progress, command)
     found = variants(models, outcome)
     if json:
         rows = [asdict(each) for each in found]
-        print_json(finite({"settings": settings.model_dump(mode="json"), "variants": rows}))
+        print_json({"settings": settings.model_dump(mode="json"), "variants": rows})
         return
-    console.print(table(found, f"{settings.training}, {settings.total_steps:,} steps, {settings.judged_by}"))
+    print_table(table(found, f"{settings.training}, {settings.total_steps:,} steps, {settings.judged_by}"))

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.table import Table
 
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.statistics import bootstrap_interval, interquartile_mean
+from panto_env.base.table import Table
 
 from .ablation import REFERENCE
 
@@ -77,12 +77,9 @@ def _difference(changes: Array, base: Array) -> Interval:
 
 def table(found: Sequence[Variant], title: str) -> Table:
     """The variants as a table."""
-    made = Table(title=title)
     headings = ("variant", "runs", "Δσ (%)", "95 %", "loses", "worse in", "mean held")
-    for heading in headings:
-        made.add_column(heading, justify="left" if heading == "variant" else "right")
-    for each in found:
-        made.add_row(
+    rows = [
+        (
             each.name,
             str(len(each.changes)),
             f"{each.change:.1f}",
@@ -91,7 +88,9 @@ def table(found: Sequence[Variant], title: str) -> Table:
             "–" if each.worse is None else f"{100 * each.worse:.0f} %",
             f"{100 * each.qualified:.0f} %",
         )
-    return made
+        for each in found
+    ]
+    return Table(title, headings, rows)
 
 
 def _between(interval: Interval | None) -> str:

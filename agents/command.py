@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +14,16 @@ from panto_env.analysis.requirements import print_criteria
 from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
-from panto_env.terminal import Json, Plot, console, number, print_json, progress_console, writable
+from panto_env.terminal import (
+    Json,
+    Plot,
+    console,
+    number,
+    print_json,
+    progress_console,
+    this_command,
+    writable,
+)
 
 from .packages import check_packages
 
@@ -64,7 +71,7 @@ def train(
         from .model_file import read_model
         from .train import train as run
     try:
-        paths = run(training, folder, resume=resume, command=shlex.join(["panto", *sys.argv[1:]]))
+        paths = run(training, folder, resume=resume, command=this_command())
     except KeyboardInterrupt as error:
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({folder}).")
         raise typer.Exit(130) from error

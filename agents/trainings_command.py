@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +11,7 @@ import typer
 
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, counting, print_json, print_table, progress_console
+from panto_env.terminal import Json, counting, print_json, print_table, progress_console, this_command
 
 from .packages import check_packages
 
@@ -50,7 +48,7 @@ def trainings(
     planned = plan(configs, seed or None, steps, output)
     try:
         with counting("trainings") as progress:
-            command = shlex.join(["panto", *sys.argv[1:]])
+            command = this_command()
             outcomes = train_all(
                 planned, resume=resume, workers=workers, ray=ray, progress=progress, command=command
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -44,6 +45,11 @@ def print_json(value: Any) -> None:
     """Print JSON to standard output; figures that are not numbers become null."""
     json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=False)
     sys.stdout.write("\n")
+
+
+def this_command() -> str:
+    """The command that is running, as it is noted beside what it makes."""
+    return shlex.join(["panto", *sys.argv[1:]])
 
 
 def print_table(table: Table) -> None:

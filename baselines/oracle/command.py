@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +9,16 @@ import typer
 
 from panto_env.analysis.options import parse_spans, with_settings
 from panto_env.base.errors import InputError
-from panto_env.terminal import Json, Plot, console, print_json, print_table, progress_console, writable
+from panto_env.terminal import (
+    Json,
+    Plot,
+    console,
+    print_json,
+    print_table,
+    progress_console,
+    this_command,
+    writable,
+)
 
 if TYPE_CHECKING:
     from .search import Oracle
@@ -78,7 +85,7 @@ def oracle(
     }
     only = given | ({"speeds_kmh": speed} if speed else {})
     settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
-    command = shlex.join(["panto", *sys.argv[1:]])
+    command = this_command()
     wanted = asked(settings)
     before = read(output)["cells"] if output is not None and Path(output).exists() else []
     done: list[dict[str, Any] | None] = [

@@ -9,7 +9,7 @@ import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, counting, print_json, print_table
+from panto_env.terminal import Json, counting, print_json, print_table, this_command
 
 
 @with_settings(
@@ -52,9 +52,6 @@ def tune(
     shows what the gains do on selection seeds. Actuator and sensors are "realistic", the line "fair", unless
     told otherwise.
     """
-    import shlex
-    import sys
-
     from panto_env.control import Task
     from panto_env.control.settings import run_settings
 
@@ -75,7 +72,7 @@ def tune(
     speeds = sorted(set(speed or SPEEDS_KMH))
     with counting("speeds") as progress:
         tuned = run(policy, settings, speeds, count, passes or PASSES, workers, progress, ray)
-    command = shlex.join(["panto", *sys.argv[1:]])
+    command = this_command()
     tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
     store(path, policy, tuning)
     if json:
