@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -12,7 +12,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,diagnosis,dev,render]'
+	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,diagnosis,dev,docs,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
@@ -43,6 +43,12 @@ lint: $(READY)
 
 test: $(READY) lint
 	$(BIN)/pytest -n auto -m 'not slow'
+
+# The documentation as a site, warnings as errors. `make test` builds it too, and follows every link within it.
+SITE := docs/_build/html
+docs: $(READY)
+	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs $(SITE)
+	@echo "The site is $(SITE)/index.html; it needs no network."
 
 # Slow proofs: more lines against finite elements, longer trainings.
 proofs: $(READY)

@@ -94,7 +94,7 @@ class FlexibleCatenaryData(CatenaryData):
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
 
         A dropper, stiff and without mass, joins two strings of impedances Z = sqrt(T m): Z_m / (Z_c + Z_m).
-        A spring k with a mass m sends back |K| / sqrt(K^2 + (2 omega Z_c)^2), K = k - omega^2 m.
+        A spring k with a mass m sends back ``|K| / sqrt(K^2 + (2 omega Z_c)^2)``, K = k - omega^2 m.
         """
         contact, messenger = self.contact_wire.impedance, self.messenger_wire.impedance
         omega = 2 * math.pi * frequency

@@ -1,8 +1,10 @@
 """Static shape of the two-wire catenary, solved in closed form for one span of a periodic line.
 
 A tensioned beam (T y'' - EI y'''' + p = 0) under its own weight and point forces, periodic in the
-span L, has the Green's function of a string less that of its bending layers:
+span L, has the Green's function of a string less that of its bending layers::
+
     G(x) = L/(2T) B2(|x|/L) - 1/T [cosh(kappa (L/2 - |x|)) / (2 kappa sinh(kappa L/2)) - 1/(L kappa^2)]
+
 with kappa = sqrt(T/EI) and B2(s) = s^2 - s + 1/6, the second Bernoulli polynomial.
 """
 
