@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs proofs coverage mutants same nonsense oldest ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs proofs coverage mutants same nonsense oldest pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -82,6 +82,16 @@ oldest:
 	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt $(OLDEST_ONES) pytest --editable .
 	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_vector_rules.py
 
+# Every version of Python that is supported and at hand, the first one apart, without the extra 'agents'.
+PYTHONS := $(shell command -v python3.12 python3.13)
+pythons:
+	for python in $(PYTHONS); do \
+	  venv=.venv-$$(basename $$python); \
+	  $$python -m venv $$venv && \
+	  $$venv/bin/pip install -qq --constraint constraints.txt pytest --editable '.[control,render]' && \
+	  $$venv/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_baselines.py \
+	    || exit 1; done
+
 # The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.
 PTX := .venv-ptx
 ptx:
@@ -117,4 +127,4 @@ libraries:
 	$(LIBRARIES)/bin/pytest tests/test_libraries.py
 
 clean:
-	rm -rf $(VENV) $(OLDEST) $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(OLDEST) .venv-python3.* $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -1,0 +1,110 @@
+"""What is installed elsewhere: built of the packed sources, with all files, typed for those who use it."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+import yaml
+
+import panto_env
+
+ROOT = Path(panto_env.__file__).parents[1]
+FOLDERS = {"agents": "panto_agents", "baselines": "panto_baselines", "configs": "panto_configs"}
+"""Folders whose name in the wheel is another."""
+USER = """
+import gymnasium
+import panto_env
+from panto_env import Trajectory, simulate
+
+run: Trajectory = simulate("periodic-stiffness", "three-mass", 200.0, distance=600.0)
+deviation: float = run.summary("all").std
+wrong: int = run.summary("all").std
+env = gymnasium.make("panto_env:PantographStiffness-v0")
+env.reset(seed=0)
+print(f"{deviation:.3f}", panto_env.__file__)
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """A wheel, built from the packed sources."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def python(wheel, tmp_path_factory):
+    """An interpreter that has the wheel, and what it stands on from here, but not this checkout."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    venv.create(folder, with_pip=False, symlinks=True)
+    interpreter = folder / "bin" / "python"
+    command = [sys.executable, "-m", "pip", "--python", interpreter, "install", "-q", "--no-deps", wheel]
+    subprocess.run(command, check=True, capture_output=True)
+    (own,) = (folder / "lib").glob("python*/site-packages")
+    (own / "below.pth").write_text(sysconfig.get_path("purelib"))
+    return interpreter
+
+
+def run(command, **options):
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+def test_every_file_of_the_packages_is_in_it(wheel):
+    listed = run(["git", "ls-files", "panto_env", *FOLDERS], cwd=ROOT)
+    if listed.returncode != 0:
+        pytest.skip("this is no checkout")
+    wanted = set()
+    for name in listed.stdout.split():
+        first, _, rest = name.partition("/")
+        wanted.add(f"{FOLDERS.get(first, first)}/{rest}")
+    inside = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert inside == wanted
+
+
+def test_it_works_without_the_checkout(python, tmp_path):
+    code = USER.replace("wrong: int", "wrong")
+    ran = run([python, "-c", code], cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    deviation, place = ran.stdout.split()
+    assert float(deviation) > 0
+    assert str(python.parents[1]) in place
+
+
+def test_its_commands_find_what_they_come_with(python, tmp_path):
+    panto = python.parent / "panto"
+    wanted = {
+        ("--version",): panto_env.__version__,
+        ("list", "en50318-2002"): "20000",
+        ("list", "agent-known-line"): "agent-known-line",
+        ("oracle", "--stored"): "300",
+    }
+    for arguments, words in wanted.items():
+        shown = run([panto, *arguments], cwd=tmp_path, env=os.environ | {"COLUMNS": "200"})
+        assert shown.returncode == 0, shown.stderr
+        assert words in shown.stdout
+
+
+def test_it_is_typed_for_those_who_use_it(python, tmp_path):
+    """A mistake is found in code that only imports it, so its types are seen, not taken for Any."""
+    (tmp_path / "user.py").write_text(USER)
+    options = ["--python-executable", python, "--cache-dir", tmp_path / "cache", "--strict"]
+    found = run([sys.executable, "-m", "mypy", *options, tmp_path / "user.py"], cwd=tmp_path)
+    errors = [line for line in found.stdout.splitlines() if "error:" in line]
+    assert len(errors) == 1, found.stdout
+    assert 'expression has type "float", variable has type "int"' in errors[0]
+
+
+def test_the_citation_names_this_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == panto_env.__version__
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## {panto_env.__version__} ({citation['date-released']})" in changelog
