@@ -264,10 +264,20 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
 
 
 def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
-    forces, sigmas = plot.plot(outcome).axes
-    assert forces.get_legend_handles_labels()[1] == ["passive", P, "nominal force"]
+    figure = plot.plot(outcome)
+    forces, sigmas, changes = figure.axes
+    limits = ["nominal force", "limit of EN 50367", "0 N: no contact"]
+    assert forces.get_legend_handles_labels()[1] == ["passive", P, *limits]
     assert forces.get_xlim() == (180, 300)  # the last two spans evaluated
-    assert sigmas.get_legend_handles_labels()[1] == ["passive", P]
+    means = [cell.figures["mean"] for cell in outcome.cells if cell.policy == "passive"]
+    assert list(sigmas.lines[-1].get_ydata()) == pytest.approx([0.3 * mean for mean in means])
+    intervals = [list(line.get_ydata()) for line in changes.lines if len(line.get_xdata()) == 2]
+    for cell in outcome.cells:
+        if cell.interval is not None:
+            assert list(cell.interval) in intervals
+    (part,) = figure.subfigs
+    assert "spans" in part.get_suptitle()
+    assert all(axis.get_legend() is None for axis in figure.axes)  # none lies on data
     assert "(N)" in forces.get_ylabel()
     assert "(km/h)" in sigmas.get_xlabel()
 

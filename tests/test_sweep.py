@@ -9,7 +9,7 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, parameter_names
-from panto_env.analysis.sweep import sweep
+from panto_env.analysis.sweep import labels, sweep
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.cli.sweep import parse_values
 from panto_env.plant.actuators.lagged import LaggedActuator
@@ -245,7 +245,10 @@ def test_plot_shows_what_varies():
     rows = sweep(
         {"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3, policies=[None, "p"]
     )
-    maps = plot_sweep(rows, ["catenary.mean_stiffness", "speed_kmh"])
+    names = labels(["catenary.mean_stiffness", "speed_kmh"], **PAPER_3)
+    maps = plot_sweep(rows, ["catenary.mean_stiffness", "speed_kmh"], names)
+    assert maps.get_supxlabel() == "catenary: mean stiffness k_m (N/m)"
+    assert maps.get_supylabel() == "speed of the train (km/h)"
     images = [axis for axis in maps.axes if axis.get_title()]
     assert len(images) == 6  # sigma, maximum and minimum of two policies
     passive = {row["speed_kmh"]: [] for row in rows}
@@ -257,3 +260,28 @@ def test_plot_shows_what_varies():
     lines = plot_sweep(one_speed, ["catenary.mean_stiffness", "speed_kmh"])
     assert list(lines.axes[1].lines[0].get_ydata()) == passive[300.0]
     assert "speed_kmh = 300" in lines.get_suptitle()
+    assert "spans 10-19" in lines.get_suptitle()
+
+
+def test_a_plot_names_parameters_in_words_with_their_units():
+    wanted = {
+        "pantograph.masses.0": "pantograph: masses, head first, 1st (kg)",
+        "catenary.contact_wire.tension": "catenary: contact wire: tension (N)",
+        "catenary.droppers.sag.10": "catenary: droppers: how far the contact wire hangs below its height at "
+        "the support, 11th (m)",
+        "speed_kmh": "speed of the train (km/h)",
+        "policy.gain": "policy: gain",
+    }
+    assert {name: labels([name])[name] for name in wanted} == wanted
+
+
+def test_what_is_bright_on_a_map_is_bad():
+    from panto_env.analysis.sweep_plots import plot_sweep
+
+    rows = sweep({"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3)
+    for axis in plot_sweep(rows, ["catenary.mean_stiffness", "speed_kmh"]).axes[:3]:
+        (mesh,) = axis.collections
+        values = mesh.get_array().ravel()
+        brightness = mesh.cmap(mesh.norm(values))[:, :3].sum(axis=1)
+        worst = values.argmin() if "minimum" in axis.get_title() else values.argmax()
+        assert brightness.argmax() == worst

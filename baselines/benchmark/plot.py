@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports
+from panto_env.analysis.plots import SUPPORTS, mark_supports
+from panto_env.base.colours import LIMIT, series_colour
+from panto_env.metrics import en50367
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import low_pass_in_place
 from panto_env.metrics.spans import in_words, limits, within
@@ -17,12 +19,13 @@ from .single_pass import drive
 from .statistics import Cell
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def plot(outcome: Benchmark) -> Figure:
-    """Contact force along two spans of every line, and sigma over speed.
+    """Contact force along two spans of every line; below it σ over speed, and its change with intervals.
 
     The force, low-passed without delay, is that at a line's highest speed with the first seed, over the
     last two evaluated spans; this runs one more pass per policy and line.
@@ -30,14 +33,21 @@ def plot(outcome: Benchmark) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    settings = outcome.settings
-    lines = settings.lines
-    figure = Figure(figsize=(11, 3.6 * len(lines) + 4.2), layout="constrained")
-    grid = figure.add_gridspec(len(lines) + 1, len(lines))
-    for k, line in enumerate(lines):
-        colours = {policy: f"C{k % 10}" for k, policy in enumerate(settings.policies_on(line))}
-        _forces(figure.add_subplot(grid[k, :]), outcome, k, colours)
-        _sigmas(figure.add_subplot(grid[len(lines), k]), line, _cells_of(outcome, line), colours)
+    lines = outcome.settings.lines
+    figure = Figure(figsize=(11, 8 * len(lines)), layout="constrained")
+    parts = figure.subfigures(len(lines), 1, squeeze=False)[:, 0]
+    for k, (part, line) in enumerate(zip(parts, lines, strict=True)):
+        colours = {policy: series_colour(n) for n, policy in enumerate(outcome.settings.policies_on(line))}
+        above, below = part.subfigures(2, 1)
+        forces, (sigmas, changes) = above.subplots(), below.subplots(1, 2)
+        _forces(forces, outcome, k, colours)
+        cells = _cells_of(outcome, line)
+        _sigmas(sigmas, cells, colours)
+        _changes(changes, cells, colours)
+        where = f"pantograph {line.pantograph}, line {line.catenary}"
+        part.suptitle(f"{where}; evaluated spans {in_words(outcome.spans[k])}, seeds: {cells[0].seeds}")
+        handles, labels = _legend(forces, cells)
+        part.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
     return figure
 
 
@@ -57,37 +67,67 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         force = low_pass_in_place(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    axes.axhline(0.0, color="tab:red", linewidth=0.9)
+    limit = en50367.maximum_limit(speed / 3.6)
+    axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label="limit of EN 50367")
+    axes.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
     mark_supports(axes, run)
     axes.set(
-        title=f"{line.pantograph} on {line.catenary} at {speed:g} km/h, seed {seed}",
-        xlabel=f"position (m); grey lines: supports; spans {in_words(shown)} of the evaluated "
-        f"{in_words(outcome.spans[place])}",
+        title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
+        xlabel=SUPPORTS,
         ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
         xlim=limits(shown, run.span_length),
     )
-    axes.legend(ncols=len(colours) + 1, loc="upper center", fontsize="small", frameon=False)
-    axes.set_ylim(top=axes.get_ylim()[1] + 0.12 * np.ptp(axes.get_ylim()))
 
 
-def _sigmas(axes: Axes, line: Line, cells: list[Cell], colours: dict[str, str]) -> None:
+def _sigmas(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
+    """σ over speed, and the largest that EN 50367 allows at the passive pantograph's mean force."""
     for policy, colour in colours.items():
-        by_speed = sorted((c for c in cells if c.policy == policy), key=lambda cell: cell.speed_kmh)
-        speeds = np.array([cell.speed_kmh for cell in by_speed])
-        sigma = np.array([cell.figures["std"] for cell in by_speed])
-        qualified = np.array([not cell.disqualified for cell in by_speed])
-        axes.plot(speeds, sigma, color=colour, linewidth=1.3)
-        axes.plot(speeds[qualified], sigma[qualified], "o", color=colour, label=policy)
-        axes.plot(speeds[~qualified], sigma[~qualified], "o", color=colour, markerfacecolor="white")
-    if any(cell.disqualified for cell in cells):
-        axes.plot([], [], "o", color="0.4", markerfacecolor="white", label="disqualified")
-    if any(np.isnan(cell.figures["std"]) for cell in cells):
-        axes.plot([], [], " ", label="not shown: ended early")
-    axes.set(
-        title=f"{line.pantograph} on {line.catenary}",
-        xlabel="speed (km/h)",
-        ylabel=LABELS["std"].heading,
-        xticks=sorted(line.speeds_kmh),
-    )
+        by_speed = _by_speed(cells, policy)
+        speeds = [cell.speed_kmh for cell in by_speed]
+        axes.plot(speeds, [cell.figures["std"] for cell in by_speed], ".-", color=colour, linewidth=1.3)
+    first = _by_speed(cells, next(iter(colours)))
+    limit = [en50367.STD_OF_MEAN * cell.figures["mean"] for cell in first]
+    axes.plot([cell.speed_kmh for cell in first], limit, color=LIMIT, linestyle="--", linewidth=0.9)
+    axes.set(xlabel="speed (km/h)", ylabel=LABELS["std"].heading, xticks=sorted({c.speed_kmh for c in cells}))
     axes.set_ylim(bottom=0)
-    axes.legend(fontsize="small", frameon=False, loc="lower left")
+
+
+def _changes(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
+    """Change of σ with its 95 % interval, policies side by side at each speed."""
+    speeds = sorted({cell.speed_kmh for cell in cells})
+    apart = 0.6 * min(np.diff(speeds), default=25.0) / len(colours)
+    for k, (policy, colour) in enumerate(colours.items()):
+        for cell in _by_speed(cells, policy):
+            x = cell.speed_kmh + apart * (k - (len(colours) - 1) / 2)
+            low, high = cell.interval or (cell.change, cell.change)
+            axes.plot([x, x], [low, high], color=colour, linewidth=1.6)
+            axes.plot(x, cell.change, "o", color=colour, markerfacecolor=_fill(cell, colour), markersize=5)
+    axes.axhline(0.0, color="0.4", linewidth=0.9)
+    axes.set(
+        title="against a passive pantograph of the same mean force",
+        xlabel="speed (km/h)",
+        ylabel="change of σ (%), and its 95 % interval",
+        xticks=speeds,
+    )
+
+
+def _fill(cell: Cell, colour: str) -> str:
+    return "white" if cell.disqualified else colour
+
+
+def _by_speed(cells: list[Cell], policy: str) -> list[Cell]:
+    return sorted((cell for cell in cells if cell.policy == policy), key=lambda cell: cell.speed_kmh)
+
+
+def _legend(axes: Axes, cells: list[Cell]) -> tuple[list[Artist], list[str]]:
+    """Entries for all panels of a line."""
+    from matplotlib.lines import Line2D
+
+    handles, labels = axes.get_legend_handles_labels()
+    if any(cell.disqualified for cell in cells):
+        handles.append(Line2D([], [], linestyle="", marker="o", color="0.4", markerfacecolor="white"))
+        labels.append("disqualified")
+    if any(np.isnan(cell.figures["std"]) for cell in cells):
+        handles.append(Line2D([], [], linestyle=""))
+        labels.append("not shown: ended early")
+    return handles, labels

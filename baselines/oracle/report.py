@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
+from panto_env.base.colours import BLUE
 from panto_env.base.table import Table
 from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
@@ -129,7 +130,7 @@ def plot(oracle: Oracle) -> Figure:
     position = run.position[inside]
     figure = Figure(figsize=(10, 9), layout="constrained")
     force, actuator, search = figure.subplots(3, 1)
-    for values, colour, label in zip(oracle.forces, ("0.6", "tab:blue"), ("passive", "oracle"), strict=True):
+    for values, colour, label in zip(oracle.forces, ("0.6", BLUE), ("passive", "oracle"), strict=True):
         force.plot(position, values[inside], color=colour, label=label)
     force.set(ylabel="contact force low-passed\nat 20 Hz, not delayed (N)")
     for values, label in ((run.frame_force, "on the frame"), (run.head_force, "on the head")):

@@ -45,6 +45,23 @@ def check_name(name: str, entry: Settings) -> None:
     )
 
 
+def parameter_label(name: str, entry: Settings) -> str:
+    """What a parameter of an entry is, with its unit: "pantograph: masses, head first, 1st (kg)"."""
+    family, *path = name.split(".")
+    words = [family.replace("_", " ")]
+    while path:
+        key = path.pop(0)
+        text = type(entry).model_fields[key].description or key
+        entry = getattr(entry, key)
+        if isinstance(entry, Settings):
+            words.append(key.replace("_", " "))
+        else:
+            break
+    unit = text[text.rfind(" (") :] if text.endswith(")") else ""
+    places = [_ordinal(int(place) + 1) for place in path]
+    return ": ".join((*words, ", ".join((text.removesuffix(unit), *places)))) + unit
+
+
 def change(entry: S, name: str, value: float) -> S:
     """The entry with another value of the parameter ``name``, whose first part names the family.
 
@@ -68,6 +85,11 @@ def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
         elif _is_number(value):
             names.append(f"{prefix}.{k}")
     return names
+
+
+def _ordinal(number: int) -> str:
+    ending = "th" if number // 10 % 10 == 1 else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"
 
 
 def _is_number(value: Any) -> bool:

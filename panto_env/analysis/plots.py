@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.colours import BLUE, GREEN, LIMIT, PURPLE, VERMILION
 from ..base.files import PICTURES, check_output, write_whole
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass_in_place
@@ -34,15 +35,16 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
     """Contact force, heights and actuator force over the spans, by default those after the start."""
     from matplotlib.figure import Figure
 
-    actuators = {"on the frame": (run.frame_force, "tab:green"), "on the head": (run.head_force, "tab:olive")}
+    actuators = {"on the frame": (run.frame_force, GREEN), "on the head": (run.head_force, PURPLE)}
     acting = {name: drawn for name, drawn in actuators.items() if drawn[0].any()}
-    figure = Figure(figsize=(10, 8 if acting else 6.4), layout="constrained")
-    contact, height, *others = figure.subplots(3 if acting else 2, 1, sharex=True)
+    figure = Figure(figsize=(10, 8.6 if acting else 7), layout="constrained")
+    ratios = (1.6, 1, 1) if acting else (1.6, 1)  # the force's limits take room
+    contact, height, *others = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     covered, shown = run.spans(spans), run.inside(spans)
     position = run.position[shown]
     _draw_force(contact, run, shown, raw="0.75")
-    height.plot(position, 1e3 * run.wire[shown], color="tab:red", label="contact wire")
-    height.plot(position, 1e3 * run.head[shown], color="tab:blue", label="collector head")
+    height.plot(position, 1e3 * run.wire[shown], color=VERMILION, label="contact wire")
+    height.plot(position, 1e3 * run.head[shown], color=BLUE, label="collector head")
     height.set(ylabel="height (mm)")
     for axis in others:
         for name, (force, colour) in acting.items():
@@ -53,7 +55,9 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
         _legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else limits(covered, run.span_length)
     figure.axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(run, covered)}", xlim=(begin, end))
-    figure.suptitle(f"{run.pantograph} on {run.catenary}, {run.speed_kmh:g} km/h, {run.policy}")
+    where = f"pantograph {run.pantograph}, line {run.catenary}, {run.speed_kmh:g} km/h"
+    shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
+    figure.suptitle(f"{where}, policy {run.policy}, {shown_spans}")
     return figure
 
 
@@ -93,7 +97,7 @@ def say_what_is_hidden(axis: Axes) -> None:
     hidden = [note for note, beyond in notes.items() if beyond]
     if hidden:
         text = f"not shown: {', '.join(hidden)}"
-        axis.text(0.99, 0.97, text, transform=axis.transAxes, ha="right", va="top", color="tab:red")
+        axis.text(0.99, 0.97, text, transform=axis.transAxes, ha="right", va="top", color=VERMILION)
 
 
 def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str) -> None:
@@ -103,10 +107,10 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     limit = en50367.maximum_limit(run.speed_kmh / 3.6)
     words = f"EN 50367: at most {limit:g} N"
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
-    axis.plot(position, filtered, color="tab:blue", label="low-passed at 20 Hz, not delayed")
+    axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")
     axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
-    axis.axhline(limit, color="tab:red", linestyle="--", linewidth=0.9, label=words)
-    axis.axhline(0.0, color="tab:red", linewidth=0.9, label="0 N: no contact")
+    axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
+    axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
     axis.set(ylabel="contact force (N)")
 
 

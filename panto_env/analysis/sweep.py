@@ -22,7 +22,7 @@ from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy, with_parameters
-from .parameters import change, check_name, parameter_names
+from .parameters import change, check_name, parameter_label, parameter_names
 from .pool import Progress, check_passes, in_threads, workers_for
 from .simulation import simulate
 
@@ -82,8 +82,7 @@ def sweep(
     checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
-    entries: dict[str, Settings] = {family: getattr(checked, family) for family in FAMILIES[:-1]}
-    entries["line_condition"] = checked.line_condition[0]
+    entries = _entries(checked)
     given = {**settings, "seed": seed}
     _check(parameters, entries, policies)
     passes = [
@@ -96,6 +95,25 @@ def sweep(
     return in_threads(
         [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
     )
+
+
+def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
+    """What each parameter is, with its unit, for the axes of a plot; settings: those of ``sweep``."""
+    entries = _entries(run_settings({name: settings[name] for name in FAMILIES if name in settings}))
+    found = {SPEED: "speed of the train (km/h)"}
+    for name in parameters:
+        family, _, rest = name.partition(".")
+        found.setdefault(
+            name,
+            parameter_label(name, entries[family]) if family in entries else f"policy: {rest}",
+        )
+    return found
+
+
+def _entries(settings: RunSettings) -> dict[str, Settings]:
+    """What a sweep may change, by family."""
+    entries: dict[str, Settings] = {family: getattr(settings, family) for family in FAMILIES[:-1]}
+    return entries | {"line_condition": settings.line_condition[0]}
 
 
 def _check(

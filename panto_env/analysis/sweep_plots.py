@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isnan
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..metrics import en50367
 from ..metrics.labels import LABELS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Row = Mapping[str, Any]
+DASHES = (0, (5, 3))
+"""Of limits: longer than those of a maximum."""
+LETTERS = 40
+"""Of a line of an axis's label."""
 FORCES: dict[str, tuple[str, Any]] = {
     "maximum": ("max", "--"),
     "mean": ("mean", "-"),
@@ -20,77 +28,106 @@ FORCES: dict[str, tuple[str, Any]] = {
 """Figures of the contact force over one parameter: as the legend names them, key and line style."""
 BELOW_FORCE = ("std", "contact_loss", "max_uplift")
 """Figures that a plot over one parameter shows below the contact force."""
-MAPPED = ("std", "max", "min")
-"""Figures that are shown as maps over two parameters."""
+MAPPED = {"std": HIGH_IS_BAD, "max": HIGH_IS_BAD, "min": LOW_IS_BAD}
+"""Figures that are shown as maps over two parameters, and their colours."""
 
 
-def plot_sweep(rows: Sequence[Row], parameters: Sequence[str]) -> Figure:
-    """Figures over one parameter, or σ, maximum and minimum as maps over two; one value varies nothing."""
+def plot_sweep(
+    rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str] | None = None
+) -> Figure:
+    """Figures over one parameter, or σ, maximum and minimum as maps over two; one value varies nothing.
+
+    labels: of parameters, with their units, as ``sweep.labels`` gives them; else their dotted names.
+    """
+    named = dict(zip(parameters, parameters, strict=True)) | dict(labels or {})
     varied = [name for name in parameters if len({row[name] for row in rows}) > 1] or parameters[:1]
-    figure = _maps(rows, varied) if len(varied) == 2 else _lines(rows, varied[0])
+    figure = _maps(rows, varied, named) if len(varied) == 2 else _lines(rows, varied[0], named)
     first = rows[0]
-    fixed = [name for name in dict.fromkeys((*parameters, "speed_kmh")) if name not in varied]
-    values = (f"{name} = {first[name]:g}" for name in fixed)
+    fixed = [f"{named[name]} = {first[name]:g}" for name in parameters if name not in varied]
+    if "speed_kmh" not in parameters:
+        fixed.append(f"{first['speed_kmh']:g} km/h")
     early = sum(row["terminated"] for row in rows)
     spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
-    title = ", ".join((f"{first['pantograph']} on {first['catenary']}", *values, f"spans {spans}"))
+    pair = f"pantograph {first['pantograph']}, line {first['catenary']}"
+    title = ", ".join((pair, *fixed, f"spans {spans}"))
     note = f"\n{early} of {len(rows)} passes ended early and are not shown" if early else ""
     figure.suptitle(f"{title}{note}")
     return figure
 
 
-def _lines(rows: Sequence[Row], parameter: str) -> Figure:
+def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     shown = [key for key in BELOW_FORCE if not all(isnan(row[key]) for row in rows)]
+    no_loss = all(row["contact_loss"] == 0 for row in rows)
+    if no_loss:
+        shown.remove("contact_loss")
     figure = Figure(figsize=(8, 1 + 2.4 * (1 + len(shown))), layout="constrained")
     force, *others = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
     by_policy = _by_policy(rows)
     for k, of_policy in enumerate(by_policy.values()):
-        values, colour = [row[parameter] for row in of_policy], f"C{k}"
+        values, colour = [row[parameter] for row in of_policy], series_colour(k)
         for key, style in FORCES.values():
             force.plot(values, [row[key] for row in of_policy], style, color=colour, marker=".")
         for axis, key in zip(others, shown, strict=True):
             scaled = [LABELS[key].scale * row[key] for row in of_policy]
             axis.plot(values, scaled, color=colour, marker=".")
+    _draw_limits(force, others[shown.index("std")], next(iter(by_policy.values())), parameter)
     force.set(ylabel="contact force (N)")
+    if no_loss:
+        force.set_title("No contact is lost in any pass.", loc="left", fontsize="small")
     for axis, key in zip(others, shown, strict=True):
         axis.set(ylabel=f"{LABELS[key].name}\n({LABELS[key].unit})")
-        if key == "contact_loss":  # never below 0; a line without loss is not magnified
-            axis.set_ylim(bottom=0, top=max(1.0, axis.get_ylim()[1]))
+        if key == "contact_loss":  # never below 0
+            axis.set_ylim(bottom=0)
     for axis in (force, *others):
         axis.grid(color="0.9")
     handles = [
         Line2D([], [], color="0.3", linestyle=style, label=name) for name, (_, style) in FORCES.items()
     ]
-    handles += [Line2D([], [], color=f"C{k}", marker=".", label=name) for k, name in enumerate(by_policy)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize="small")
-    figure.axes[-1].set(xlabel=parameter)
+    words = f"EN 50367: maximum; σ of 0.3 F_m ({next(iter(by_policy))})"
+    handles.append(Line2D([], [], color=LIMIT, linestyle=DASHES, linewidth=0.9, label=words))
+    handles += [
+        Line2D([], [], color=series_colour(k), marker=".", label=name) for k, name in enumerate(by_policy)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize="small")
+    figure.axes[-1].set(xlabel=labels[parameter])
     return figure
 
 
-def _maps(rows: Sequence[Row], parameters: Sequence[str]) -> Figure:
+def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) -> None:
+    """No contact, and EN 50367's largest force and σ, the latter at the mean force of the first policy."""
+    values = [row[parameter] for row in rows]
+    style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
+    limits = [en50367.maximum_limit(row["speed_kmh"] / 3.6) for row in rows]
+    force.plot(values, limits, drawstyle="steps-pre", **style)
+    std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
+    force.axhline(0.0, color=LIMIT, linewidth=0.9)
+    place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "bottom", "fontsize": "x-small"}
+    force.annotate("0 N: no contact", (0.01, 0), **place)
+
+
+def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str]) -> Figure:
     import numpy as np
     from matplotlib.figure import Figure
 
     first, second = (np.array(sorted({row[name] for row in rows})) for name in parameters)
     by_policy = _by_policy(rows)
-    figure = Figure(figsize=(13, 0.6 + 3.6 * len(by_policy)), layout="constrained")
+    figure = Figure(figsize=(13, 1.2 + 3.6 * len(by_policy)), layout="constrained")
     axes = figure.subplots(len(by_policy), len(MAPPED), sharex=True, sharey=True, squeeze=False)
-    for key, column in zip(MAPPED, axes.T, strict=True):
+    for (key, colours), column in zip(MAPPED.items(), axes.T, strict=True):
         values = [row[key] for row in rows if not isnan(row[key])]
         low, high = (min(values), max(values)) if values else (0.0, 1.0)  # one scale for all policies
         for axis, (policy, of_policy) in zip(column, by_policy.items(), strict=True):
             table = {tuple(row[name] for name in parameters): row[key] for row in of_policy}
             grid = [[table[x, y] for x in first] for y in second]
-            mesh = axis.pcolormesh(first, second, grid, shading="nearest", vmin=low, vmax=high)
-            axis.set_title(f"{LABELS[key].heading}, {policy}", fontsize="medium")
-        figure.colorbar(mesh, ax=column)
-    for axis in axes[-1]:
-        axis.set(xlabel=parameters[0])
-    for axis in axes[:, 0]:
-        axis.set(ylabel=parameters[1])
+            shades: dict[str, Any] = {"vmin": low, "vmax": high, "cmap": colours}
+            mesh = axis.pcolormesh(first, second, grid, shading="nearest", **shades)
+            axis.set_title(f"{LABELS[key].name}, {policy}", fontsize="medium")
+        figure.colorbar(mesh, ax=column, label=f"{LABELS[key].unit}; bright is worse")
+    figure.supxlabel(labels[parameters[0]], fontsize="medium")
+    figure.supylabel(fill(labels[parameters[1]], LETTERS), fontsize="medium")
     return figure
 
 

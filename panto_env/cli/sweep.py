@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.pool import MOST_PASSES
-from ..analysis.sweep import SPEED
+from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
 from ..base.files import TABLES, write_rows
@@ -74,7 +74,7 @@ def sweep(
     if output is not None:
         write_rows(rows, output)
     if plot is not None:
-        save(plot_sweep(rows, list(values)), plot)
+        save(plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
     if json:
         used = plain(run_settings(settings | {"spans": line_spans}))
         told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}

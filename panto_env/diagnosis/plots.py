@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.colours import BLUE, LIMIT, ORANGE
 from .diagnosis import Diagnosis
 from .tables import place
 
@@ -22,18 +23,18 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     x = evidence.position[shown]
     figure = Figure(figsize=(12, 6), layout="constrained")
     force, score = figure.subplots(2, 1, sharex=True)
-    force.plot(x, evidence.rest[shown], color="tab:blue", linewidth=0.9)
+    force.plot(x, evidence.rest[shown], color=BLUE, linewidth=0.9)
     force.set(ylabel="force beside healthy passes (N)")
-    score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color="tab:blue", linewidth=0.9, label="score")
+    score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
     words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"
-    score.axhline(evidence.threshold, color="tab:red", linestyle="--", linewidth=0.9, label=words)
+    score.axhline(evidence.threshold, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
     inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
         for support in np.arange(diagnosis.begin, diagnosis.end + 1e-6, evidence.span):
             axis.axvline(support, color="0.85", linewidth=0.8, zorder=0)
         for finding in diagnosis.findings:
-            axis.axvline(finding.position, color="tab:orange", linewidth=1.5, zorder=1)
+            axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {finding.span}, {place(finding)}"
         force.annotate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..base.arrays import Array
+from ..base.colours import BLUE, LIMIT, ORANGE
 from ..metrics.low_pass import low_pass_in_place
 from .estimate import Estimate
 from .verdict import WINDOW_NIS
@@ -32,15 +33,15 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     time = estimate.time[shown]
     if measured is not None:
         drawn = low_pass_in_place(measured, step)[shown]
-        force.plot(time, drawn, color="tab:orange", linewidth=3, label="recorded")
+        force.plot(time, drawn, color=ORANGE, linewidth=3, label="recorded")
     drawn = low_pass_in_place(estimate.force, step)[shown]
     force.plot(time, drawn, color="black", linewidth=1, label="estimated")
     force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
     force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, fontsize="small", frameon=False)
     tested = estimate.consistency
-    innovations.plot(tested.window_time, tested.window_nis, "o-", color="tab:blue", markersize=3)
+    innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3)
     innovations.axhline(1.0, color="0.4", linestyle=":")
-    innovations.axhline(WINDOW_NIS, color="tab:red", linestyle="--", linewidth=0.9)
+    innovations.axhline(WINDOW_NIS, color=LIMIT, linestyle="--", linewidth=0.9)
     rest = f"; the record ends at {estimate.time[-1]:.4g} s" if end < estimate.time[-1] else ""
     innovations.set(xlabel=f"time (s){rest}", ylabel="innovations\n(squared, 1: as expected)")
     for axis in (force, innovations):

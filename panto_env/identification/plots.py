@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..base.arrays import Array
+from ..base.colours import BLUE, ORANGE
 from .performance import Match
 from .record import Record
 
@@ -30,7 +31,7 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
     axes = figure.subplots(len(series), 1, sharex=True)
     for axis, (name, values) in zip(axes, series.items(), strict=True):
         symbol, unit, scale = _axis_of(name)
-        axis.plot(time, scale * values[inside][::step], color="tab:blue", linewidth=1)
+        axis.plot(time, scale * values[inside][::step], color=BLUE, linewidth=1)
         axis.set(ylabel=f"${symbol}$ ({unit})")
         axis.grid(color="0.9")
     axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
@@ -49,7 +50,7 @@ def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float
     for axis, match in zip(axes, matches, strict=True):
         symbol, unit, scale = _axis_of(match.channel)
         recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))
-        axis.plot(time[inside][::step], recorded, color="tab:orange", linewidth=3)
+        axis.plot(time[inside][::step], recorded, color=ORANGE, linewidth=3)
         axis.plot(time[inside][::step], modelled, color="black", linewidth=0.8)
         axis.set(ylabel=f"${symbol}$ ({unit})")
         axis.set_title(
@@ -59,7 +60,7 @@ def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float
             fontsize="small",
         )
         axis.grid(color="0.9")
-    axes[0].plot([], [], color="tab:orange", linewidth=3, label="record")
+    axes[0].plot([], [], color=ORANGE, linewidth=3, label="record")
     axes[0].plot([], [], color="black", linewidth=0.8, label="model")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
     axes[-1].set(xlabel="time (s)", xlim=(first, last))

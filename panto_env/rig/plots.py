@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import mark_supports
+from ..base.colours import series_colour
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.spectrum import amplitudes
 from .comparison import Pair
@@ -42,7 +43,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
                 values = low_pass_in_place(values, run.time_step)
             values = scale * (values - values[run.inside(pairs[0].spans)].mean())
             shown = (run.position >= begin) & (run.position <= end)
-            style = LINE_STYLE if who.startswith("under") else {"color": f"C{k}"}
+            style = LINE_STYLE if who.startswith("under") else {"color": series_colour(k)}
             axis.plot(run.position[shown], values[shown], label=who, **style)
         axis.set(ylabel=f"{label}, without mean", xlim=(begin, end))
         axis.grid(color="0.92")
@@ -53,7 +54,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         force = run.contact_force[run.inside(pairs[0].spans)]
         frequency, amplitude = amplitudes(force, run.time_step)
         shown = frequency <= HIGHEST
-        style = LINE_STYLE if who.startswith("under") else {"color": f"C{k}"}
+        style = LINE_STYLE if who.startswith("under") else {"color": series_colour(k)}
         axes[3].plot(frequency[shown], amplitude[shown], label=who, **style)
     axes[3].set(xlabel="frequency (Hz)", ylabel="amplitude of the contact force (N)", xlim=(0, HIGHEST))
     axes[3].grid(color="0.92")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ...analysis.plots import mark_supports, say_what_is_hidden
+from ...base.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, series_colour
 from ...metrics.labels import LABELS
 from ...metrics.spans import limits
 from .angles import cost_over_angle
@@ -39,7 +40,7 @@ SHOWN_SPANS = (10, 11)
 """Spans of Figs 14 to 16."""
 COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
 # The paper's colours: without control red, with control blue, control force green.
-WITHOUT, WITH, FORCE = "tab:red", "tab:blue", "tab:green"
+WITHOUT, WITH, FORCE = VERMILION, BLUE, GREEN
 
 
 def all_plots(results: Results) -> dict[str, Figure]:
@@ -61,7 +62,7 @@ def phase_angle(results: Results) -> Figure:
     for axis, reading in zip(figure.subplots(1, 2, sharey=True), (SPAN, KMH), strict=True):
         for k, speed in enumerate(ANGLE_SPEEDS):
             curve = cost_over_angle(results, speed, GAIN, reading)
-            colour = f"C{k}"
+            colour = series_colour(k)
             axis.plot(
                 [math.degrees(theta) for theta in THETAS], curve.cost, color=colour, label=f"{speed} km/h"
             )
@@ -90,41 +91,52 @@ def forces_along_line(speed: int) -> Figure:
     lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
     for axis in (upper, lower):
         mark_supports(axis, active)
-        axis.legend(loc="upper right", ncols=3, fontsize="small")
+        axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize="small", frameon=False)
     lower.set_xlim(limits(SHOWN_SPANS, active.span_length))
     for axis in (upper, lower):
         say_what_is_hidden(axis)
-    figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: simulation at {speed} km/h, gain {GAIN}")
+    shown = f"spans {SHOWN_SPANS[0]} to {SHOWN_SPANS[1]}"
+    figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: {speed} km/h, gain {GAIN}, {shown}")
     return figure
 
 
 def over_speed(results: Results, number: int, name: str, caption: str) -> Figure:
-    """Figs 17 and 18: a figure of merit over speed, by the name that the paper gives it."""
+    """Figs 17 and 18: a figure of merit over speed, by the name that the paper gives it.
+
+    On the left what the paper claims, with an ideal actuator; on the right what a realistic one makes of it.
+    """
     from matplotlib.figure import Figure
 
     gentle, shipped, strong = control(REAL_GAIN), DAMPING[SHIPPED], DAMPING[STRONG]
-    curves = {
-        "without control": ([Case(v) for v in SPEEDS], WITHOUT, "o-"),
-        f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
-        "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], "tab:cyan", "^--"),
-        f"with control, gain {REAL_GAIN}, realistic actuator": (
-            [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x:"
-        ),
-        "feedback and frame damping (pd), realistic actuator": (
-            [sampled(v, shipped, "realistic") for v in SPEEDS], "tab:olive", "d:"
-        ),
-        f"{STRONG}, realistic actuator": (
-            [sampled(v, strong, "realistic") for v in SPEEDS], "tab:purple", "v:"
-        ),
+    passive = [Case(v) for v in SPEEDS]
+    panels = {
+        "ideal actuator": {
+            "without control": (passive, WITHOUT, "o-"),
+            "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], ORANGE, "^--"),
+            f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
+        },
+        "realistic actuator": {
+            "without control": (passive, WITHOUT, "o-"),
+            f"with control, gain {REAL_GAIN}": (
+                [sampled(v, gentle, "realistic") for v in SPEEDS], "0.5", "x--"
+            ),
+            "feedback and frame damping (pd)": (
+                [sampled(v, shipped, "realistic") for v in SPEEDS], PURPLE, "d--"
+            ),
+            STRONG: ([sampled(v, strong, "realistic") for v in SPEEDS], SKY, "v-"),
+        },
     }  # fmt: skip
-    figure = Figure(figsize=(8, 4.8), layout="constrained")
-    axis = figure.subplots()
-    for label, (cases, colour, style) in curves.items():
-        values = [getattr(results[case].figures, name) for case in cases]
-        axis.plot(SPEEDS, values, style, color=colour, label=label)
-    label = f"{caption} {LABELS[name].short_heading}"
-    axis.set(xlabel="speed (km/h)", ylabel=label, ylim=(0 if name == "cost_function" else None, None))
-    axis.set_title(f"Fig. {number}: {caption}, {COVERED}")
-    axis.legend(fontsize="small")
-    axis.grid(color="0.9")
+    figure = Figure(figsize=(10.5, 5), layout="constrained")
+    for axis, (actuator, curves) in zip(figure.subplots(1, 2, sharey=True), panels.items(), strict=True):
+        for label, (cases, colour, style) in curves.items():
+            values = [getattr(results[case].figures, name) for case in cases]
+            none = " (0 at every speed)" if not any(values) else ""
+            axis.plot(SPEEDS, values, style, color=colour, label=f"{label}{none}", markersize=5)
+        axis.set(xlabel="speed (km/h)", title=actuator)
+        axis.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False)
+        axis.grid(color="0.9")
+    figure.axes[0].set(ylabel=f"{caption} {LABELS[name].short_heading}")
+    if name == "cost_function":
+        figure.axes[0].set_ylim(bottom=0)
+    figure.suptitle(f"Fig. {number}: {caption}, {COVERED}")
     return figure

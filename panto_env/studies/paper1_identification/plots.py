@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...base.arrays import Array
+from ...base.colours import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.equation_error import equations
 from ...identification.plots import plot_matches, plot_record
 from .published import PUBLISHED
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SECONDS = 4.0
 """Shown of a record. Own choice: the paper's figures are not at hand, only their captions."""
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green")
+COLOURS = (BLUE, VERMILION, GREEN)
 
 
 def record(shown: Record, name: str) -> Figure:
@@ -42,10 +44,10 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
     place = np.arange(3)
     left.bar(place - 0.2, [p.condition for p in PUBLISHED], 0.4, color="0.7", label="paper")
     ours = [kept[p.name].fits[FILTERED].condition for p in PUBLISHED]
-    left.bar(place + 0.2, ours, 0.4, color="tab:blue", label="ours, low-passed")
+    left.bar(place + 0.2, ours, 0.4, color=BLUE, label="ours, low-passed")
     left.set_xticks(place, [f"Exp. {p.name}" for p in PUBLISHED])
     left.set(ylabel="condition number of A", title="Condition number, offset kept")
-    left.legend(fontsize="small")
+    _legend_below(left, 2)
     place = np.arange(5)
     for k, printed in enumerate(PUBLISHED):
         label = f"paper, {printed.name}"
@@ -53,10 +55,11 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
     for k, printed in enumerate(PUBLISHED):
         label = f"ours, {printed.name}"
         right.bar(place + 0.13 * (k + 0.5), medians[printed.name], 0.13, color=COLOURS[k], label=label)
-    right.axhline(100, color="0.3", linestyle=":", linewidth=1)
+    right.axhline(100, color=LIMIT, linestyle=":", linewidth=1, label="100 %: as large as the value")
     right.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
-    right.set(yscale="log", ylabel="RSD (%)", title="RSD; ours with free offset, low-passed, median of 100")
-    right.legend(fontsize="small", ncols=2)
+    title = "Relative standard deviation; ours with free offset, low-passed, median of 100"
+    right.set(yscale="log", ylabel="RSD (%)", title=title)
+    _legend_below(right, 4)
     return figure
 
 
@@ -74,7 +77,7 @@ def stiffness(
     known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
     m3, k3 = IDENTIFIED.index("m3"), IDENTIFIED.index("k3")
     for (name, shown), colour, width in zip(
-        list(clean.items())[::-1], ("tab:orange", "tab:blue"), (0.6, 2.5), strict=True
+        list(clean.items())[::-1], (ORANGE, BLUE), (0.6, 2.5), strict=True
     ):
         (_, columns), _ = equations(shown, known)  # of the frame's equation
         label = "sweep 0.3 to 4 Hz" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, 1.42 Hz"
@@ -85,9 +88,9 @@ def stiffness(
         ylabel="column of $m_3$: acceleration (m/s²)",
         title="One sine: two columns on one line",
     )
-    left.legend(fontsize="small")
-    right.plot(last, sweeps[True], "o-", color="tab:blue", label="offset free: only motion counts")
-    right.plot(last, sweeps[False], "s-", color="tab:green", label="offset kept, as printed")
+    _legend_below(left, 2)
+    right.plot(last, sweeps[True], "o-", color=BLUE, label="offset free: only motion counts")
+    right.plot(last, sweeps[False], "s-", color=GREEN, label="offset kept, as printed")
     right.axhline(PUBLISHED[0].rsd[k3], color="0.3", linestyle=":", label="paper, Experiment I: one sine")
     right.set(
         xscale="log", yscale="log",
@@ -96,7 +99,7 @@ def stiffness(
     )  # fmt: skip
     right.set_xticks([0.3, 0.5, 1.0, 2.0, 4.0], ["0.3: a sine", "0.5", "1", "2", "4"])
     right.minorticks_off()
-    right.legend(fontsize="small")
+    _legend_below(right, 1)
     for axis in (left, right):
         axis.grid(color="0.9")
     return figure
@@ -111,29 +114,27 @@ def convergence(
     """Errors of the equations as printed over the sampling step, and of all methods over the noise."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.5, 3.7), layout="constrained")
+    figure = Figure(figsize=(12.5, 5.2), layout="constrained")
     axes = figure.subplots(1, 3)
     steps = 1e3 / np.array(rates)
-    for name, errors in sampling.items():
-        axes[0].loglog(steps, np.abs(errors).max(axis=1), "o-", label=f"{name}: c2, the worst")
+    for k, (name, errors) in enumerate(sampling.items()):
+        style: dict[str, Any] = {"color": series_colour(k), "marker": "osd^"[k]}
+        label = f"{'' if name == FREQUENCY_SWEEP.name else 'Experiment '}{name}: c2, the worst"
+        axes[0].loglog(steps, np.abs(errors).max(axis=1), label=label, **style)
         others = np.abs(errors[:, IDENTIFIED.index("m3") :]).max(axis=1)
-        axes[0].loglog(steps, others, "--", color=axes[0].lines[-1].get_color(), linewidth=0.9)
-    axes[0].plot([], [], "--", color="0.5", label="worst of m3, c3, k3")
-    axes[0].set(
-        xlabel="sampling step (ms)", ylabel="error (%)",
-        title="No noise, as printed", ylim=(1e-6, 1e6),
-    )  # fmt: skip
+        axes[0].loglog(steps, others, "--", color=series_colour(k), linewidth=0.9)
+    axes[0].plot([], [], "--", color="0.5", label="worst of m3, c3, k3, same colours")
+    axes[0].set(xlabel="sampling step (ms)", ylabel="error (%)", title="Equations as printed, no noise")
     for axis, (name, methods) in zip(axes[1:], noise.items(), strict=True):
-        for method, colour in zip(METHODS, COLOURS, strict=True):
-            axis.loglog(1e6 * np.array(levels), methods[method], "o-", color=colour, label=method)
+        for method, colour, marker in zip(METHODS, COLOURS, "osd", strict=True):
+            axis.loglog(1e6 * np.array(levels), methods[method], marker + "-", color=colour, label=method)
         label = "sweep, offset free" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, offset kept"
         axis.set(xlabel="noise of the displacements, rms (µm)", ylabel="error of the worst parameter (%)")
         axis.set_title(f"{label}, 1 kHz")
-        axis.set_ylim(top=1e9)  # room for the legend
     for axis in axes:
-        axis.axhline(0.5, color="0.3", linestyle=":", label="0.5 %")
+        axis.axhline(0.5, color=LIMIT, linestyle=":", label="0.5 %")
         axis.grid(color="0.9")
-        axis.legend(fontsize="x-small", loc="upper left")
+        _legend_below(axis, 1)
     return figure
 
 
@@ -146,14 +147,25 @@ def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
     place = np.arange(5)
     for axis, (record_name, by_method) in zip(axes, shares.items(), strict=True):
         for k, (method, colour) in enumerate(zip(METHODS, COLOURS, strict=True)):
-            axis.bar(place + 0.27 * (k - 1), by_method[method], 0.27, color=colour, label=method)
-        axis.axhline(90, color="0.3", linestyle=":", linewidth=1)
+            at = place + 0.27 * (k - 1)
+            axis.bar(at, by_method[method], 0.27, color=colour, label=method)
+            for x, share in zip(at, by_method[method], strict=True):
+                if share < 1:  # a bar that cannot be seen
+                    axis.annotate("0" if share == 0 else "<1", (x, 1), ha="center", color=colour)
+        axis.axhline(95, color=LIMIT, linestyle=":", linewidth=1, label="95 %: what an interval promises")
         axis.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
         axis.set_title(record_name)
     axes[0].set(ylabel=f"truth inside its 95 % interval\n(% of {trials} records)")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="small")
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
+    figure.suptitle("How often a 95 % interval holds the true parameter")
     return figure
+
+
+def _legend_below(axis: Axes, columns: int) -> None:
+    """A legend that covers no data."""
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
+    axis.legend(fontsize="small", ncols=columns, frameon=False, **place)
 
 
 def _symbol(name: str) -> str:

@@ -10,6 +10,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from ...analysis.simulation import simulate
+from ...base.colours import BLUE, ORANGE
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...metrics.figures import Figures
@@ -135,7 +136,7 @@ def _plot(found: Mapping[float, Mapping[str, Figures]]) -> Figure:
         words, spreads = list(each), [figures.std for figures in each.values()]
         starts = [0.0, *spreads[:-1]]
         for k, (begin, end) in enumerate(zip(starts, spreads, strict=True)):
-            colour = "0.6" if k == 0 else "tab:blue" if end < begin else "tab:orange"
+            colour = "0.6" if k == 0 else BLUE if end < begin else ORANGE
             axis.barh(k, end - begin, left=begin, color=colour)
             axis.annotate(f"{end:.1f}", (max(begin, end), k), (4, 0), textcoords="offset points", va="center")
         axis.set(yticks=range(len(words)), yticklabels=words, xlabel="σ (N)", title=f"{speed:g} km/h")

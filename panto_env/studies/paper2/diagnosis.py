@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
+from ...base.colours import LIMIT
 from ...base.table import Table
 from ...diagnosis import diagnose
 from ...diagnosis.cases import Track, draw_defect, drive
@@ -139,8 +140,8 @@ def plot_rates(rows: Sequence[dict[str, float]]) -> Figure:
         rate = [row["rate"] for row in own]
         axis.semilogx(rate, [100 * row["located"] for row in own], "o-", label=f"mean of {count}")
         axis.fill_between(rate, [100 * r["low"] for r in own], [100 * r["high"] for r in own], alpha=0.15)
-    axis.axhline(100 * WANTED, color="tab:red", linestyle="--", linewidth=0.9)
-    axis.axvline(FALSE_ALARMS, color="tab:red", linestyle="--", linewidth=0.9)
+    axis.axhline(100 * WANTED, color=LIMIT, linestyle="--", linewidth=0.9)
+    axis.axvline(FALSE_ALARMS, color=LIMIT, linestyle="--", linewidth=0.9)
     axis.set(
         xlabel="false alarms per km that set the threshold", ylabel="broken droppers within an interval (%)"
     )

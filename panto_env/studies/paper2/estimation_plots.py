@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.arrays import Array
+from ...base.colours import ORANGE
 from ...estimation.motion import Motion
 from ...estimation.score import COHERENT, phases
 from .estimation import MISMATCH, OBSERVATIONS, SPEED_KMH, START
@@ -30,7 +31,7 @@ def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
     shown = (motion.time >= START) & (motion.time <= START + SHOWN)
     figure = Figure(figsize=(9, 4), layout="constrained")
     axis = figure.subplots()
-    axis.plot(motion.time[shown], motion.contact_force[shown], color="tab:orange", linewidth=2, label="true")
+    axis.plot(motion.time[shown], motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
     axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
     axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
     axis.set_title(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base.colours import series_colour
 from ..study import Comparison, Outcome, Report
 from .motor_bench import BenchRun, bench_run, line_pass
 from .motors import (
@@ -135,7 +136,7 @@ def _plot(bench: Sequence[BenchRun]) -> Figure:
     over_time, over_frequency = figure.subplots(2, 1)
     for k, one in enumerate(bench):
         label = "without motor" if k == 0 else f"gain {one.gain:g}"
-        style = {"color": "black" if k == 0 else f"C{k}", "linewidth": 1.2}
+        style = {"color": "black" if k == 0 else series_colour(k), "linewidth": 1.2}
         shown = one.time < one.time[0] + SHOWN
         over_time.plot(one.time[shown] - one.time[0], one.force[shown], label=label, **style)
         frequency, amplitude = one.spectrum

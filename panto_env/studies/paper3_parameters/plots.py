@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base.colours import series_colour
 from .passes import SPANS, SPEED_KMH, Influence, Pass, Passes
 
 if TYPE_CHECKING:
@@ -49,13 +50,15 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
     scale = 1e3 if quantity == "displacement" else 1.0
     handles = []
     for k, (value, pulled, pushed) in enumerate(zip(influence.values, pulling, pushing, strict=True)):
-        axis.plot(pulled.position, scale * getattr(pulled, quantity), color=f"C{k}", linewidth=1.6)
+        axis.plot(pulled.position, scale * getattr(pulled, quantity), color=series_colour(k), linewidth=1.6)
         label = f"${influence.symbol}$ = {value:g} {influence.unit}"
-        handles.append(Line2D([], [], color=f"C{k}", label=label))
+        handles.append(Line2D([], [], color=series_colour(k), label=label))
         if np.abs(pulled.force - pushed.force).max() > DIFFERENT:
-            axis.plot(pushed.position, scale * getattr(pushed, quantity), ":", color=f"C{k}", linewidth=1.6)
+            axis.plot(
+                pushed.position, scale * getattr(pushed, quantity), ":", color=series_colour(k), linewidth=1.6
+            )
             label = f"{value:g} {influence.unit}, contact can only push"
-            handles.append(Line2D([], [], color=f"C{k}", linestyle=":", label=label))
+            handles.append(Line2D([], [], color=series_colour(k), linestyle=":", label=label))
     if any(getattr(one_pass, quantity).min() < 0 for one_pass in pulling):
         axis.axhline(0.0, color="0.5", linewidth=0.8)
     span = pulling[0].span_length

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ...base.colours import series_colour
 from .tables import Row
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ def plot_speed(result: Row) -> Figure:
     """How cost grows on a machine: plants over spans and modes, vector environments over lanes, cores."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 7), layout="constrained")
+    figure = Figure(figsize=(10, 8), layout="constrained")
     (by_spans, by_modes), (by_lanes, by_cores) = figure.subplots(2, 2)
     scaling = result["scaling"]
     _draw_plants(by_spans, scaling["spans"], "spans", "spans computed, flexible catenary")
@@ -31,20 +32,21 @@ def plot_speed(result: Row) -> Figure:
 
 def _draw_plants(axis: Axes, rows: Sequence[Row], key: str, label: str) -> None:
     values = [row[key] for row in rows]
-    axis.plot(values, [1e3 / row["times_real_time"] for row in rows], "o-")
-    axis.set(xlabel=label, ylabel="one core, ms a simulated second", xticks=values)
+    axis.plot(values, [1e3 / row["times_real_time"] for row in rows], "o-", color=series_colour(0))
+    axis.set(xlabel=label, ylabel="one core, ms per simulated second", xticks=values)
     axis.set(xlim=(0, None), ylim=(0, None))
 
 
 def _draw_lanes(axis: Axes, rows: Sequence[Row]) -> None:
-    for name, of_environment in _by_environment(rows).items():
+    for k, (name, of_environment) in enumerate(_by_environment(rows).items()):
         rates = [row["steps_per_second"] for row in of_environment]
-        axis.loglog([row["lanes"] for row in of_environment], rates, "o-", label=name)
+        lanes = [row["lanes"] for row in of_environment]
+        axis.loglog(lanes, rates, "o-", color=series_colour(k), label=name)
     widest = max(_by_environment(rows).values(), key=lambda its: its[-1]["lanes"])
     rates = [row["yardstick_steps_per_second"] for row in widest]
     axis.loglog([row["lanes"] for row in widest], rates, "s:", color="0.5", label=widest[0]["yardstick"])
     axis.set(xlabel="lanes, on all cores", ylabel="environment steps per second")
-    axis.legend(fontsize="small")
+    _legend_above(axis)
 
 
 def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
@@ -54,13 +56,20 @@ def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
         axis.text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
         return
     counts = sorted({row["cores"] for row in rows})
-    for name, lanes in dict.fromkeys((row["id"], row["lanes"]) for row in rows):
+    for k, (name, lanes) in enumerate(dict.fromkeys((row["id"], row["lanes"]) for row in rows)):
         own = [row for row in rows if (row["id"], row["lanes"]) == (name, lanes)]
         gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
-        axis.plot([row["cores"] for row in own], gain, "o-", label=f"{name}, {lanes} lanes")
+        axis.plot(
+            [row["cores"] for row in own], gain, "o-", color=series_colour(k), label=f"{name}, {lanes} lanes"
+        )
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
     axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
-    axis.legend(fontsize="small", loc="lower left")
+    _legend_above(axis)
+
+
+def _legend_above(axis: Axes) -> None:
+    """A legend that covers no data."""
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, fontsize="small", frameon=False)
 
 
 def _by_environment(rows: Sequence[Row]) -> dict[str, list[Row]]:

@@ -14,5 +14,7 @@ class PeriodicStiffnessData(CatenaryData):
     """A massless spring whose stiffness varies along the span (paper 3, Eqs 1-5)."""
 
     kind: Literal["periodic_stiffness"] = "periodic_stiffness"
-    mean_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(description="k_m (N/m)")
-    stiffness_variation: Annotated[float, Between(0, 0.99)] = Field(description="epsilon (-)")
+    mean_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(description="mean stiffness k_m (N/m)")
+    stiffness_variation: Annotated[float, Between(0, 0.99)] = Field(
+        description="share epsilon by which the stiffness varies (-)"
+    )
