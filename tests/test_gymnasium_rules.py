@@ -130,7 +130,7 @@ def test_numpy_s_numbers_are_numbers():
 @pytest.mark.parametrize("name", IDS)
 def test_render_modes_are_kept(name):
     env = gymnasium.make(name)
-    assert env.metadata["render_modes"] == ["rgb_array"]
+    assert env.metadata["render_modes"] == ["human", "rgb_array"]
     assert env.unwrapped.render() is None
     pictured = gymnasium.make(name, render_mode="rgb_array")
     pictured.reset(seed=0)

@@ -166,7 +166,7 @@ def test_bad_actions_change_nothing(actions, message):
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),
         ({"lanes": 0}, "number of lanes must be a whole number from 1"),
-        ({"render_mode": "rgb_array"}, "does not render"),
+        ({"render_mode": "human"}, "must be None or 'rgb_array'"),
     ],
 )
 def test_bad_arguments_are_refused(settings, message):

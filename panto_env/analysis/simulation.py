@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import reprlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from numbers import Integral
 from typing import Any
 
@@ -55,16 +55,31 @@ def simulate(
     driver = None if policy is None else find_policy(policy)
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(driver) | settings
-    checked = far_enough(run_settings(given))
-    trim = trim_of_pass(checked, seed, evaluated, passive_mean)
-    task = Task(checked, record_droppers=record_droppers, trim=trim)
-    task.reset(0, np.random.default_rng(seed))
+    task = _ready(given, seed, evaluated, record_droppers)
     if driver is None:
         task.run_passively()
         return task.trajectory(0, seed=seed, last=True)
     name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
     run_policy(task, driver, name, progress)
     return task.trajectory(0, policy=name, seed=seed, last=True)
+
+
+def _ready(given: dict[str, Any], seed: int, evaluated: SpanChoice, record_droppers: bool) -> Task:
+    """A task with these settings, its lane reset under the seed."""
+    checked = far_enough(run_settings(given))
+    trim = trim_of_pass(checked, seed, evaluated, passive_mean)
+    task = Task(checked, record_droppers=record_droppers, trim=trim)
+    task.reset(0, np.random.default_rng(seed))
+    return task
+
+
+def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, Policy]:
+    """A task and its driver, ready for ``steps_of_policy``: the pass that ``simulate`` makes of the same.
+
+    Raises InputError as ``simulate`` does.
+    """
+    driver = find_policy(policy)
+    return _ready(wishes(driver) | settings, seed, None, record_droppers=False), driver
 
 
 def run_policy(
@@ -74,6 +89,13 @@ def run_policy(
 
     Raises InputError where the policy fails, or its action is not finite or not of the right shape.
     """
+    for share in steps_of_policy(task, policy, name):
+        if progress is not None:
+            progress(share)
+
+
+def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
+    """The same, a control step at a time; yields the share done after each."""
     with errors_name(name, "reset"):
         policy.reset(task.context(0))
     results, shape = task.results, (len(task.actuator.places),)
@@ -87,8 +109,7 @@ def run_policy(
                     f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
                 )
         task.step(action[None])
-        if progress is not None:
-            progress(task.plant.of(0, Row.STEP) / task.end(0))
+        yield task.plant.of(0, Row.STEP) / task.end(0)
 
 
 def _explicit() -> inspect.Signature:

@@ -40,7 +40,19 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands, those of installed packages too."""
-    from . import catalogue, diagnose, estimate, identify, reproduce, rig, simulate, speed, sweep, validate
+    from . import (
+        catalogue,
+        diagnose,
+        estimate,
+        film,
+        identify,
+        reproduce,
+        rig,
+        simulate,
+        speed,
+        sweep,
+        validate,
+    )
 
     app = typer.Typer(
         name="panto",
@@ -53,6 +65,7 @@ def make_app() -> typer.Typer:
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
     app.command()(simulate.simulate)
+    app.command()(film.film)
     app.command()(sweep.sweep)
     app.command()(validate.validate)
     app.command()(identify.identify)

@@ -85,6 +85,10 @@ class Lanes:
         """What all lanes have come to."""
         return Answer(self._results, self._speed_kmh.copy(), np.ones(self.usual.lanes, dtype=np.bool_))
 
+    def task_of(self, lane: int) -> Task:
+        """The task that a lane runs in."""
+        return next((task for task, its in self._others if its[lane]), self.usual)
+
     def figures(self, lanes: Flags) -> dict[str, Array]:
         """Figures of the episodes of lanes, by name, (lanes,), zero for the others.
 

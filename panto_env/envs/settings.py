@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 from gymnasium.vector import AutoresetMode
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError
+from ..base.ranges import Between
 from ..control.settings import RunSettings
+
+Pixels = Annotated[int, Between(64, 4096)]
+SlowMotion = Field(
+    1.0, description="how many times slower than in life a film of the frames is, as `render_fps` tells (-)"
+)
 
 
 class EnvironmentSettings(RunSettings):
     """Arguments of ``PantographEnv``."""
 
-    render_mode: Literal["rgb_array"] | None = Field(
-        None, description='None, or "rgb_array" for pictures from `render()`'
+    render_mode: Literal["human", "rgb_array"] | None = Field(
+        None,
+        description='None, "rgb_array" for frames from `render()`, or "human" for a window with each step',
     )
+    render_size: tuple[Pixels, Pixels] = Field((1280, 720), description="width and height of a frame (px)")
+    slow_motion: Annotated[float, Between(0.01, 1000)] = SlowMotion
 
     @field_validator("render_mode", mode="before")
     @classmethod
     def _known(cls, value: object) -> object:
-        if value not in (None, "rgb_array"):
-            raise InputError(f"render_mode must be None or 'rgb_array', not {value!r}.")
+        if value not in (None, "human", "rgb_array"):
+            raise InputError(f"render_mode must be None, 'human' or 'rgb_array', not {value!r}.")
         return value
 
 
@@ -37,7 +46,14 @@ class VectorSettings(RunSettings):
     max_episode_steps: int | None = Field(
         None, ge=1, description="steps after which an episode is truncated; by default the line's end"
     )
-    render_mode: None = Field(None, description="None: the vector environment does not render")
+    render_mode: Literal["rgb_array"] | None = Field(
+        None, description='None, or "rgb_array" for frames from `render()`, one per lane that is drawn'
+    )
+    render_lanes: tuple[Annotated[int, Between(0, 10**6)], ...] | None = Field(
+        None, description="numbers of the lanes that are drawn, by default all"
+    )
+    render_size: tuple[Pixels, Pixels] = Field((640, 360), description="width and height of a frame (px)")
+    slow_motion: Annotated[float, Between(0.01, 1000)] = SlowMotion
 
     @field_validator("autoreset_mode", mode="before")
     @classmethod
@@ -50,6 +66,29 @@ class VectorSettings(RunSettings):
 
     @field_validator("render_mode", mode="before")
     @classmethod
-    def _no_picture(cls, value: object) -> None:
-        if value is not None:
-            raise InputError("The vector environment does not render; leave render_mode at None.")
+    def _pictures(cls, value: object) -> object:
+        if value not in (None, "rgb_array"):
+            raise InputError(
+                f"render_mode of the vector environment must be None or 'rgb_array', not {value!r}."
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _lanes_are_there(self) -> VectorSettings:
+        beyond = [lane for lane in self.render_lanes or () if lane >= self.num_envs]
+        if beyond:
+            raise InputError(f"render_lanes has lane {beyond[0]}, but lanes are 0 to {self.num_envs - 1}.")
+        return self
+
+
+def frames_per_second(control_interval: float, slow_motion: float) -> float:
+    """Of a film with one frame per control step, whole where it is nearly so."""
+    exact = 1 / control_interval / slow_motion
+    return round(exact) if abs(exact - round(exact)) < 1e-6 * exact else exact
+
+
+def render_metadata(
+    metadata: dict[str, Any], settings: EnvironmentSettings | VectorSettings
+) -> dict[str, Any]:
+    """An environment's metadata with the frames per second of its own control interval and slow motion."""
+    return metadata | {"render_fps": frames_per_second(settings.control_interval, settings.slow_motion)}

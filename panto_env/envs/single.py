@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -22,7 +22,10 @@ from ..plant.actuators import actuator_settings
 from .episodes import task_with_options, with_longest_episode
 from .ids import IDS
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, first_info, told
-from .settings import EnvironmentSettings
+from .settings import EnvironmentSettings, render_metadata
+
+if TYPE_CHECKING:
+    from ..render.viewer import Viewer
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 
@@ -104,13 +107,16 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     * v0: first version.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
 
     @takes(EnvironmentSettings)
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, EnvironmentSettings)
         self.render_mode = settings.render_mode
+        self.metadata = render_metadata(self.metadata, settings)
+        self._viewer: Viewer | None = None
+        self._reward_so_far = 0.0  # told in pictures
         self._spec: EnvSpec | None = None
         self._usual = Task(settings)
         self._watch(self._usual)
@@ -149,6 +155,9 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         task.reset(0, self.np_random)
         self._speed_kmh = 3.6 * float(task.speed[0])
         self._running = True
+        self._reward_so_far = 0.0
+        if self.render_mode == "human":
+            self._show()
         return self._observation.copy(), first_info(task)
 
     def _watch(self, task: Task) -> None:
@@ -160,8 +169,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._flags = results.flags[:, 0]
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what a copy has to see anew, since its arrays lie elsewhere."""
-        return {name: value for name, value in vars(self).items() if name not in SEEN}
+        """All but what a copy has to see anew, since its arrays lie elsewhere, and its window."""
+        return {name: value for name, value in vars(self).items() if name not in SEEN} | {"_viewer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -199,15 +208,40 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if terminated or truncated:
             self._running = False
             info["figures"] = told(self.task.figures(0))
+        if self.render_mode is not None:
+            self._reward_so_far += reward
+            if self.render_mode == "human":
+                self._show()
         return self._observation.copy(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Picture of the last two spans, (height, width, 3), with render_mode "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        from ..render import picture  # Matplotlib is slow to import
+        """The line and the pantograph now, (height, width, 3), with render_mode "rgb_array".
 
-        return picture(self.trajectory)
+        With "human" a window shows each step by itself. Raises InputError without the extra 'render'.
+        """
+        return self._frame() if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+
+    def _frame(self) -> NDArray[np.uint8]:
+        from ..render.viewer import Viewer  # fonts and drawing are slow to import
+
+        if self._viewer is None:
+            self._viewer = Viewer(self._usual.settings.render_size)  # type: ignore[attr-defined]
+        return self._viewer.frame(self.task, 0, self._title, self._reward_so_far)
+
+    def _show(self) -> None:
+        frame = self._frame()
+        assert self._viewer is not None
+        self._viewer.show(frame, self._title, self.metadata["render_fps"])
+
+    @property
+    def _title(self) -> str:
+        plant = self.task.plant
+        return f"pantograph {plant.pantograph.name}, line {plant.catenary.name}"
 
 
 def checked(action: Any, shape: tuple[int, ...]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -23,9 +23,12 @@ from ..control.settings import read_settings
 from .episodes import task_with_options, with_longest_episode
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer, Lanes
-from .settings import VectorSettings
+from .settings import VectorSettings, render_metadata
 from .single import checked
 from .stable_baselines import NamedToStableBaselines
+
+if TYPE_CHECKING:
+    from ..render.viewer import Viewer
 
 
 class PantographVectorEnv(
@@ -48,17 +51,21 @@ class PantographVectorEnv(
     Stable-Baselines3 takes it inside `panto_agents.vec_env.PantographVecEnv`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
 
     @takes(VectorSettings)
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, VectorSettings)
         self.autoreset_mode = settings.autoreset_mode
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
         self.num_envs = settings.num_envs
-        self.render_mode = None
-        self.task = Task(settings, lanes=self.num_envs, keep_samples=False)
+        self.render_mode = settings.render_mode
+        self.task = Task(settings, lanes=self.num_envs, keep_samples=self.render_mode is not None)
+        drawn = range(self.num_envs) if settings.render_lanes is None else settings.render_lanes
+        self._drawn, self._render_size = tuple(drawn), settings.render_size
+        self._viewer: Viewer | None = None
+        self._reward_so_far = np.zeros(self.num_envs)  # told in pictures
         self.single_observation_space = gymnasium.spaces.Box(
             -BOUND, BOUND, self.task.results.observation[0].shape, np.float32
         )
@@ -152,6 +159,10 @@ class PantographVectorEnv(
             self._ended = terminated | truncated
             self._any_ended = bool(self._ended.any())
         observation, reward = results.observation, results.values[REWARD, : self.num_envs]
+        if self.render_mode is not None:
+            self._reward_so_far += reward
+            if waiting is not None:
+                self._reward_so_far[waiting] = 0.0
         if self._any_ended and self.autoreset_mode == AutoresetMode.SAME_STEP:
             observation, infos = self._begin_at_once(answer)
         else:
@@ -159,6 +170,25 @@ class PantographVectorEnv(
             if self._any_ended:
                 infos |= self._figures()
         return observation, reward, terminated, truncated, infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Frames, (height, width, 3), of the lanes that are drawn, with render_mode "rgb_array".
+
+        Raises InputError where the extra 'render' is missing.
+        """
+        if self.render_mode is None:
+            return None
+        from ..render.viewer import Viewer  # fonts and drawing are slow to import
+
+        if self._viewer is None:
+            self._viewer = Viewer(self._render_size)
+        names = f"{self.task.plant.pantograph.name} on {self.task.plant.catenary.name}"
+        return tuple(
+            self._viewer.frame(
+                self._lanes.task_of(lane), lane, f"lane {lane}: {names}", float(self._reward_so_far[lane])
+            )
+            for lane in self._drawn
+        )
 
     def _figures(self) -> dict[str, Any]:
         return lane_figures(self._lanes.figures(self._ended), self._ended)
@@ -186,6 +216,7 @@ class PantographVectorEnv(
     def _begin(self, lanes: Flags, task: Task) -> None:
         self._lanes.begin(lanes, task, self._generator)
         self._steps[lanes] = 0
+        self._reward_so_far[lanes] = 0.0
         self._ended[lanes] = False
         self._any_ended = bool(self._ended.any())
 

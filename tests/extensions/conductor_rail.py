@@ -23,6 +23,7 @@ from .protocol import (
     rise_at_contact,
 )
 from .schema import CatenaryData
+from .view import NOTHING
 
 
 class ConductorRailData(CatenaryData):
@@ -60,6 +61,9 @@ class ConductorRail:
 
     def rest_tension(self, lane):
         return np.zeros(0)
+
+    def view(self, lane, begin, end):
+        return NOTHING
 
 
 KIND = CatenaryKind(ConductorRailData, ConductorRail)

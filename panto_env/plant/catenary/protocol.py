@@ -21,6 +21,7 @@ from ...base.errors import InputError
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from .schema import CatenaryData
+from .view import LineView
 
 
 class StartPoint(NamedTuple):
@@ -69,6 +70,9 @@ class CatenaryModel(Protocol):
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """What can be seen of one lane's line now, from begin to end (m) as far as it is computed there."""
 
 
 class CatenaryKind(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,14 +12,23 @@ from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
+from ..view import LineView
 from .build import at_rest, constants, dropper_positions, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
+from .line import CONTACT, MESSENGER, PAD
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
-from .static_shape import hang
+from .segments import along
+from .static_shape import StaticShape, hang
 from .tension import shape_left, with_tension_left
 from .wire_defects import locate
+
+DESIGNED = -1
+"""Instead of a lane's number: the shape of all lanes that have none of their own."""
+
+VIEW_POINTS = 401
+"""Of a span, at which the messenger's height is kept for pictures."""
 
 
 class FlexibleCatenary:
@@ -53,6 +63,7 @@ class FlexibleCatenary:
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
+        self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; for pictures alone
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.length = spans * data.span_length
@@ -105,6 +116,7 @@ class FlexibleCatenary:
         shape = shape_left(self._designed, own)
         tensioned = of_tension(own, shape, self.line.spacing, self.time_step)
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
+        self._shapes[row] = shape
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
         self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
 
@@ -118,6 +130,59 @@ class FlexibleCatenary:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
         tension: Array = self._tension[min(lane, len(self._tension) - 1)]
         return tension
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """As far as the window about the train.
+
+        Heights of the messenger are those of a line without defects of droppers and supports, as tensioned;
+        the contact wire's are what the pantograph feels.
+        """
+        line, wire = self.line, self.wire
+        first_span = int(wire.first_span[lane])
+        start, links = first_span * line.span, line.link_set.size
+        moved = along(wire.displacement[lane] - 0.5 * wire.increment[lane])[:, PAD:-PAD]
+        x = start + line.spacing * np.arange(moved.shape[1])
+        inside = (x >= begin) & (x <= end)
+        x, moved = x[inside], moved[:, inside]
+        of_span = np.linspace(0.0, line.span, line.shape.shape[1])
+        contact = np.interp(x % line.span, of_span, line.shape[min(lane, len(line.shape) - 1)])
+        heights = messenger_heights(self._shapes.get(lane, self._shapes[DESIGNED]))
+        messenger = np.interp(x % line.span, np.linspace(0.0, line.span, VIEW_POINTS), heights)
+        supports = self.supports[(self.supports >= begin) & (self.supports <= end)]
+        first = first_span * (links // line.window)
+        droppers = self.droppers[first : first + links]
+        hanging = (droppers >= begin) & (droppers <= end)
+        tension = (wire.static[lane] + wire.change[lane])[line.link_set, line.link_segment]
+        return LineView(
+            x=x,
+            contact=contact + self._rise(lane, x) + moved[CONTACT],
+            messenger=messenger + moved[MESSENGER],
+            supports=supports,
+            droppers=droppers[hanging],
+            slack=(tension <= 0)[hanging],
+        )
+
+    def _rise(self, lane: int, x: Array) -> Array:
+        """What defects add to the contact wire's height at rest (m): ``rise_by_defects`` at many places."""
+        line = self.line
+        if not line.rise.shape[1]:
+            return np.zeros(len(x))
+        row = min(lane, len(line.rise) - 1)
+        pieces, breaks, decay = line.rise[row], line.rise_breaks, line.rise_decay[row]
+        per_span = len(breaks) - 1
+        number = np.minimum((x / breaks[-1]).astype(int), len(pieces) // per_span - 1)
+        local = x - number * breaks[-1]
+        k = np.clip(np.searchsorted(breaks, local, side="right") - 1, 0, per_span - 1)
+        a, b, c, d, e = pieces[number * per_span + k].T
+        left, right = local - breaks[k], breaks[k + 1] - local
+        rise: Array = a + b * left + c * np.exp(-decay * left) + d * np.exp(-decay * right) + e * left * right
+        return rise
+
+
+@lru_cache(maxsize=64)
+def messenger_heights(shape: StaticShape) -> Array:
+    """Height (m) of the messenger wire at ``VIEW_POINTS`` places over a span."""
+    return shape.messenger.height(np.linspace(0.0, shape.messenger.span, VIEW_POINTS))
 
 
 def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:

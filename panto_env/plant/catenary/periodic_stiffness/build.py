@@ -12,6 +12,7 @@ from ....base.arrays import Array
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds, refuse_defects
+from ..view import NOTHING, LineView
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
@@ -72,3 +73,7 @@ class PeriodicStiffness:
     def rest_tension(self, lane: int) -> Array:
         """No tension: there are no droppers."""
         return np.zeros(0)
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """Nothing: a spring has no shape along the line."""
+        return NOTHING

@@ -16,6 +16,7 @@ from ...pantograph.build import exponential
 from ..flexible import KIND as FLEXIBLE
 from ..protocol import CatenaryModel, StartPoint
 from ..three_span import KIND as THREE_SPAN
+from ..view import LineView
 from .arrays import TERMS, FitRow, RigLine, RigRow, RigWire
 from .schema import Computer, RigData
 
@@ -105,6 +106,10 @@ class Rig:
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of the computed line's droppers at rest."""
         return self.model.rest_tension(lane)
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """The line that is computed."""
+        return self.model.view(lane, begin, end)
 
 
 def constants(data: RigData, line: Any, time_step: float) -> RigLine:

@@ -12,10 +12,13 @@ from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ...state import CONTACTS
 from ..protocol import StartPoint, check_speeds, refuse_defects
+from ..view import NOTHING, LineView
 from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
+VIEW_POINTS = 361
+"""Of the three spans, in a picture."""
 TIME_STEP = 2.5e-3
 """Unless told otherwise (s): tests/test_three_span.py shows how figures converge."""
 
@@ -71,6 +74,8 @@ class ThreeSpan:
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
         self.line: Any = _constants(data, self.time_step)
+        places = np.linspace(0.0, 3 * data.span_length, VIEW_POINTS)
+        self._view_shapes = mode_shapes(data, modes(data)[1], places)
         self.wire: Any = _at_rest(lanes, data.modes)
         self.contact_gain = contact_gain(self.line)
         self.usual_end = spans * data.span_length
@@ -88,6 +93,16 @@ class ThreeSpan:
     def rest_tension(self, lane: int) -> Array:
         """No tension: the equivalent wire has no droppers."""
         return np.zeros(0)
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """As far as the three spans about the train; the wire's own sag is no part of this model."""
+        span, before = self.line.span, float(self.wire.central_span[lane] - 1)
+        x = before * span + np.linspace(0.0, 3 * span, VIEW_POINTS)
+        inside = (x >= begin) & (x <= end)
+        height = self._view_shapes[inside] @ self.wire.modal[lane, 0]
+        supports = span * (before + np.array([1.0, 2.0]))
+        supports = supports[(supports >= begin) & (supports <= end)]
+        return NOTHING._replace(x=x[inside], contact=height, supports=supports)
 
 
 def modes(data: ThreeSpanData) -> tuple[Array, Array]:

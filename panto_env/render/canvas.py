@@ -1,0 +1,124 @@
+"""A picture that is drawn into, in memory: no screen is needed. Lines by OpenCV, words by Pillow."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array
+from .packages import check_packages
+
+Colour = tuple[int, int, int]
+PARTS = 4
+"""Places are drawn to a part 1 / 2^PARTS of a pixel."""
+KEPT_WORDS = 2000
+"""Drawings of words that are kept: numbers come again."""
+
+
+def rgb(colour: str) -> Colour:
+    """A colour as "#rrggbb" in numbers."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+class Canvas:
+    """A picture of so many pixels, (height, width, 3), and a pen. Places are pixels from the top left."""
+
+    def __init__(self, width: int, height: int) -> None:
+        """Raises InputError where OpenCV is not installed."""
+        check_packages("cv2")
+        self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
+
+    def start_from(self, other: Canvas) -> None:
+        """Begin a new picture, in pixels of its own, with what another canvas shows."""
+        self.pixels = other.pixels.copy()
+
+    def fill(self, colour: Colour) -> None:
+        """Make all of it one colour."""
+        self.pixels[...] = colour
+
+    def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
+        """A filled rectangle."""
+        rows = slice(max(round(top), 0), max(round(top + height), 0))
+        self.pixels[rows, max(round(left), 0) : max(round(left + width), 0)] = colour
+
+    def line(self, points: Any, colour: Colour, width: float = 1.0) -> None:
+        """A smooth line through points, (n, 2)."""
+        import cv2
+
+        cv2.polylines(self.pixels, [_exact(points)], False, colour, max(1, round(width)), cv2.LINE_AA, PARTS)
+
+    def shape(self, points: Any, colour: Colour) -> None:
+        """A filled convex polygon."""
+        import cv2
+
+        cv2.fillConvexPoly(self.pixels, _exact(points), colour, cv2.LINE_AA, PARTS)
+
+    def dot(self, x: float, y: float, radius: float, colour: Colour, edge: Colour | None = None) -> None:
+        """A filled circle, with an edge of another colour or none."""
+        import cv2
+
+        place, part = tuple(_exact([(x, y)])[0].tolist()), 1 << PARTS
+        if edge is not None:
+            cv2.circle(self.pixels, place, round((radius + 1.5) * part), edge, -1, cv2.LINE_AA, PARTS)
+        cv2.circle(self.pixels, place, round(radius * part), colour, -1, cv2.LINE_AA, PARTS)
+
+    def words(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        colour: Colour,
+        size: float,
+        *,
+        bold: bool = False,
+        anchor: str = "left",
+    ) -> float:
+        """A line of text, y being its middle and x its left, middle or right; returns its width."""
+        shade = _shade(text, max(8, round(size)), bold)
+        high, wide = shade.shape[:2]
+        left = round(x - {"left": 0.0, "middle": 0.5, "right": 1.0}[anchor] * wide)
+        top = round(y - 0.5 * high)
+        begin, start = max(left, 0), max(top, 0)
+        under = self.pixels[start : max(top + high, 0), begin : max(left + wide, 0)]
+        own = shade[start - top :, begin - left :][: under.shape[0], : under.shape[1]]
+        under[...] = under + own * (np.array(colour, dtype=np.float32) - under)
+        return float(wide)
+
+
+def _exact(points: Any) -> NDArray[np.int32]:
+    """Places, (n, 2), in parts of a pixel, far ones brought nearer: OpenCV's numbers end."""
+    near = np.clip(np.asarray(points, dtype=float), -20_000, 20_000)
+    return np.asarray(np.rint(near * (1 << PARTS)), dtype=np.int32)
+
+
+@lru_cache(maxsize=KEPT_WORDS)
+def _shade(text: str, size: int, bold: bool) -> NDArray[np.float32]:
+    """How dark words are, 0 to 1, (height, width, 1)."""
+    from PIL import Image, ImageDraw
+
+    font = _font(size, bold)
+    left, _, right, _ = font.getbbox(text)
+    image = Image.new("L", (int(right - left) + 2, int(1.4 * size)))
+    ImageDraw.Draw(image).text((1 - left, 0.7 * size), text, fill=255, font=font, anchor="lm")
+    return (np.asarray(image, dtype=np.float32)[:, :, None] / 255).astype(np.float32)
+
+
+@lru_cache(maxsize=32)
+def _font(size: int, bold: bool) -> Any:
+    """The font that comes with Matplotlib: it has σ and Δ, and needs nothing of the system."""
+    import matplotlib
+    from PIL import ImageFont
+
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
+
+
+def zigzag(x: float, top: float, bottom: float, half: float, turns: int) -> Array:
+    """A spring from top to bottom, (n, 2)."""
+    down = np.concatenate([[0.0, 0.1], np.linspace(0.15, 0.85, 2 * turns), [0.9, 1.0]])
+    aside = np.concatenate([[0.0, 0.0], np.where(np.arange(2 * turns) % 2, -half, half), [0.0, 0.0]])
+    return np.column_stack([x + aside, top + (bottom - top) * down])

@@ -1,0 +1,108 @@
+"""Where everything in a frame lies: from metres and newtons to pixels. Nothing here draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array
+from .moment import AHEAD, BEHIND, Moment
+
+TITLE, CHART, ROOF = 0.075, 0.30, 0.045
+"""Shares of the frame's height: of the title, of the chart below, and of the train's roof."""
+PANTOGRAPH = 0.22
+"""Share of the frame's height from the contact wire down to the roof."""
+LEAST_HEIGHT = 0.35
+"""That a picture shows above the contact wire at least (m)."""
+CHAIN = 0.55
+"""Share of the way from wire to roof over which the pantograph's masses are spread."""
+ARROW = 0.11
+"""Length of the largest force's arrow, as a share of the frame's height."""
+ROUND_TO = (1, 2, 5, 10, 15, 20, 30, 50, 100, 200)
+"""Exaggerations of heights that are used: one that a person can remember."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Of one frame: the pantograph stands still in it, the line passes by."""
+
+    width: int  # px
+    height: int  # px
+    span_length: float  # m
+    exaggeration: int  # of heights against lengths
+    rest: tuple[float, ...]  # heights of the masses above the head's in the first frame (m)
+
+    @classmethod
+    def of(cls, moment: Moment, width: int, height: int) -> Layout:
+        """Of all frames of a line: the exaggeration is the largest round one by which its wires fit in."""
+        wires = moment.line.messenger if moment.line.messenger.size else moment.line.contact
+        tallest = max(LEAST_HEIGHT, float(wires.max()) if wires.size else 0.0)
+        per_metre = width / ((BEHIND + AHEAD) * moment.span_length)
+        room = (1 - TITLE - CHART - ROOF - PANTOGRAPH) * height
+        fitting = [each for each in ROUND_TO if each * per_metre * tallest <= room]
+        rest = tuple((moment.heights - moment.heights[0]).tolist())
+        return cls(width, height, moment.span_length, max(fitting, default=1), rest)
+
+    @property
+    def per_metre(self) -> float:
+        """Pixels of a metre along the line."""
+        return self.width / ((BEHIND + AHEAD) * self.span_length)
+
+    @property
+    def pantograph(self) -> float:
+        """Where the pantograph stands (px from the left)."""
+        return self.per_metre * BEHIND * self.span_length
+
+    @property
+    def wire(self) -> float:
+        """Where height 0 is (px from the top)."""
+        return (1 - CHART - ROOF - PANTOGRAPH) * self.height
+
+    @property
+    def roof(self) -> float:
+        """Where the train's roof is (px from the top)."""
+        return (1 - CHART - ROOF) * self.height
+
+    @property
+    def chart(self) -> tuple[float, float]:
+        """Top and bottom of the chart (px from the top)."""
+        return (1 - CHART + 0.045) * self.height, 0.975 * self.height
+
+    def across(self, places: Array, position: float) -> Array:
+        """Pixels from the left of places along the line (m), the pantograph being at ``position`` (m)."""
+        return self.pantograph + self.per_metre * (np.asarray(places) - position)
+
+    def up(self, heights: Array | float) -> Array:
+        """Pixels from the top of heights (m)."""
+        return self.wire - self.exaggeration * self.per_metre * np.asarray(heights)
+
+    def points(self, places: Array, heights: Array, position: float) -> Array:
+        """Pixels, (n, 2), of a line of places and heights (m)."""
+        return np.column_stack([self.across(places, position), self.up(heights)])
+
+    def forces(self, forces: Array | float, largest: float) -> Array:
+        """Pixels from the top of contact forces (N) in the chart, from 0 to beyond the limit."""
+        top, bottom = self.chart
+        low, high = -0.06 * largest, 1.12 * largest
+        shown = np.clip(forces, low, high)
+        return bottom - (bottom - top) * (np.asarray(shown) - low) / (high - low)
+
+    def chain(self, heights: Array) -> Array:
+        """Pixels from the top of the pantograph's masses, (masses,), by their heights (m), head first.
+
+        They stand evenly below each other in the first frame, and move from there as they do.
+        """
+        count, heights = len(heights), heights - np.array(self.rest)
+        apart = CHAIN * (self.roof - self.wire) * np.arange(count) / max(count - 1, 1)
+        return np.asarray(self.up(heights) + apart)
+
+    def arrow(self, force: float, limit: float) -> float:
+        """Length of a force's arrow (px), negative where it points down."""
+        return float(np.clip(force / limit, -1.0, 1.0)) * ARROW * self.height
+
+
+def lost(force: Array) -> NDArray[np.bool_]:
+    """Where contact is lost, (n,)."""
+    return np.asarray(force) <= 0

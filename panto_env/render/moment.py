@@ -1,0 +1,79 @@
+"""What a picture shows: one lane of a task at one moment, and its force up to then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..backend import of_lanes
+from ..base.arrays import Array
+from ..control import Task
+from ..metrics import en50367
+from ..metrics.low_pass import low_pass
+from ..plant.catenary.view import LineView
+from ..plant.state import Place, Row
+
+BEHIND, AHEAD = 1.3, 0.75
+"""How much of the line a picture shows behind and ahead of the pantograph (spans)."""
+SETTLING = 0.5
+"""Time (s) before what is shown, from which the force is low-passed."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One lane at one moment."""
+
+    title: str  # what runs where
+    time: float  # since the start (s)
+    speed: float  # of the train (m/s)
+    position: float  # of the pantograph (m)
+    span_length: float  # m
+    line: LineView
+    masses: Array  # (masses,): head first (kg)
+    heights: Array  # (masses,): of each (m), 0 where no spring is strained and the head at height 0
+    wire: float  # height of the contact wire above the pantograph (m)
+    places: Array  # (n,): where the force that is shown acted (m)
+    force: Array  # (n,): contact force there, raw (N)
+    filtered: Array  # (n,): low-passed at 20 Hz as EN 50317 does, so 31 ms late (N)
+    nominal_force: float  # N
+    largest_force: float  # that EN 50367 allows (N)
+    actuators: dict[Place, float]  # forces of those that there are (N)
+    force_limit: float  # of an actuator (N)
+    figures: dict[str, str] = field(default_factory=dict)  # to be told beside, by name
+
+
+def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Moment:
+    """What a lane of a task that keeps its samples is doing now."""
+    plant = task.plant
+    own = of_lanes(plant.run.table[0], lane)
+    steps, span = int(own[Row.STEP]), plant.catenary.span_length
+    speed, step = float(task.speed[lane]), plant.time_step
+    count = min(steps, int((BEHIND * span / speed + SETTLING) / step) + 1)
+    at = np.arange(steps - count, steps) + 0.5
+    lanes = np.array([lane])
+    places = at * step * speed + plant.ahead(lanes, at[None])[0]
+    position = steps * step * speed + float(plant.ahead(lanes, np.array([[steps]]))[0, 0])
+    force = task.samples.rows[lane, steps - count + 1 : steps + 1, 0, Row.CONTACT_FORCE].copy()
+    begin, end = position - BEHIND * span, position + AHEAD * span
+    shown = places >= begin
+    size = len(plant.pantograph.masses)
+    return Moment(
+        title=title,
+        time=steps * step,
+        speed=speed,
+        position=position,
+        span_length=span,
+        line=plant.model.view(lane, begin, end),
+        masses=np.array(plant.pantograph.masses),
+        heights=own[Row.STATE : Row.STATE + size].copy(),
+        wire=float(own[Row.WIRE_HEIGHT]),
+        places=places[shown],
+        force=force[shown],
+        filtered=low_pass(force, step)[shown] if count else force,
+        nominal_force=float(own[Row.NOMINAL_FORCE]),
+        largest_force=en50367.maximum_limit(speed),
+        actuators={place: float(own[Row.FRAME_FORCE + place]) for place in task.actuator.places},
+        force_limit=task.actuator.force_limit,
+        figures=figures,
+    )

@@ -1,0 +1,65 @@
+"""What an environment draws with: a picture per lane, and a window where one is asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..backend import of_lanes
+from ..base.errors import InputError
+from ..control import Task
+from ..control.state import TaskRow
+from ..metrics.labels import LABELS
+from .moment import moment_of
+from .picture import Picture
+
+if TYPE_CHECKING:
+    from .window import Window
+
+SHOWN = ("mean", "std", "contact_loss")
+"""Figures of the episode so far that stand beside the picture."""
+
+
+class Viewer:
+    """Draws lanes of tasks that keep their samples."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """size: width and height of a frame (px)."""
+        self._size = size
+        self._pictures: dict[int, Picture] = {}
+        self._window: Window | None = None
+
+    def frame(self, task: Task, lane: int, title: str, reward: float) -> NDArray[np.uint8]:
+        """A lane of a task now, (height, width, 3); reward: summed over the episode so far."""
+        if lane not in self._pictures:
+            self._pictures[lane] = Picture(*self._size)
+        figures = figures_so_far(task, lane) | {"reward so far": f"{reward:.2f}"}
+        return self._pictures[lane].draw(moment_of(task, lane, title, figures))
+
+    def show(self, frame: NDArray[np.uint8], title: str, rate: float) -> None:
+        """Show a frame in a window, and wait until it is time for the next; rate: frames per second."""
+        from .window import Window
+
+        if self._window is None:
+            self._window = Window(self._size, title)
+        self._window.show(frame, rate)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+def figures_so_far(task: Task, lane: int) -> dict[str, str]:
+    """Figures of a lane's episode so far, in words; none before its first step, or once it has diverged."""
+    if not of_lanes(task.episode.table, lane)[TaskRow.SAMPLES]:
+        return {}
+    try:
+        values = task.figures(lane).as_dict()
+    except InputError:
+        return {}
+    told = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in SHOWN}
+    return {f"{LABELS[name].short} so far": value for name, value in told.items()}

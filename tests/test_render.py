@@ -1,0 +1,326 @@
+"""Pictures show what the plant does: where things are, which way a force points, what is slack or lost."""
+
+import itertools
+import pickle
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from panto_env import InputError, simulate
+from panto_env.base.colours import ORANGE, VERMILION
+from panto_env.cli import make_app
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
+from panto_env.envs import IDS
+from panto_env.plant.state import Place, Row
+
+pytest.importorskip("cv2", reason="the extra 'render' is not installed")
+
+from panto_env.render.canvas import Canvas, rgb
+from panto_env.render.film import frames, shown
+from panto_env.render.layout import Layout
+from panto_env.render.moment import moment_of
+from panto_env.render.picture import Picture
+from panto_env.render.video import write_film
+
+SIZE = (640, 360)
+
+
+def driven(steps=150, action=0.0, **settings):
+    """A task in the midst of a run."""
+    task = Task(run_settings(settings))
+    task.reset(0, np.random.default_rng(0))
+    for _ in range(steps):
+        task.step(np.full((1, len(task.actuator.places)), action))
+    return task
+
+
+def moment(task, lane=0):
+    return moment_of(task, lane, "title", {})
+
+
+def calm(task):
+    """The same, but for contact that is lost and droppers that are slack."""
+    now = moment(task)
+    line = now.line._replace(slack=np.zeros_like(now.line.slack))
+    return replace(now, line=line, force=np.maximum(now.force, 50.0))
+
+
+def count(frame, colour):
+    """Pixels of about a colour."""
+    return int((np.abs(frame.astype(int) - rgb(colour)).max(axis=2) < 12).sum())
+
+
+LINES = {
+    "flexible": {"catenary": "en50318-2002"},
+    "as built": {"catenary": "shinkansen-simple", "line_condition": "as-built"},
+    "three spans": {"catenary": "ohl-three-span", "pantograph": "dsa350"},
+    "rig": {"catenary": "rig-flexible"},
+}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_the_wire_that_is_drawn_is_the_one_that_the_pantograph_touches(name):
+    task = driven(**LINES[name])
+    view = moment(task).line
+    position = task.plant.of(0, Row.STEP) * task.plant.of(0, Row.STRIDE)
+    drawn = np.interp(position, view.x, view.contact)
+    head, compliance = task.plant.of(0, Row.HEAD_HEIGHT), 1 / 50e3
+    felt = head - task.plant.of(0, Row.CONTACT_FORCE) * compliance
+    tolerance = 1e-3 if name != "rig" else 5e-3  # a cylinder follows the line that is drawn, late
+    assert drawn == pytest.approx(felt, abs=tolerance)
+    assert view.x.min() <= position - task.plant.catenary.span_length
+    assert np.all(np.diff(view.x) > 0)
+
+
+def test_the_messenger_is_where_the_static_shape_hangs_it():
+    task = driven(steps=60)
+    view = moment(task).line
+    data = task.plant.catenary
+    at_support = np.interp(data.span_length, view.x, view.messenger)
+    carried = 9.81 * (data.contact_wire.mass + data.messenger_wire.mass) * data.span_length
+    assert at_support == pytest.approx(data.encumbrance - carried / data.support.stiffness, abs=3e-3)
+
+
+def test_slack_droppers_are_those_without_tension():
+    run = simulate("en50318-2002", speed_kmh=300.0)
+    task = Task(run_settings({"speed_kmh": 300.0}), record_droppers=True)
+    task.reset(0, np.random.default_rng(0))
+    seen = 0
+    for _ in range(600):
+        task.step(np.zeros((1, 1)))
+        view, step = moment(task).line, int(task.plant.of(0, Row.STEP)) - 1
+        which = np.searchsorted(run.dropper_position, view.droppers)
+        np.testing.assert_array_equal(view.slack, run.dropper_force[step, which] <= 0)
+        seen += view.slack.sum()
+    assert seen > 0
+
+
+def test_a_slack_dropper_is_drawn_in_another_colour():
+    task, picture = driven(), Picture(*SIZE)
+    now = calm(task)
+    slack = now.line._replace(slack=np.ones_like(now.line.slack))
+    drawn = [count(picture.draw(replace(now, line=line)), VERMILION) for line in (now.line, slack)]
+    assert drawn[0] == 0
+    assert drawn[1] > 100
+
+
+def test_an_arrow_points_as_the_force_does():
+    task, picture = driven(), Picture(*SIZE)
+    now = moment(task)
+    layout = Layout.of(now, *SIZE)
+    frame = layout.chain(now.heights)[-1]
+    for force in (80.0, -80.0):
+        drawn = picture.draw(replace(now, actuators={Place.FRAME: force}))
+        rows, columns = np.nonzero(np.abs(drawn.astype(int) - rgb(ORANGE)).max(axis=2) < 30)
+        middle = rows[columns > layout.pantograph - 50].mean()
+        assert (middle < frame) == (force > 0)
+    assert layout.arrow(50.0, 100.0) == -layout.arrow(-50.0, 100.0)
+    assert layout.arrow(100.0, 100.0) == layout.arrow(300.0, 100.0)
+
+
+def test_lost_contact_is_marked():
+    task, picture = driven(), Picture(*SIZE)
+    now = calm(task)
+    lost = replace(now, force=np.where(np.arange(len(now.force)) > len(now.force) - 20, 0.0, now.force))
+    assert count(picture.draw(now), VERMILION) == 0
+    assert count(picture.draw(lost), VERMILION) > 20
+
+
+def test_the_force_shown_is_the_one_of_the_run_where_it_was_felt():
+    run = simulate("en50318-2002", speed_kmh=250.0)
+    now = moment(driven(steps=300, speed_kmh=250.0))
+    felt = np.interp(now.places, run.position, run.contact_force)
+    np.testing.assert_allclose(now.force, felt, rtol=1e-4)
+    filtered = now.filtered[len(now.filtered) // 2 :]
+    assert filtered.std() < now.force[len(now.force) // 2 :].std()
+
+
+def test_heights_are_exaggerated_by_what_is_said():
+    now = moment(driven())
+    layout = Layout.of(now, *SIZE)
+    places = layout.across(np.array([0.0, 1.0]), 0.0)
+    heights = layout.up(np.array([0.0, 1.0]))
+    assert (heights[0] - heights[1]) / (places[1] - places[0]) == pytest.approx(layout.exaggeration)
+    assert layout.up(now.line.messenger).min() > 0
+    assert layout.forces(np.array([0.0, 350.0]), 350.0)[0] > layout.forces(350.0, 350.0)
+
+
+@pytest.mark.parametrize(("name", "mode"), list(itertools.product(IDS, ("rgb_array", "rgb_array_list"))))
+def test_every_id_draws_itself(name, mode):
+    env = gymnasium.make(name, render_mode=mode, render_size=SIZE)
+    env.reset(seed=0)
+    shown = [env.render()]
+    for _ in range(30):
+        env.step(env.action_space.sample())
+    shown.append(env.render())
+    if mode == "rgb_array_list":
+        assert len(shown[1]) == 30
+        shown = [shown[0][0], shown[1][-1]]
+    for frame in shown:
+        assert frame.shape == (360, 640, 3)
+        assert frame.dtype == np.uint8
+    assert np.any(shown[0] != shown[1])
+    env.close()
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_drawing_changes_no_number(name):
+    plain, drawn = gymnasium.make(name), gymnasium.make(name, render_mode="rgb_array", render_size=SIZE)
+    for env in (plain, drawn):
+        env.reset(seed=3)
+    for _ in range(20):
+        results = [env.step(np.full(1, 0.3, dtype=np.float32)) for env in (plain, drawn)]
+        drawn.render()
+        np.testing.assert_array_equal(results[0][0], results[1][0])
+        assert results[0][1:4] == results[1][1:4]
+
+
+def test_a_lane_draws_what_a_single_environment_draws():
+    arguments = {"render_mode": "rgb_array", "render_size": SIZE}
+    envs = gymnasium.make_vec("Pantograph-v0", num_envs=3, render_lanes=(2, 0), **arguments)
+    env = gymnasium.make("Pantograph-v0", **arguments)
+    envs.reset(seed=5)
+    env.reset(seed=7)
+    for _ in range(25):
+        envs.step(np.full((3, 1), 0.2, dtype=np.float32))
+        env.step(np.full(1, 0.2, dtype=np.float32))
+    second, first = envs.render()
+    single = env.render()
+    title = slice(None, int(0.075 * 360))  # tells the lane
+    second[title] = single[title] = 0
+    np.testing.assert_array_equal(second, single)
+    assert np.any(first != second)
+
+
+def test_frames_per_second_tell_true_time():
+    assert gymnasium.make("Pantograph-v0").metadata["render_fps"] == 100
+    slow = gymnasium.make("Pantograph-v0", slow_motion=4.0)
+    assert slow.metadata["render_fps"] == 25
+    quick = gymnasium.make("Pantograph-v0", control_interval=0.02)
+    assert quick.metadata["render_fps"] == 50
+    assert gymnasium.make_vec("Pantograph-v0", num_envs=1, slow_motion=10).metadata["render_fps"] == 10
+
+
+def test_a_window_shows_each_step_and_closes(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gymnasium.make("Pantograph-v0", render_mode="human", render_size=SIZE, slow_motion=0.01)
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    screen = pygame.surfarray.array3d(pygame.display.get_surface())
+    assert screen.shape == (640, 360, 3)
+    assert len(np.unique(screen.reshape(-1, 3), axis=0)) > 10
+    copy = pickle.loads(pickle.dumps(env.unwrapped))
+    copy.step(np.zeros(1, dtype=np.float32))
+    env.close()
+    copy.close()
+    assert not pygame.display.get_init()
+
+
+def test_record_video_writes_an_episode(tmp_path):
+    pytest.importorskip("moviepy")
+    env = gymnasium.make(
+        "Pantograph-v0", render_mode="rgb_array", render_size=SIZE, distance=60.0, run_in=0.0
+    )
+    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), disable_logger=True)
+    env.reset(seed=0)
+    steps, ended = 0, False
+    while not ended:
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        steps, ended = steps + 1, terminated or truncated
+    env.close()
+    (film,) = tmp_path.glob("*.mp4")
+    meta, number = read(film)
+    assert meta["fps"] == 100
+    assert number == steps + 1
+
+
+def read(path):
+    """What a film says of itself, and its frames counted."""
+    import imageio_ffmpeg
+
+    reader = imageio_ffmpeg.read_frames(str(path))
+    return next(reader), sum(1 for _ in reader)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
+    path = tmp_path / f"film{suffix}"
+    command = ["film", "passive", "pd", "--output", str(path), "--size", "640", "480", "--seconds", "0.3"]
+    result = CliRunner().invoke(make_app(), [*command, "--line-spans", "14", "--slow-motion", "5"])
+    assert result.exit_code == 0, result.output
+    assert "20 frames per second, 5 times slower than life" in result.output
+    if suffix == ".mp4":
+        meta, number = read(path)
+        assert meta["size"] == (640, 480)
+        assert meta["fps"] == 20
+        assert number == pytest.approx(30, abs=1)
+        assert meta["pix_fmt"].startswith("yuv420p")  # what every browser plays
+    else:
+        from PIL import Image
+
+        film = Image.open(path)
+        assert film.size == (640, 480)
+        assert film.n_frames == pytest.approx(30, abs=1)
+
+
+def test_a_film_shows_the_pass_that_simulate_makes():
+    settings = {"speed_kmh": 300.0, "spans": 14}
+    runs = [simulate(policy="pd", seed=2, **settings)]
+    what = shown(runs[0], 0.01, 10, 0.2, 4.0)
+    assert what.begin == pytest.approx(9 * 60 / (300 / 3.6))
+    (first, *_) = frames(["pd"], runs, settings, 2, what, SIZE)
+    task = Task(run_settings(settings))
+    assert first.shape == (360, 640, 3)
+    assert task.plant.time_step == runs[0].time_step
+
+
+def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
+    run = simulate("periodic-stiffness", "three-mass", 200.0, distance=200.0)
+    with pytest.raises(InputError, match="before span 10; begin in an earlier one"):
+        shown(run, 0.01, 10, 1.0, 1.0)
+    with pytest.raises(InputError, match=r"must end in one of \.mp4, \.gif"):
+        write_film([], tmp_path / "film.avi", 25, SIZE)
+    for arguments, words in (
+        (["passive"] * 5, "up to 4 policies, not 5"),
+        (["passive", "--size", "641", "480"], "even numbers of pixels"),
+    ):
+        result = CliRunner().invoke(make_app(), ["film", *arguments, "--output", str(tmp_path / "film.mp4")])
+        assert isinstance(result.exception, InputError)
+        assert words in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_words_at_an_edge_are_cut_and_far_lines_too():
+    canvas = Canvas(64, 64)
+    canvas.words(-20, 2, "cut", (255, 255, 255), 16)
+    canvas.words(60, 63, "cut", (255, 255, 255), 16)
+    canvas.line([(-1e9, 5.0), (1e9, 5.0)], (255, 0, 0))
+    canvas.box(-5, -5, 8, 8, (0, 255, 0))
+    assert canvas.pixels[:3, :3, 1].min() == 255
+    assert canvas.pixels.any(axis=2).sum() > 64
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"render_mode": "ansi"}, "render_mode must be None, 'human' or 'rgb_array', not 'ansi'"),
+        ({"render_size": (1, 1)}, "from 64 to 4,096"),
+        ({"slow_motion": 0.0}, "from 0.01 to 1,000"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments, words):
+    from panto_env.envs import PantographEnv
+
+    with pytest.raises(InputError, match=words):
+        PantographEnv(**arguments)
+
+
+def test_a_lane_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match="render_lanes has lane 4, but lanes are 0 to 3"):
+        gymnasium.make_vec("Pantograph-v0", num_envs=4, render_lanes=(0, 4))
