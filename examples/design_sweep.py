@@ -1,10 +1,10 @@
-"""A sweep over two parameters of a design: the collector head's mass and the contact wire's tension.
+r"""A sweep over two parameters of a design: the collector head's mass and the contact wire's tension.
 
     python examples/design_sweep.py --plot design.png
 
 printed twelve designs, and at last "least sigma: 23.0 N, head 4 kg, tension 24 kN". The same as a command:
 
-    panto sweep pantograph.masses.0=4:10:4 catenary.contact_wire.tension=16e3:24e3:3 \\
+    panto sweep pantograph.masses.0=4:10:4 catenary.contact_wire.tension=16e3:24e3:3 \
       --speed 275 --mean-force 130 --plot design.png
 """
 

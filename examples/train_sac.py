@@ -4,6 +4,13 @@ At 300 km/h on lines that differ from one another, with a real actuator and real
 seeds that it has not seen, against a passive pantograph that is pressed to the same mean force.
 
     python examples/train_sac.py --steps 120000
+
+printed after two minutes of one core
+
+    sigma -20.2 % of the passive pantograph of the same mean, mean force +0.4 %
+
+With other seeds and numbers of steps it ended between -8 and -20 %: SAC is sparing with steps, which cost little here,
+and less steady than PPO, which reaches more in a third of the time (examples/ppo_cleanrl.py).
 """
 
 from __future__ import annotations
