@@ -9,8 +9,8 @@ printed after two minutes of one core
 
     sigma -20.2 % of the passive pantograph of the same mean, mean force +0.4 %
 
-With other seeds and numbers of steps it ended between -8 and -20 %: SAC is sparing with steps, which cost little here,
-and less steady than PPO, which reaches more in a third of the time (examples/ppo_cleanrl.py).
+With other settings that were tried it ended between -8 and -20 %. SAC is sparing with steps, which cost
+little here; PPO reaches more in a third of the time (examples/ppo_cleanrl.py).
 """
 
 from __future__ import annotations

@@ -1,9 +1,15 @@
 """PPO of TorchRL on the native vector environment.
 
-TorchRL and other libraries have an environment of their own, made by `make libraries`, in which this is run and
-tested.
+TorchRL and other libraries have an environment of their own, made by `make libraries`, in which this is run
+and tested.
 
     .venv-libraries/bin/python examples/with_torchrl.py --steps 200000
+
+printed after half a minute of one core
+
+    mean reward per step: -1.078 at first, -0.669 at last
+
+A passive pantograph gets -1.
 """
 
 from __future__ import annotations

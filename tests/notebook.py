@@ -1,4 +1,4 @@
-"""Run the notebook of the examples: `python -m tests.notebook` stores its outputs, a test looks at them alone."""
+"""The notebook of the examples: `make notebook` runs it anew and stores what it prints and draws."""
 
 import re
 from pathlib import Path
@@ -11,9 +11,12 @@ SECONDS = 900.0
 """After which a cell is given up: some train."""
 
 
-def executed():
-    """The notebook, run anew in a process of its own."""
+def executed(before=None):
+    """The notebook, run anew in a process of its own; before: the heading at which to stop."""
     notebook = nbformat.read(NOTEBOOK, as_version=4)
+    if before is not None:
+        headings = [cell.source.partition("\n")[0] for cell in notebook.cells]
+        notebook.cells = notebook.cells[: headings.index(before)]
     resources = {"metadata": {"path": str(NOTEBOOK.parent)}}
     NotebookClient(notebook, timeout=SECONDS, resources=resources, record_timing=False).execute()
     return notebook

@@ -56,6 +56,7 @@ BY_HAND = {
     "libraries": "wants an environment of its own",
     "lint": "part of test",
     "mutants": "an hour",
+    "notebook": "two minutes; a slow test runs it, too",
     "nonsense": "any number of lines; proofs run some",
     "ptx": "wants an environment of its own",
     "ray": "wants an environment of its own",
@@ -71,10 +72,6 @@ SHORTENED = {
     },
 }
 """Text in the Python of a page, and what runs instead."""
-NOT_RUN = {
-    "docs/agents.md": "RLlib is not installed here; `make rllib` runs examples/with_rllib.py",
-}
-"""Pages whose Python is compiled and not run, and why."""
 CONTROLLER = "from panto_baselines.policies.pd import ProportionalDerivative as Mine\n"
 
 
@@ -144,9 +141,7 @@ def test_python_of_a_page_runs(page, folder):
         text = block.text
         for long, short in SHORTENED.get(page, {}).items():
             text = text.replace(long, short)
-        code = compile("\n" * (block.line - 1) + text, ROOT / page, "exec")
-        if page not in NOT_RUN:
-            exec(code, names)
+        exec(compile("\n" * (block.line - 1) + text, ROOT / page, "exec"), names)
 
 
 def test_no_exception_is_left_of_a_document_that_has_changed():
@@ -155,7 +150,6 @@ def test_no_exception_is_left_of_a_document_that_has_changed():
     for page, changes in SHORTENED.items():
         text = "".join(block.text for block in python(page))
         assert [long for long in changes if long not in text] == []
-    assert [page for page in NOT_RUN if not python(page)] == []
 
 
 def test_targets_that_documents_name_are_run_by_ci_or_by_hand():

@@ -5,11 +5,14 @@ import re
 import sys
 from pathlib import Path
 
+import nbformat
 import numpy as np
 import pytest
 
 from panto_env import simulate
 from panto_env.metrics.spectrum import in_band
+
+from .notebook import NOTEBOOK, changes, executed, told
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -183,3 +186,21 @@ def test_ppo_example_is_better_than_passive(monkeypatch):
     sigma, mean = example.judge(agent)
     assert sigma < -18.0
     assert abs(mean) < 1.5
+
+
+def test_notebook_shows_what_it_prints_now():
+    """Without the part that learns, which a slow test runs."""
+    stored = nbformat.read(NOTEBOOK, as_version=4)
+    again = told(executed(before="## Learning"))
+    assert told(stored).startswith(again)
+    assert again == "mean force 115.6 N, sigma 35.28 N\nsigma 35.28 N\nDamper: sigma -8.8 %\n"
+    assert [cell for cell in stored.cells if cell.cell_type == "code" and not cell.execution_count] == []
+    assert NOTEBOOK.stat().st_size < 300_000
+    assert changes(stored)["SAC"] < changes(stored)["Damper"]
+
+
+@pytest.mark.slow
+def test_notebook_learns_as_it_shows():
+    assert changes(executed())["SAC"] == pytest.approx(
+        changes(nbformat.read(NOTEBOOK, as_version=4))["SAC"], abs=5.0
+    )
