@@ -36,15 +36,19 @@ RULES = (
     Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
     Rule("panto reproduce paper3-parameters", "ten seconds", "", slow=True),
     Rule("panto speed --json", f"{MINUTES}, and means nothing on a busy machine"),
-    Rule("panto train ", f"{MINUTES}", "--steps 1000", slow=True),
+    Rule("panto train agent-ppo", MINUTES, "--steps 1000", slow=True),
+    Rule("panto train agent-clone", "clones a million steps first; tests/test_agents.py clones fewer"),
+    Rule("panto train agent-residual", f"{MINUTES}; tests/test_agents.py has a short one"),
     Rule("panto train ppo --output runs/ppo", "what follows needs its model", "--steps 1000"),
-    Rule("panto trainings", f"{MINUTES}; six trainings", "--steps 1000 --workers 1", slow=True),
-    Rule("panto trainings agent-ppo agent-residual --seed 0 --seed 1 --seed 2 --ray", "wants a cluster"),
+    Rule(
+        "panto trainings",
+        "six trainings of minutes, or a cluster; tests/test_killed.py and tests/test_ray.py have short ones",
+    ),
     Rule("panto sweep catenary.mean_stiffness=2000:6000:17", "527 passes", "", slow=True),
     Rule(
         "panto tune",
         MINUTES,
-        "--speed 300 --seeds 1 --passes 2 --workers 1 --output gains.toml",
+        "--speed 300 --seeds 1 --passes 2 --workers 1 --output gains-$$.toml",
         slow=True,
     ),
 )
