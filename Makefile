@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs proofs coverage mutants same nonsense oldest pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense oldest pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -49,6 +49,10 @@ SITE := docs/_build/html
 docs: $(READY)
 	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs $(SITE)
 	@echo "The site is $(SITE)/index.html; it needs no network."
+
+# The notebook of the examples, run anew; what it prints and draws is stored in it.
+notebook: $(READY)
+	$(BIN)/python -m tests.notebook
 
 # Slow proofs: more lines against finite elements, longer trainings.
 proofs: $(READY)

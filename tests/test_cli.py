@@ -105,3 +105,18 @@ def test_unwritable_output_is_refused(tmp_path):
     assert result.returncode == 2
     assert "cannot be written" in result.stderr
     assert target.read_text() == "mine"
+
+
+def test_reproduce_prints_what_it_writes_as_json(monkeypatch, capsys, tmp_path):
+    from panto_env.cli import reproduce
+    from panto_env.studies import Comparison, Outcome
+
+    found = Outcome("A study", (Comparison("mass", "kg", 2.0, 2.1, 1.9, float("inf")),), numbers={"k": 3})
+    monkeypatch.setattr(reproduce.studies, "find_study", lambda name: lambda report: found)
+    reproduce.reproduce("paper2", tmp_path, json=True)
+    told = json.loads(capsys.readouterr().out)
+    assert told["paper2"] == json.loads((tmp_path / "paper2" / "numbers.json").read_text())
+    assert told["paper2"]["comparisons"][0]["agrees"]
+    assert told["paper2"]["comparisons"][0]["high"] is None
+    reproduce.reproduce("paper2", tmp_path)
+    assert "A study" in capsys.readouterr().out

@@ -1,5 +1,7 @@
 """Learning libraries on our environments; `make libraries` has them in an environment of their own."""
 
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from panto_env.envs import IDS
 
 torch = pytest.importorskip("torch")
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -24,6 +27,16 @@ def test_torchrl_s_check_finds_no_fault(name):
     abreast = GymWrapper(native)
     check_env_specs(abreast)
     assert abreast.rollout(80, break_when_any_done=False)["next", "truncated"].sum() >= 6
+
+
+def test_torchrl_s_example_learns(monkeypatch):
+    pytest.importorskip("torchrl")
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import with_torchrl
+
+    rewards = with_torchrl.train(60_000)
+    assert rewards[-1] > rewards[0] + 0.05
+    assert rewards[-1] > -1.0  # what a passive pantograph gets
 
 
 @pytest.mark.parametrize("kind", ["DummyVectorEnv", "SubprocVectorEnv"])

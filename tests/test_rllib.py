@@ -1,6 +1,8 @@
 """RLlib on the native vector environment; `make rllib` has it in an environment of its own."""
 
 import os
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +13,17 @@ import ray
 from ray.rllib.algorithms.ppo import PPOConfig
 
 BATCH, ITERATIONS = 4096, 8
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_the_example_of_the_documents_learns(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.setattr(sys, "argv", ["with_rllib"])  # RLlib's processes look at it
+    import with_rllib
+
+    rewards = with_rllib.train(20)
+    assert rewards[-1] > rewards[0]
+    assert rewards[-1] > -1.0  # what a passive pantograph gets
 
 
 @pytest.mark.parametrize("runners", [0, 2])

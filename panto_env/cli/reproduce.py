@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.progress import Progress
@@ -11,7 +11,7 @@ from rich.table import Table
 
 from .. import studies
 from ..base.files import make_folder
-from ..terminal import console, number, print_table, progress_console
+from ..terminal import Json, console, number, print_json, print_table, progress_console
 
 
 def reproduce(
@@ -19,12 +19,14 @@ def reproduce(
     output: Annotated[Path, typer.Option(help="Folder for figures (PNG) and numbers (JSON).")] = Path(
         "runs/reproduce"
     ),
+    json: Json = False,
 ) -> None:
     """Reproduce a paper's results: print ours beside the paper's, write figures and every number."""
     names = studies.STUDIES if name == "all" else (name,)
     chosen = {name: studies.find_study(name) for name in names}
     for name in chosen:  # now: a study takes minutes
         make_folder(output / name)
+    found: dict[str, Any] = {}
     with Progress(console=progress_console, transient=True) as progress:
         for study, run in chosen.items():
             bar = progress.add_task(study, total=1.0)
@@ -35,8 +37,12 @@ def reproduce(
             )
             files = studies.write(outcome, output / study)
             progress.remove_task(bar)
-            _print(outcome)
-            console.print(f"{len(files) - 1} figures and numbers.json are in {output / study}.\n")
+            found[study] = outcome.as_dict()
+            if not json:
+                _print(outcome)
+                console.print(f"{len(files) - 1} figures and numbers.json are in {output / study}.\n")
+    if json:
+        print_json(found)
 
 
 def _print(outcome: studies.Outcome) -> None:

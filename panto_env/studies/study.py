@@ -55,6 +55,12 @@ class Outcome:
     plots: Mapping[str, Figure] = field(default_factory=dict)  # by file name, without suffix
     numbers: Mapping[str, Any] = field(default_factory=dict)  # every number behind tables and plots
 
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON: nan becomes None."""
+        comparisons = [comparison.as_dict() for comparison in self.comparisons]
+        table: dict[str, Any] = finite({"title": self.title, "comparisons": comparisons, **self.numbers})
+        return table
+
 
 class Study(Protocol):
     """A study of one part of a paper."""
@@ -66,15 +72,10 @@ class Study(Protocol):
 def write(outcome: Outcome, folder: str | Path) -> list[Path]:
     """Write the numbers as JSON and the plots as PNG into a folder; the files written."""
     folder = Path(folder)
-    table = {
-        "title": outcome.title,
-        "comparisons": [comparison.as_dict() for comparison in outcome.comparisons],
-        **outcome.numbers,
-    }
     make_folder(folder)
     files = [folder / "numbers.json"]
     with write_whole(files[0]) as temporary:
-        text = json.dumps(finite(table), indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(outcome.as_dict(), indent=1, ensure_ascii=False, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
     for name, plot in outcome.plots.items():
         files.append(folder / f"{name}.png")
