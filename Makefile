@@ -54,6 +54,21 @@ docs: $(READY)
 notebook: $(READY)
 	$(BIN)/python -m tests.notebook
 
+# The films that the documentation shows.
+REAL := --actuator realistic --sensors realistic
+SMALL := --seconds 2.4 --size 1120 630
+films: $(READY)
+	mkdir -p docs/films
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 1120 840 \
+	  --output docs/films/passive-and-agent.mp4
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 800 600 \
+	  --output docs/films/passive-and-agent.gif
+	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
+	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \
+	  --output docs/films/pantograph-stiffness.mp4
+	$(BIN)/panto film pd --catenary ohl-three-span --pantograph dsa350 $(SMALL) \
+	  --output docs/films/pantograph-three-span.mp4
+
 # Slow proofs: more lines against finite elements, longer trainings.
 proofs: $(READY)
 	$(BIN)/pytest -n auto -m slow
