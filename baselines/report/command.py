@@ -14,7 +14,11 @@ from panto_env.terminal import console
 
 def report(
     files: Annotated[
-        list[Path], typer.Argument(help="Results of `panto benchmark --output RESULT.json`, one a track.")
+        list[Path],
+        typer.Argument(
+            help="Runs of `panto simulate --output RUN.parquet`, or results of `panto benchmark --output "
+            "RESULT.json`, one per track."
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option(help="Page to write; the first file's name with .html by default.")
@@ -24,16 +28,23 @@ def report(
         typer.Option("--markdown", help="Print each track's table for a document; write no page."),
     ] = False,
 ) -> None:
-    """Write a page of HTML on what was measured: tables that sort, forces and spectra, every policy.
+    """Write a page of HTML: of runs a report for engineers, of a benchmark's results every policy.
 
-    It holds all that it needs, and opens in any browser without a network.
+    It holds all that it needs, opens in any browser without a network, and prints.
     """
     from .page import save
     from .result import read_result
 
-    for file in files:
-        if file.suffix.lower() != ".json":
-            raise InputError(f"{file} must end in .json, as results of `panto benchmark --output` do.")
+    kinds = {file.suffix.lower() for file in files}
+    if kinds == {".parquet"} and not markdown:
+        _of_runs(files, output)
+        return
+    if kinds != {".json"}:
+        odd = next((file for file in files if file.suffix.lower() != ".json"), files[0])
+        raise InputError(
+            f"{odd}: a report is of runs (.parquet) alone or of the benchmark's results (.json) alone"
+            f"{', and --markdown of the latter' if markdown else ''}."
+        )
     if markdown:
         from .summary import summary
 
@@ -44,3 +55,11 @@ def report(
     check_output(path, PAGES)
     save([read_result(file) for file in files], path)
     console.print(f"The page is {path}.", markup=False, highlight=False, soft_wrap=True)
+
+
+def _of_runs(files: list[Path], output: Path | None) -> None:
+    from panto_env import report
+
+    path = files[0].with_suffix(PAGES[0]) if output is None else output
+    report.save(files, path)
+    console.print(f"The report is {path}.", markup=False, highlight=False, soft_wrap=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -13,6 +13,7 @@ from ..base.files import read_toml
 from ..base.names import suggest
 from ..catalog import available, load_catenary, load_pantograph
 from ..catalog.loader import SCHEMAS
+from ..catalog.values import values_of
 from ..plant.actuators import ACTUATOR_PRESETS
 from ..plant.catenary.schema import CatenaryData
 from ..plant.line_condition import LINE_CONDITIONS
@@ -29,7 +30,6 @@ PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
 }
 """By the settings that they are of."""
 POLICY = "policy"
-NOT_VALUES = ("sources", "name", "kind", "description")
 
 
 class Description(NamedTuple):
@@ -79,21 +79,9 @@ def _family_of(path: str) -> str:
 
 
 def _entry(family: str, entry: Entry) -> Description:
-    rows = [
-        (key, str(value), meaning, entry.sources.get(key, "")) for key, value, meaning in _leaves(entry, "")
-    ]
+    rows = [(each.key, str(each.value), each.meaning, each.source) for each in values_of(entry)]
     headings = ("key", "value", "meaning", "source")
     return Description(family, entry.name, entry.description, headings, rows, entry.model_dump())
-
-
-def _leaves(entry: BaseModel, prefix: str) -> Iterator[tuple[str, Any, str]]:
-    """Keys, values and meanings of all values of an entry, its tables opened."""
-    for key, field in type(entry).model_fields.items():
-        value = getattr(entry, key)
-        if isinstance(value, BaseModel):
-            yield from _leaves(value, f"{prefix}{key}.")
-        elif value is not None and key not in NOT_VALUES:
-            yield prefix + key, value, field.description or ""
 
 
 def _policy(name: str) -> Description:

@@ -94,6 +94,10 @@ def trajectory(
         terminated=_ending(task, lane) is not Ending.NONE,
         ending=ending(task, lane),
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
+        design={
+            "catenary": plant.catenary.model_dump(mode="json"),
+            "pantograph": task.settings.pantograph.model_dump(mode="json"),
+        },
     )
 
 

@@ -60,7 +60,7 @@ def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
         (
             criterion.heading,
             _digits(criterion.value),
-            _limits(criterion),
+            limits_in_words(criterion),
             _digits(criterion.margin),
             verdicts[criterion.kept],
             criterion.source,
@@ -78,7 +78,8 @@ def remarks(criteria: Sequence[Criterion]) -> list[str]:
     return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in told)]
 
 
-def _limits(criterion: Criterion) -> str:
+def limits_in_words(criterion: Criterion) -> str:
+    """The limits as people write them; "" where there is none."""
     if criterion.lowest is None:
         return "" if criterion.highest is None else f"at most {_digits(criterion.highest)}"
     if criterion.highest is None:

@@ -71,6 +71,7 @@ class Trajectory:
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
     ending: str = ""  # where and why it did, as a sentence
     line: LineFacts = field(default_factory=LineFacts)
+    design: Mapping[str, Any] = field(default_factory=dict)  # line and pantograph by value, plain data
 
     def summary(self, spans: SpanChoice = None) -> Figures:
         """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or "all" the run.

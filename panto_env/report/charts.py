@@ -1,0 +1,150 @@
+"""Charts of a report, as SVG that lies within the page."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.colours import BLUE, LIMIT, series_colour
+from ..metrics import en50367
+from ..metrics.low_pass import low_pass_in_place
+from ..metrics.spectrum import amplitudes
+from .findings import Findings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+HIGHEST = 25.0
+"""Frequency up to which a spectrum is drawn (Hz)."""
+
+
+def drawn(draw: Callable[[Axes], Any], height: float = 3.2) -> str:
+    """What a function draws into axes, as SVG, the same text for the same drawing."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, height), layout="constrained")
+    axes = figure.subplots()
+    draw(axes)
+    axes.grid(color="0.92")
+    axes.set_axisbelow(True)
+    file = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": "panto-env"}):
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    text = file.getvalue()
+    return text[text.index("<svg") :]
+
+
+def force_along(one: Findings) -> str:
+    """Contact force along the evaluated spans."""
+
+    def draw(axes: Axes) -> None:
+        run, inside = one.run, one.inside
+        position, smooth = run.position[inside], low_pass_in_place(run.contact_force, run.time_step)[inside]
+        axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
+        axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
+        limit = en50367.maximum_limit(run.speed_kmh / 3.6)
+        axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=f"EN 50367: {limit:.0f} N")
+        axes.axhline(0, color=LIMIT, linewidth=0.9)
+        for loss in one.losses:
+            axes.plot(loss.position, 0, "v", color=LIMIT, markersize=5)
+        for support in np.arange(np.ceil(position[0] / run.span_length), position[-1] // run.span_length + 1):
+            axes.axvline(support * run.span_length, color="0.85", linewidth=0.8, zorder=0)
+        axes.set(xlabel="position (m); grey lines: supports", ylabel="contact force (N)")
+        axes.set_xlim(position[0], position[-1])
+        _legend(axes)
+
+    return drawn(draw)
+
+
+def force_folded(found: Sequence[Findings]) -> str:
+    """Contact force over the place within the span: median of all spans, and from least to largest."""
+
+    def draw(axes: Axes) -> None:
+        for k, one in enumerate(found):
+            folded = one.folded
+            if folded is None:
+                continue
+            share = folded.place / one.run.span_length
+            axes.fill_between(share, folded.low, folded.high, color=series_colour(k), alpha=0.2, linewidth=0)
+            axes.plot(share, folded.median, color=series_colour(k), label=f"{name_of(found, one)}: median")
+        axes.set(
+            xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1)
+        )
+        axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
+        _legend(axes)
+
+    return drawn(draw)
+
+
+def spectrum(found: Sequence[Findings]) -> str:
+    """Amplitudes of the force, with what passes once per span and once per dropper marked."""
+
+    def draw(axes: Axes) -> None:
+        for k, one in enumerate(found):
+            frequency, amplitude = amplitudes(one.run.contact_force[one.inside], one.run.time_step)
+            shown = frequency <= HIGHEST
+            axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=name_of(found, one))
+        run = found[0].run
+        passing = {"per span": run.speed_kmh / 3.6 / run.span_length}
+        places = np.diff([dropper.position for dropper in found[0].droppers])
+        if places.size:
+            passing["per dropper"] = run.speed_kmh / 3.6 / float(np.median(places))
+        for words, at in passing.items():
+            axes.axvline(at, color="0.5", linestyle=":", linewidth=1)
+            axes.annotate(f"{words}: {at:.2f} Hz", (at, 0.98), xycoords=("data", "axes fraction"),
+                          rotation=90, va="top", ha="right", fontsize="small")  # fmt: skip
+        axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N), raw force", xlim=(0, HIGHEST))
+        axes.set_ylim(bottom=0)
+        _legend(axes)
+
+    return drawn(draw)
+
+
+def uplifts(found: Sequence[Findings]) -> str:
+    """Largest uplift at each support."""
+
+    def draw(axes: Axes) -> None:
+        for k, one in enumerate(found):
+            numbers = [number for number, _, _ in one.uplifts]
+            heights = [1e3 * uplift for _, _, uplift in one.uplifts]
+            width = 0.8 / len(found)
+            at = np.array(numbers) + width * (k - (len(found) - 1) / 2)
+            axes.bar(at, heights, width, color=series_colour(k), label=name_of(found, one))
+        axes.set(xlabel="support", ylabel="largest uplift (mm)", xticks=[n for n, _, _ in found[0].uplifts])
+        _legend(axes)
+
+    return drawn(draw, 2.6)
+
+
+def stiffness(one: Findings) -> str:
+    """Elasticity along a span."""
+    assert one.elasticity is not None
+    places, lifts, _ = one.elasticity
+
+    def draw(axes: Axes) -> None:
+        axes.plot(places, 1e3 * lifts, color=BLUE)
+        axes.set(xlabel="place within the span (m)", ylabel="elasticity (mm/N)", xlim=(places[0], places[-1]))
+        axes.set_ylim(bottom=0)
+
+    return drawn(draw, 2.6)
+
+
+def name_of(found: Sequence[Findings], one: Findings) -> str:
+    """What a run is called beside the others: by what differs between them."""
+    differing = [
+        own for own, *others in zip(_parts(one), *map(_parts, found), strict=True) if len({*others}) > 1
+    ]
+    return ", ".join(differing) or f"{one.run.speed_kmh:g} km/h"
+
+
+def _parts(one: Findings) -> tuple[str, ...]:
+    run = one.run
+    return run.catenary, run.pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"
+
+
+def _legend(axes: Axes) -> None:
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False)

@@ -1,0 +1,168 @@
+"""What a report tells of a run beside its figures: supports, droppers, losses of contact, elasticity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..metrics.criterion import Criterion
+from ..metrics.figures import Figures
+from ..metrics.low_pass import low_pass
+from ..metrics.spans import Spans
+from ..metrics.trajectory import Trajectory
+from ..plant.catenary import CATENARIES
+from ..plant.catenary.flexible import FlexibleCatenaryData
+from ..plant.catenary.flexible.elasticity import elasticity, unevenness
+from ..plant.pantograph.schema import PantographData
+
+FOLDS = 240
+"""Places of a span at which spans are compared."""
+
+
+class Dropper(NamedTuple):
+    """One dropper of a span, over all evaluated spans, while the train is in its span."""
+
+    position: float  # from the support (m)
+    largest: float  # N
+    smallest: float  # N
+    slack: float  # share of time (%)
+
+
+class Loss(NamedTuple):
+    """One loss of contact."""
+
+    position: float  # where it begins (m)
+    duration: float  # s
+
+
+class Folded(NamedTuple):
+    """The low-passed force of all evaluated spans over the place within the span."""
+
+    place: Array  # (n,): m
+    median: Array  # (n,): N
+    low: Array  # (n,): least of all spans (N)
+    high: Array  # (n,): largest of all spans (N)
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All of one run."""
+
+    run: Trajectory
+    file: str
+
+    @cached_property
+    def covered(self) -> Spans | None:
+        """The spans that figures are of; None where the run ended early or is too short."""
+        try:
+            return self.run.spans()
+        except InputError:
+            return None
+
+    @cached_property
+    def figures(self) -> Figures | None:
+        """Figures of these spans."""
+        return None if self.covered is None else self.run.summary()
+
+    @cached_property
+    def criteria(self) -> list[Criterion]:
+        """Requirements and what is told beside."""
+        return [] if self.covered is None else self.run.compliance()
+
+    @cached_property
+    def line(self) -> Any:
+        """The line, by value. Raises InputError where the file does not hold it."""
+        return CATENARIES[self._design("catenary")["kind"]].schema.model_validate(self._design("catenary"))
+
+    @cached_property
+    def pantograph(self) -> PantographData:
+        """The pantograph, by value. Raises InputError where the file does not hold it."""
+        return PantographData.model_validate(self._design("pantograph"))
+
+    def _design(self, part: str) -> dict[str, Any]:
+        if part not in self.run.design:
+            raise InputError(
+                f"{self.file} was written by an older version, without its line and pantograph; simulate it "
+                "anew with `panto simulate --output`."
+            )
+        return dict(self.run.design[part])
+
+    @cached_property
+    def inside(self) -> Any:
+        """Samples in the evaluated spans, (n,)."""
+        return self.run.inside("all" if self.covered is None else None)
+
+    @cached_property
+    def filtered(self) -> Array:
+        """The contact force behind EN 50317's filter (N), of the whole run."""
+        return low_pass(self.run.contact_force, self.run.time_step)
+
+    @cached_property
+    def folded(self) -> Folded | None:
+        """The force folded over the span."""
+        if self.covered is None:
+            return None
+        place = np.linspace(0.0, self.run.span_length, FOLDS, endpoint=False)
+        first, last = self.covered
+        spans = [
+            np.interp(place + (k - 1) * self.run.span_length, self.run.position, self.filtered)
+            for k in range(first, last + 1)
+        ]
+        return Folded(place, np.median(spans, axis=0), np.min(spans, axis=0), np.max(spans, axis=0))
+
+    @cached_property
+    def uplifts(self) -> list[tuple[int, float, float]]:
+        """Support, its place (m) and its largest uplift (m), of the evaluated spans and both ends."""
+        run = self.run
+        begin, end = run.position[self.inside][[0, -1]]
+        stride = 1.5 * run.stride
+        return [
+            (round(place / run.span_length), float(place), float(run.uplift[:, k].max()))
+            for k, place in enumerate(run.support_position)
+            if begin - stride <= place <= end + stride and k < run.uplift.shape[1]
+        ]
+
+    @cached_property
+    def droppers(self) -> list[Dropper]:
+        """Droppers by place in the span."""
+        run = self.run
+        if not run.dropper_force.size:
+            return []
+        train = run.position[self.inside] // run.span_length
+        tension = run.dropper_force[self.inside]
+        own, places = run.dropper_position // run.span_length, run.dropper_position % run.span_length
+        found = []
+        for place in np.unique(places.round(6)):
+            which = np.flatnonzero(np.abs(places - place) < 1e-5)
+            values = np.concatenate([tension[train == own[k], k] for k in which])
+            if values.size:
+                slack = 100 * float((values <= 0).mean())
+                found.append(Dropper(float(place), float(values.max()), float(values.min()), slack))
+        return found
+
+    @cached_property
+    def losses(self) -> list[Loss]:
+        """Losses of contact in the evaluated spans."""
+        run = self.run
+        lost = (run.contact_force[self.inside] <= 0).astype(int)
+        edges = np.diff(np.concatenate([[0], lost, [0]]))
+        begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        position = run.position[self.inside]
+        return [
+            Loss(float(position[begin]), float((end - begin) * run.time_step))
+            for begin, end in zip(begins, ends, strict=True)
+        ]
+
+    @cached_property
+    def elasticity(self) -> tuple[Array, Array, float] | None:
+        """Places (m), uplift per newton (m/N) and its unevenness (%), at the mean force; None of other kinds."""
+        if not isinstance(self.line, FlexibleCatenaryData):
+            return None
+        force = self.run.nominal_force if self.figures is None else self.figures.mean
+        places, lifts = elasticity(self.line, force)
+        return places, lifts, unevenness(lifts)

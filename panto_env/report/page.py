@@ -1,0 +1,102 @@
+"""The page of one run or several: tables and charts in one file, the same bytes for the same runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import InputError
+from ..base.files import PAGES, check_output, write_whole
+from ..base.version import __version__
+from ..catalog.values import values_of
+from ..metrics.criterion import limits_in_words
+from ..metrics.labels import LABELS
+from ..metrics.spans import in_words
+from ..metrics.trajectory import Trajectory
+from . import charts
+from .findings import Findings
+from .words import ACCURACY, FILTER, LEFT_OUT
+
+MOST = 8
+"""Runs on one page: more cannot be told apart."""
+
+
+def page(found: Sequence[Findings]) -> str:
+    """The page of some runs. Everything that comes from a file is escaped.
+
+    Raises InputError where there are too many runs, or one does not hold its line and pantograph.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    if not 1 <= len(found) <= MOST:
+        raise InputError(f"A report is of 1 to {MOST} runs, not {len(found)}.")
+    environment = Environment(
+        loader=PackageLoader("panto_env.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "digits": digits, "limits": limits_in_words}
+    judged = [one for one in found if one.figures is not None]
+    lines = {one.run.catenary: one for one in found}
+    return environment.get_template("page.html.jinja").render(
+        version=__version__,
+        title=_title(found),
+        names=[charts.name_of(found, one) for one in found],
+        found=found,
+        labels=LABELS,
+        figures=[[getattr(one.figures, key, math.nan) for one in found] for key in LABELS],
+        criteria=_side_by_side(found),
+        values_of=values_of,
+        in_words=in_words,
+        lines=list(lines.values()),
+        pantographs=list({one.run.pantograph: one for one in found}.values()),
+        stiffness={name: charts.stiffness(one) for name, one in lines.items() if one.elasticity},
+        along=[charts.force_along(one) for one in found],
+        folded=charts.force_folded(judged) if judged else "",
+        spectrum=charts.spectrum(judged) if judged else "",
+        uplifts=charts.uplifts(found) if any(one.uplifts for one in found) else "",
+        words={"accuracy": ACCURACY, "filter": FILTER, "left_out": LEFT_OUT},
+    )
+
+
+def save(files: Sequence[str | Path], path: str | Path) -> None:
+    """Write the page of runs in files, whole or not at all.
+
+    Raises InputError for a name that is not a page's, or files that are no runs.
+    """
+    check_output(path, PAGES)
+    found = [Findings(Trajectory.load(file), Path(file).name) for file in files]
+    text = page(found)
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def number(value: float, digits: int = 1) -> str:
+    """A number with so many digits after the point, or a dash where there is none."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+def digits(value: float) -> str:
+    """The same with as many digits as its size wants."""
+    return number(value, 1 if abs(value) >= 10 else 3)
+
+
+def _title(found: Sequence[Findings]) -> str:
+    pairs = {f"{one.run.pantograph} on {one.run.catenary}" for one in found}
+    speeds = sorted({one.run.speed_kmh for one in found})
+    return f"{', '.join(sorted(pairs))} at {', '.join(f'{speed:g}' for speed in speeds)} km/h"
+
+
+def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:
+    """Each criterion of any run, and what it is in each; None where a run has none of it."""
+    by_key = [{each.key: each for each in one.criteria} for one in found]
+    keys = dict.fromkeys(key for criteria in by_key for key in criteria)
+    rows = []
+    for key in keys:
+        own = [criteria.get(key) for criteria in by_key]
+        rows.append((next(each for each in own if each is not None), own))
+    return rows
