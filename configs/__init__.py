@@ -1,4 +1,4 @@
-"""Trainings, benchmarks, data sets and more that come with the project; commands take them by name, files by path."""
+"""Trainings, benchmarks, data sets and more of the project; commands take them by name, files by path."""
 
 from __future__ import annotations
 

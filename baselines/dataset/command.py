@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from panto_env.base.settings import parse
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, console, counting, print_json, print_table, progress_console
@@ -46,8 +47,8 @@ def episodes(
     if only:
         settings = chosen(settings, tuple(only))
     if episodes is not None:
-        sets = [each.model_copy(update={"episodes": episodes}) for each in settings.sets]
-        settings = type(settings).model_validate(settings.model_dump() | {"sets": sets})
+        sets = [each.model_dump() | {"episodes": episodes} for each in settings.sets]
+        settings = parse(type(settings), settings.model_dump() | {"sets": sets}, str(config))
     made = _going_on(
         output,
         lambda progress: make_episodes(settings, output, workers=workers, ray=ray, progress=progress),
@@ -84,19 +85,17 @@ def designs(
 
     settings = load_designs(config)
     if count is not None:
-        settings = type(settings).model_validate(settings.model_dump() | {"count": count})
+        settings = parse(type(settings), settings.model_dump() | {"count": count}, str(config))
     made = _going_on(
         output, lambda progress: make_designs(settings, output, workers=workers, ray=ray, progress=progress)
     )
     if json:
         print_json(asdict(made) | {"folder": str(made.folder)})
         return
-    row = (
-        str(made.folder),
-        *(f"{each:,}" for each in (made.designs, made.refused, made.ended_early, made.warned)),
-    )
+    counts = (f"{each:,}" for each in (made.designs, made.refused, made.ended_early, made.warned))
     headings = ("folder", "designs", "refused", "ended early", "with warnings", "MB")
-    print_table(Table("designs", headings, ((*row, f"{made.megabytes:.1f}"),)))
+    row = (str(made.folder), *counts, f"{made.megabytes:.1f}")
+    print_table(Table("designs", headings, (row,)))
 
 
 @dataset.command()

@@ -28,7 +28,7 @@ OUTCOME = ("nominal_force", "wave_speed", "time_step", "spacing", *FIGURES)
 
 
 def draw(settings: DesignsSettings, first: int, last: int) -> Array:
-    """Values of the designs first to last - 1, (designs, ranges): a scrambled Sobol sequence over the ranges."""
+    """Values of the designs first to last - 1, (designs, ranges): a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
     with warnings.catch_warnings():  # of a count that is no power of two: that is told on the card

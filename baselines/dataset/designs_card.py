@@ -14,7 +14,6 @@ from panto_env.metrics.labels import LABELS
 from .designs import FIGURES
 from .designs_settings import DesignsSettings
 
-
 SI = {"mm": "m"}
 """Units of figures in the table, where people read others."""
 
@@ -60,13 +59,13 @@ def card(settings: DesignsSettings, told: Sequence[Column], table: Any, made_of:
         f"# {settings.title}",
         "",
         f"{table.num_rows:,} designs around the pantograph {settings.pantograph} on the line "
-        f"{settings.catenary}, each simulated once: a passive pantograph along a new line, as designed, without "
-        "irregularity, sensors or control. Figures are those of EN 50317 over the spans after the start has "
-        "died out.",
+        f"{settings.catenary}, each simulated once: a passive pantograph along a new line, as designed, "
+        "without irregularity, sensors or control. Figures are those of EN 50317 over the spans after the "
+        "start has died out.",
         "",
         f"Drawn by a scrambled Sobol sequence (seed {settings.seed}), evenly over the ranges. Where spans "
-        "are longer or shorter, droppers keep their places as shares of the span. What no range names is as in "
-        "the catalogue.",
+        "are longer or shorter, droppers keep their places as shares of the span. What no range names is as "
+        "in the catalogue.",
         "",
         f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
         f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
@@ -81,9 +80,9 @@ def card(settings: DesignsSettings, told: Sequence[Column], table: Any, made_of:
         *_endings("ending", "ended early", kinds["ending"], table.num_rows),
         *_endings("accuracy_warning", "with a warning", kinds["accuracy_warning"], table.num_rows),
         "",
-        "Caveats: simulated, not measured; grid and time step are chosen so that figures are within about 1 % "
-        "of converged ones, where no warning says more; a model that is fitted to it knows nothing beyond the "
-        "ranges, nor of other kinds of line (stitched, with pre-sag), several pantographs, wind, or "
+        "Caveats: simulated, not measured; grid and time step are chosen so that figures are within about "
+        "1 % of converged ones, where no warning says more; a model that is fitted to it knows nothing "
+        "beyond the ranges, nor of other kinds of line (stitched, with pre-sag), several pantographs, wind, or "
         "irregularity.",
         "",
     ]

@@ -1,4 +1,4 @@
-"""What a table of designs holds: a line and a pantograph, and the ranges that their parameters are drawn from."""
+"""What a table of designs holds: a line, a pantograph, and the ranges of their parameters."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ class Stage:
     """Where episodes are recorded: the environment, and a twin for each other observation that is asked for.
 
     A policy that asks for another observation than what is recorded is shown it by a twin, which has the same
-    seed and gets the same actions. It moves alike bit for bit: the observation decides nothing but what is seen.
+    seed and gets the same actions. It moves alike bit for bit: the observation decides only what is seen.
     """
 
     def __init__(self, settings: EpisodesSettings) -> None:
@@ -163,7 +163,8 @@ def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[i
             raise InputError(
                 f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
             )
-    return np.clip(action, -1.0, 1.0)
+    clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
+    return clipped
 
 
 def _kept(info: dict[str, Any], wanted: NDArray[Any]) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from .episodes import Episode
 from .settings import ENVIRONMENT, EpisodesSettings, Plan, PolicySet
 
 REWARD = (
-    "The reward is that of the environment: minus the cost function CF and the contact-loss ratio CL of paper 1 "
-    "over the control step, the rate of the action and the deviation of a running mean of the contact force, "
-    "with the weights of its argument `reward`; `infos/reward_terms` holds the terms, not weighted."
+    "The reward is that of the environment: minus the cost function CF and the contact-loss ratio CL of "
+    "paper 1 over the control step, the rate of the action and the deviation of a running mean of the contact "
+    "force, with the weights of its argument `reward`; `infos/reward_terms` holds the terms, not weighted."
 )
 
 
@@ -28,8 +28,8 @@ def description(settings: EpisodesSettings, policy_set: PolicySet) -> str:
     plans = list(settings.plans(policy_set))
     own = f" {policy_set.description}" if policy_set.description else ""
     return (
-        f"Episodes of {ENVIRONMENT}, simulated: {places}. Policies: {', '.join(policy_set.policies)}; rms of the "
-        f"noise on the action: {', '.join(f'{noise:g}' for noise in policy_set.noise)}.{own} {REWARD} "
+        f"Episodes of {ENVIRONMENT}, simulated: {places}. Policies: {', '.join(policy_set.policies)}; rms of "
+        f"the noise on the action: {', '.join(f'{noise:g}' for noise in policy_set.noise)}.{own} {REWARD} "
         f"Seeds {plans[0].seed} to {plans[-1].seed}, which nothing was trained, chosen or judged on."
     )
 
@@ -54,16 +54,16 @@ def card(
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
         *_table(settings, rows),
         "",
-        "Means over episodes; σ and mean force are those of whole episodes, their start included, so that they "
+        "Means over episodes; σ and mean force are those of whole episodes, their start included: they "
         "compare policies of this data set and not with figures of standards.",
         "",
         "| | observed | value of 0 | value of 1 more |",
         "|---:|---|---:|---:|",
         *(f"| {k} | {e.name} | {e.centre:g} | {e.scale:g} {e.unit} |" for k, e in enumerate(layout.entries)),
         "",
-        "`actions`: what was done, share of the actuator's force limit. `infos`: row k + 1 is of step k, row 0 "
-        "of the start; `policy_action` is what the policy wanted before noise was added. An episode's metadata "
-        "hold policy, noise, line, speed, figures, and seed and options: `env.reset(seed=seed, "
+        "`actions`: what was done, share of the actuator's force limit. `infos`: row k + 1 is of step k, row "
+        "0 of the start; `policy_action` is what the policy wanted before noise was added. An episode's "
+        "metadata hold policy, noise, line, speed, figures, and seed and options: `env.reset(seed=seed, "
         "options=options)` and the actions give it again, bit for bit.",
         "",
     ]

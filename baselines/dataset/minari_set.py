@@ -25,8 +25,8 @@ def check_minari() -> None:
         import minari  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"Data sets of episodes need Minari, which is not installed ({error}); install panto-env with its "
-            "extra: pip install 'panto-env[data]'."
+            f"Data sets of episodes need Minari, which is not installed ({error}); install panto-env with "
+            "its extra: pip install 'panto-env[data]'."
         ) from error
 
 
@@ -73,11 +73,11 @@ def write_minari(
                 EpisodeBuffer(
                     seed=plan.seed,
                     options=settings.options(plan) or None,
-                    observations=episode.observations,  # type: ignore[arg-type]
-                    actions=episode.actions,  # type: ignore[arg-type]
-                    rewards=episode.rewards,  # type: ignore[arg-type]
-                    terminations=episode.terminations,  # type: ignore[arg-type]
-                    truncations=episode.truncations,  # type: ignore[arg-type]
+                    observations=episode.observations,
+                    actions=episode.actions,
+                    rewards=episode.rewards,
+                    terminations=episode.terminations,
+                    truncations=episode.truncations,
                     infos=_nested(episode.infos),
                 )
             ]

@@ -1,4 +1,4 @@
-"""Work in parts, each a file that is written whole: whatever ends the work, it goes on with what is missing."""
+"""Work in parts, each a file that is written whole: whatever ends it, it goes on with what is missing."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
     difference = first_difference(json.loads(path.read_text(encoding="utf-8")), made_of)
     if difference:
         raise InputError(
-            f"{folder} holds parts of another data set ({difference}); finish that one, remove the folder, or "
-            "take another --output."
+            f"{folder} holds parts of another data set ({difference}); finish that one, remove the folder, "
+            "or take another --output."
         )
 
 
