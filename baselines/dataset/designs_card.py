@@ -82,8 +82,8 @@ def card(settings: DesignsSettings, told: Sequence[Column], table: Any, made_of:
         "",
         "Caveats: simulated, not measured; grid and time step are chosen so that figures are within about "
         "1 % of converged ones, where no warning says more; a model that is fitted to it knows nothing "
-        "beyond the ranges, nor of other kinds of line (stitched, with pre-sag), several pantographs, wind, or "
-        "irregularity.",
+        "beyond the ranges, nor of other kinds of line (stitched, with pre-sag), several pantographs, wind, "
+        "or irregularity.",
         "",
     ]
     return "\n".join(lines)

@@ -17,7 +17,17 @@ from .checksums import LIST, write_checksums
 from .designs import simulate_designs
 from .designs_card import card, columns
 from .designs_settings import DesignsSettings
-from .parts import Job, alone, first_difference, identity, make_parts, open_parts, remove_parts
+from .parts import (
+    PARTS,
+    Job,
+    alone,
+    first_difference,
+    identity,
+    make_parts,
+    open_parts,
+    remove_if_empty,
+    remove_parts,
+)
 
 PER_PART = 64
 """Designs in a part: some seconds of work."""
@@ -63,7 +73,7 @@ def make_designs(
             if difference:
                 raise InputError(f"{folder} holds another table ({difference}); take another --output.")
         else:
-            parts = output / ".parts"
+            parts = output / PARTS / "designs"
             open_parts(parts, made_of)
             jobs: dict[Path, Job] = {}
             for first in range(0, settings.count, PER_PART):
@@ -72,6 +82,7 @@ def make_designs(
             make_parts(jobs, workers=workers, ray=ray, progress=progress)
             _assemble(settings, folder, list(jobs), made_of)
             remove_parts(parts)
+            remove_if_empty(output / PARTS)
     return _told(folder, kept=there)
 
 

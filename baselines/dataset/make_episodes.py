@@ -18,13 +18,21 @@ from .checksums import LIST, write_checksums
 from .episodes import Episode, check_places, make, read_episodes, record
 from .episodes_card import card, description, summary
 from .minari_set import KEY, check_minari, write_minari
-from .parts import Job, alone, first_difference, identity, make_parts, open_parts, remove_parts
+from .parts import (
+    PARTS,
+    Job,
+    alone,
+    first_difference,
+    identity,
+    make_parts,
+    open_parts,
+    remove_if_empty,
+    remove_parts,
+)
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
 
 PER_PART = 10
 """Episodes in a part: a second or two of work, so that little is lost where it ends."""
-PARTS = ".parts"
-"""Folder of parts in the output; hidden, so that Minari takes it for no data set."""
 NAMESPACE_FILE = "namespace_metadata.json"
 """By which Minari knows a folder of data sets."""
 
@@ -72,8 +80,7 @@ def make_episodes(
             if not there:
                 _assemble(settings, one)
                 remove_parts(one.parts)
-        if (output / PARTS).is_dir() and not any((output / PARTS).iterdir()):
-            remove_parts(output / PARTS)
+        remove_if_empty(output / PARTS)
     return [_told(one, kept=there) for one, there in zip(wanted, kept, strict=True)]
 
 

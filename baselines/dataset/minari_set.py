@@ -48,7 +48,7 @@ def write_minari(
     from minari.dataset.minari_storage import MinariStorage
 
     env = make(settings)
-    data = folder / "data"
+    data = folder.resolve() / "data"  # Minari takes no relative path
     data.mkdir(parents=True)
     storage = MinariStorage.new(
         data, env_spec=env.spec, observation_space=env.observation_space, action_space=env.action_space

@@ -21,6 +21,8 @@ from panto_env.cluster import spread
 
 Job = Callable[[Path], None]
 """Work that writes its result to a path; ``functools.partial`` of a function of a module."""
+PARTS = ".parts"
+"""Folder in the output with one for each data set's parts; hidden, so that Minari does not look into it."""
 IDENTITY = "identity.json"
 
 
@@ -76,6 +78,12 @@ def make_parts(
 def remove_parts(folder: Path) -> None:
     """Remove what is needed no more."""
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder in which nothing is left."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
 
 
 @contextmanager
