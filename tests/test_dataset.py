@@ -113,6 +113,13 @@ class TestSettings:
             ({"environment": {"distanse": 60}}, "arguments of the environment"),
             ({"sets": [TABLE["sets"][0] | {"policies": ["pdd"]}]}, "Unknown policy 'pdd'"),
             ({"places": [KNOWN | {"catenary": "nowhere"}]}, "nowhere"),
+            (
+                {
+                    "sets": [TABLE["sets"][0] | {"policies": ["tuned-pd"]}],
+                    "places": [KNOWN | {"speed_kmh": [200, 300]}],
+                },
+                "'tuned-pd' failed in reset: .* not for 200 km/h",
+            ),
         ):
             with pytest.raises(InputError, match=message):
                 make_episodes.make_episodes(settings(**changes), tmp_path / "out", workers=1)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from panto_env.base.errors import InputError
 from panto_env.policies import Policy, errors_name, find_policy, wishes
 
+from ..benchmark.seeds import DATA
 from .settings import ENVIRONMENT, EpisodesSettings, Plan
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
@@ -36,6 +37,18 @@ class Episode(NamedTuple):
     figures: dict[str, float]  # of the whole episode, as the environment's info has them
 
 
+class Beginning(NamedTuple):
+    """The start of an episode."""
+
+    policy: Policy
+    twin: (
+        gymnasium.Env[Any, Any] | None
+    )  # that shows the policy what it asks for; None: it sees what is recorded
+    observation: NDArray[np.float32]  # that is recorded
+    seen: NDArray[np.float32]  # by the policy
+    info: dict[str, Any]
+
+
 def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
     """The environment that is recorded, made so that others can make it again; with other arguments, if any.
 
@@ -48,13 +61,12 @@ def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
 
 
 def check_places(settings: EpisodesSettings) -> None:
-    """Raise InputError unless an episode can begin at each place, under each policy."""
-    env = make(settings)
-    for place in settings.places:
-        env.reset(seed=0, options=place.options())
-    env.close()
-    for policy in {policy for each in settings.sets for policy in each.policies}:
-        find_policy(policy)
+    """Raise InputError unless each policy can begin at each place, at both ends of its speeds."""
+    stage = Stage(settings)
+    for policy in dict.fromkeys(policy for each in settings.sets for policy in each.policies):
+        for place in settings.places:
+            for speed in place.speed_kmh:
+                stage.begin(policy, DATA[0], place.options() | {"speed_kmh": [speed, speed]})
 
 
 def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> None:
@@ -98,12 +110,8 @@ class Stage:
 
     def play(self, plan: Plan) -> Episode:
         """One episode. Raises InputError where the policy fails, or its twin does not move alike."""
-        policy, env, options = find_policy(plan.policy), self._env, self._settings.options(plan)
-        twin = self._twin(policy)
-        observation, info = env.reset(seed=plan.seed, options=options)
-        seen = observation if twin is None else twin.reset(seed=plan.seed, options=options)[0]
-        with errors_name(plan.policy, "reset"):
-            policy.reset((twin or env).unwrapped.context)  # type: ignore[attr-defined]
+        env, options = self._env, self._settings.options(plan)
+        policy, twin, observation, seen, info = self.begin(plan.policy, plan.seed, options)
         random = np.random.default_rng([plan.seed, NOISE_STREAM])
         shape = env.action_space.shape or ()
         observations, infos = [observation], [_kept(info, np.zeros(shape))]
@@ -129,6 +137,16 @@ class Stage:
             {key: np.array([each[key] for each in infos], dtype=np.float64) for key in infos[0]},
             info["figures"],
         )
+
+    def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
+        """The start of an episode. Raises InputError where the policy cannot begin it."""
+        policy = find_policy(name)
+        twin = self._twin(policy)
+        observation, info = self._env.reset(seed=seed, options=options)
+        seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
+        with errors_name(name, "reset"):
+            policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
+        return Beginning(policy, twin, observation, seen, info)
 
     def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
         """The environment that a policy asks for; None where that is the one that is recorded."""
