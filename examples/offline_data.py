@@ -4,7 +4,7 @@
 
 printed
 
-    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,438 steps, returns -196.1 and -211.7
+    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -198.3 and -211.0
     replayed from seed and actions: the same rewards to the last bit
 """
 

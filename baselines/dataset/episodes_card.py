@@ -55,8 +55,8 @@ def card(
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
         *_table(settings, rows),
         "",
-        "Means over episodes; σ and mean force are those of whole episodes, their start included: they "
-        "compare policies of this data set and not with figures of standards.",
+        "Means over whole episodes, their start included. Each row has seeds, and so lines and speeds, of "
+        "its own: it says what is in the data and ranks no policy, as `panto benchmark` does.",
         "",
         "| | observed | value of 0 | value of 1 more |",
         "|---:|---|---:|---:|",
