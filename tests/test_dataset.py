@@ -329,7 +329,7 @@ class TestDesigns:
 
     def test_a_longer_span_takes_its_droppers_along(self):
         values = {"speed_kmh": 250.0, "catenary.span_length": 54.0, "pantograph.masses.0": 7.2}
-        line, _ = designs._designed(few_designs(), values)
+        line, _ = designs.designed(few_designs(), values)
         base = few_designs().entries()["catenary"]
         assert line.span_length == 54.0
         np.testing.assert_allclose(line.droppers.positions, 0.9 * np.array(base.droppers.positions))

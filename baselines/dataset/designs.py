@@ -59,7 +59,7 @@ def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AccuracyWarning)
         try:
-            line, pantograph = _designed(settings, values)
+            line, pantograph = designed(settings, values)
             run = simulate(line, pantograph, values[SPEED], record_droppers=False)
         except InputError as error:
             return row | {"refused": str(error)}
@@ -81,7 +81,7 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def _designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:
+def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:
     """The line and the pantograph of a design. Raises InputError for values that their schemas refuse.
 
     Where spans have another length, droppers keep their places as shares of the span.
