@@ -95,7 +95,7 @@ def _spread(table: Any, column: Column) -> str:
     values = table[column.name].drop_null().to_numpy()
     if not len(values):
         return "– | – | –"
-    return " | ".join(f"{each:.4g}" for each in (values.min(), np.median(values), values.max()))
+    return " | ".join(f"{float(f'{each:.4g}'):g}" for each in (values.min(), np.median(values), values.max()))
 
 
 def _reasons(texts: Sequence[str]) -> list[tuple[str, int]]:
