@@ -4,6 +4,16 @@
     panto dataset designs
     python examples/learn_from_data.py
 
+printed, after about two minutes on one core,
+
+    clone: rms error 8.6 % of the rms action, on unseen episodes
+    250 km/h: sigma -21.7 %, 100 % of its teacher's -21.7 %
+    300 km/h: sigma -21.9 %, 95 % of its teacher's -23.0 %
+    350 km/h: sigma -33.3 %, 96 % of its teacher's -34.8 %
+    sigma of unseen designs by mean: R2 -0.027, median error 22.7 %
+    sigma of unseen designs by linear: R2 0.806, median error 8.1 %
+    sigma of unseen designs by trees: R2 0.941, median error 5.1 %
+
 The controller is a network that imitates `fitted-fb+ff` (behaviour cloning). It sees what the data set
 holds, the observation of Pantograph-v0, and makes of it what a controller can remember: the place within
 the span as 14 harmonics, three control steps of readings, slow averages of them, and its own last two
