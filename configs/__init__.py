@@ -1,4 +1,4 @@
-"""Trainings, benchmarks and more that come with the project; commands take them by name, files by path."""
+"""Trainings, benchmarks, data sets and more of the project; commands take them by name, files by path."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
 
 FOLDER = Path(__file__).parent
-Kind = Literal["training", "benchmark", "oracle", "ablation"]
+Kind = Literal["training", "benchmark", "oracle", "ablation", "dataset", "designs"]
 KINDS: dict[Kind, str] = {
     "training": "algorithm",
     "benchmark": "lines",
     "oracle": "cells",
     "ablation": "variants",
+    "dataset": "sets",
+    "designs": "ranges",
 }
 """A key that every file of a kind has."""
 

@@ -19,7 +19,8 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_every_file_has_a_name_and_one_kind():
-    kinds = names("training"), [*names("benchmark"), *names("ablation")]
+    others = [*names("ablation"), *names("dataset"), *names("designs")]
+    kinds = names("training"), [*names("benchmark"), *others]
     here = [path.relative_to(FOLDER).with_suffix("") for path in FOLDER.rglob("*.toml")]
     gains = [path for path in here if path.parts[0] in ("policies", "oracle")]
     assert sorted(kinds[0] + kinds[1]) == sorted(path.as_posix() for path in here if path not in gains)

@@ -10,8 +10,10 @@ from panto_env.base.errors import InputError
 TEST = range(1000)
 SELECTION = range(1000, 2000)
 TRAINING = range(2000, 1_000_000)
-Purpose = Literal["test", "selection", "training"]
-SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING}
+# Above those that tapes of the benchmark are made under (``controls.OTHER_SEED``).
+DATA = range(2_000_000, 3_000_000)
+Purpose = Literal["test", "selection", "training", "data"]
+SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING, "data": DATA}
 """Disjoint: a seed draws a line, its pantograph and all noise."""
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from ..base.errors import InputError
-from ..base.explanation import complaints
+from ..base.explanation import complaints, explain
 from ..base.names import hint
 from ..base.ranges import ranges_of
 from ..base.settings import Settings
@@ -75,6 +76,21 @@ def change(entry: S, name: str, value: float) -> S:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found)
         raise InputError(f"{name} can't be {value:g}: {'; '.join(words)}.") from error
+
+
+def change_together(entry: S, values: Mapping[str, float]) -> S:
+    """The entry with other values of several parameters, which its schema judges together.
+
+    Raises InputError as ``change`` does.
+    """
+    table = entry.model_dump()
+    for name, value in values.items():
+        check_name(name, entry)
+        table = _put(table, name.split(".")[1:], value)
+    try:
+        return type(entry).model_validate(table)
+    except ValidationError as error:
+        raise InputError(f"These values do not go together: {explain(error, type(entry))}.") from error
 
 
 def _places(values: tuple[Any, ...], prefix: str) -> list[str]:

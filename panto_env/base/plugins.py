@@ -15,7 +15,7 @@ POLICIES = "panto_env.policies"
 LOADERS = "panto_env.policy_loaders"
 """A file suffix without its dot, and a callable that loads a policy from a path."""
 COMMANDS = "panto_env.commands"
-"""The name of a sub-command of ``panto``, and its function."""
+"""The name of a sub-command of ``panto``, and its function, or a Typer app with sub-commands of its own."""
 
 
 def installed(group: str) -> dict[str, EntryPoint]:

@@ -75,7 +75,11 @@ def make_app() -> typer.Typer:
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)
     for name, point in plugins.installed(plugins.COMMANDS).items():
-        app.command(name)(plugins.load(point))
+        command = plugins.load(point)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name)(command)
     return app
 
 

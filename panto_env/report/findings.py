@@ -160,7 +160,7 @@ class Findings:
 
     @cached_property
     def elasticity(self) -> tuple[Array, Array, float] | None:
-        """Places (m), uplift per newton (m/N) and its unevenness (%), at the mean force; None of other kinds."""
+        """Places (m), uplift per newton (m/N) and its unevenness (%), at the mean force, if it is known."""
         if not isinstance(self.line, FlexibleCatenaryData):
             return None
         force = self.run.nominal_force if self.figures is None else self.figures.mean

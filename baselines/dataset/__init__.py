@@ -1,0 +1,1 @@
+"""Data to learn from: recorded episodes as Minari data sets, and a table of simulated designs."""

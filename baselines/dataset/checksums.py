@@ -1,0 +1,65 @@
+"""SHA-256 of each file of a data set, in a list beside them that `sha256sum --check` reads, too."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from panto_env.base.errors import InputError
+from panto_env.base.files import write_whole
+
+LIST = "SHA256SUMS"
+
+
+def write_checksums(folder: Path) -> None:
+    """Write the list of all files of a folder but hidden ones."""
+    lines = [f"{_checksum(folder / name)}  {name}\n" for name in _files(folder)]
+    with write_whole(folder / LIST) as temporary:
+        temporary.write_text("".join(lines), encoding="utf-8", newline="")
+
+
+def verify(path: Path) -> list[tuple[Path, int]]:
+    """Folders with a list in or below ``path``, each with the number of its files, all of them as listed.
+
+    Raises InputError, naming the file, where one is missing, differs or is not listed, and where there is no
+    list.
+    """
+    lists = sorted(path.rglob(LIST))
+    if not lists:
+        raise InputError(f"There is no {LIST} in or below {path}; give the folder of a data set.")
+    return [(each.parent, _verify(each.parent)) for each in lists]
+
+
+def _verify(folder: Path) -> int:
+    listed = {}
+    for line in (folder / LIST).read_text(encoding="utf-8").splitlines():
+        checksum, _, name = line.partition("  ")
+        listed[name] = checksum
+    found = _files(folder)
+    for name, checksum in listed.items():
+        if name not in found:
+            raise InputError(f"{folder / name} is missing; make or download the data set anew.")
+        if _checksum(folder / name) != checksum:
+            raise InputError(
+                f"{folder / name} is not what {LIST} says: it was damaged or changed; make or download the "
+                "data set anew."
+            )
+    extra = next((name for name in found if name not in listed), None)
+    if extra is not None:
+        raise InputError(f"{folder / extra} is not in {LIST}; move it elsewhere, it is not of the data set.")
+    return len(listed)
+
+
+def _files(folder: Path) -> list[str]:
+    """Relative paths, in order."""
+    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path.as_posix()
+        for path in paths
+        if path.name != LIST and not any(p.startswith(".") for p in path.parts)
+    )
+
+
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

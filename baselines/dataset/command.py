@@ -1,0 +1,124 @@
+"""The commands `panto dataset episodes`, `panto dataset designs` and `panto dataset verify`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from panto_env.base.settings import parse
+from panto_env.base.table import Table
+from panto_env.cluster import RayAddress
+from panto_env.terminal import Json, console, counting, print_json, print_table, progress_console
+
+T = TypeVar("T")
+dataset = typer.Typer(no_args_is_help=True, help="Make data to learn from, and check it.")
+Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)]
+
+
+@dataset.command()
+def episodes(
+    config: Annotated[Path, typer.Argument(help="TOML file, or a name such as dataset-known-line.")],
+    output: Annotated[
+        Path, typer.Option(help="Folder to make them in, which MINARI_DATASETS_PATH may name.")
+    ] = Path("data"),
+    only: Annotated[
+        list[str] | None, typer.Option(help="One of the file's sets, instead of all; repeatable.")
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(help="For each policy, noise and place of every set, instead of the file's.", min=1),
+    ] = None,
+    workers: Workers = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Record episodes of policies as data sets of Minari.
+
+    What is there already is kept: the same command goes on after whatever ended it.
+    """
+    from .make_episodes import make_episodes
+    from .settings import chosen, load_episodes
+
+    settings = load_episodes(config)
+    if only:
+        settings = chosen(settings, tuple(only))
+    if episodes is not None:
+        sets = [each.model_dump() | {"episodes": episodes} for each in settings.sets]
+        settings = parse(type(settings), settings.model_dump() | {"sets": sets}, str(config))
+    made = _going_on(
+        output,
+        lambda progress: make_episodes(settings, output, workers=workers, ray=ray, progress=progress),
+    )
+    if json:
+        print_json([asdict(each) | {"folder": str(each.folder)} for each in made])
+        return
+    rows = tuple(
+        (each.dataset_id, f"{each.episodes:,}", f"{each.steps:,}", f"{each.megabytes:.1f}") for each in made
+    )
+    print_table(Table("data sets", ("Minari's name", "episodes", "steps", "MB"), rows))
+    console.print(f"MINARI_DATASETS_PATH={output.resolve()}", highlight=False)
+
+
+@dataset.command()
+def designs(
+    config: Annotated[Path, typer.Argument(help="TOML file, or a name such as dataset-designs.")] = Path(
+        "dataset-designs"
+    ),
+    output: Annotated[Path, typer.Option(help="Folder to make the table in.")] = Path("data"),
+    count: Annotated[
+        int | None, typer.Option(help="Designs, instead of the file's; powers of two fill evenly.", min=1)
+    ] = None,
+    workers: Workers = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Simulate many designs of line and pantograph, as a table.
+
+    What is there already is kept: the same command goes on after whatever ended it.
+    """
+    from .designs_settings import load_designs
+    from .make_designs import make_designs
+
+    settings = load_designs(config)
+    if count is not None:
+        settings = parse(type(settings), settings.model_dump() | {"count": count}, str(config))
+    made = _going_on(
+        output, lambda progress: make_designs(settings, output, workers=workers, ray=ray, progress=progress)
+    )
+    if json:
+        print_json(asdict(made) | {"folder": str(made.folder)})
+        return
+    counts = (f"{each:,}" for each in (made.designs, made.refused, made.ended_early, made.warned))
+    headings = ("folder", "designs", "refused", "ended early", "with warnings", "MB")
+    row = (str(made.folder), *counts, f"{made.megabytes:.1f}")
+    print_table(Table("designs", headings, (row,)))
+
+
+@dataset.command()
+def verify(
+    path: Annotated[Path, typer.Argument(help="Folder of a data set, or of several.")],
+    json: Json = False,
+) -> None:
+    """Check that the files of data sets are those that were made, by their SHA-256."""
+    from .checksums import verify as verify_folder
+
+    found = verify_folder(path)
+    if json:
+        print_json([{"folder": str(folder), "files": files} for folder, files in found])
+        return
+    for folder, files in found:
+        console.print(f"{folder}: {files} files as listed", highlight=False)
+
+
+def _going_on(output: Path, work: Callable[[Any], T]) -> T:
+    """The result of work that shows its progress, and can be gone on with where it is interrupted."""
+    try:
+        with counting("parts") as progress:
+            return work(progress)
+    except KeyboardInterrupt as error:
+        progress_console.print(f"Stopped. To continue, repeat the command ({output}).")
+        raise typer.Exit(130) from error

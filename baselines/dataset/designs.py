@@ -1,0 +1,98 @@
+"""Designs: drawn from ranges, each simulated once, and each with a row, whatever came of it."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from panto_env import simulate
+from panto_env.analysis.parameters import change_together
+from panto_env.analysis.sweep import SPEED
+from panto_env.base.arrays import Array
+from panto_env.base.errors import AccuracyWarning, InputError
+from panto_env.base.files import write_rows
+from panto_env.base.settings import Settings
+from panto_env.metrics.figures import Figures
+
+from .designs_settings import SPAN_LENGTH, DesignsSettings
+
+Row = dict[str, Any]
+DROPPERS = "catenary.droppers.positions"
+FIGURES = tuple(name for name in Figures.__dataclass_fields__ if not name.startswith("effort"))
+"""Figures of a run; a passive pantograph has no effort."""
+OUTCOME = ("nominal_force", "wave_speed", "time_step", "spacing", *FIGURES)
+"""Columns that are null where a design was refused, figures also where its run ended early."""
+
+
+def draw(settings: DesignsSettings, first: int, last: int) -> Array:
+    """Values of the designs first to last - 1, (designs, ranges): a scrambled Sobol sequence."""
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():  # of a count that is no power of two: that is told on the card
+        warnings.simplefilter("ignore", UserWarning)
+        sequence = qmc.Sobol(len(settings.ranges), seed=settings.seed)
+        if first:  # SciPy takes no 0
+            sequence.fast_forward(first)
+        points = sequence.random(last - first)
+    low, high = np.array(list(settings.ranges.values())).T
+    values: Array = low + points * (high - low)
+    return values
+
+
+def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Path) -> None:
+    """Rows of the designs first to last - 1, into a Parquet file."""
+    values = draw(settings, first, last).tolist()
+    rows = [
+        design(settings, first + k, dict(zip(settings.ranges, each, strict=True)))
+        for k, each in enumerate(values)
+    ]
+    write_rows(rows, path)
+
+
+def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> Row:
+    """A design's row: its values, why it was refused or ended early, warnings of inaccuracy, and figures."""
+    row: Row = {"design": number, **values, "refused": "", "ending": "", "accuracy_warning": ""}
+    row |= dict.fromkeys(OUTCOME)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", AccuracyWarning)
+        try:
+            line, pantograph = designed(settings, values)
+            run = simulate(line, pantograph, values[SPEED], record_droppers=False)
+        except InputError as error:
+            return row | {"refused": str(error)}
+    told = dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, AccuracyWarning))
+    figures = {} if run.terminated else run.summary().as_dict()
+    found = {
+        "ending": run.ending,
+        "accuracy_warning": " ".join(told),
+        "nominal_force": run.nominal_force,
+        "wave_speed": run.line.wave_speed,
+        "time_step": run.time_step,
+        "spacing": run.settings["spacing"],
+    }
+    return row | found | {name: _number(figures[name]) for name in FIGURES if name in figures}
+
+
+def _number(value: float) -> float | None:
+    """A figure; None where the run has not that one, as uplift on a line without supports."""
+    return None if np.isnan(value) else value
+
+
+def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:
+    """The line and the pantograph of a design. Raises InputError for values that their schemas refuse.
+
+    Where spans have another length, droppers keep their places as shares of the span.
+    """
+    entries = settings.entries()
+    line, pantograph = (
+        {name: value for name, value in values.items() if name.startswith(f"{family}.")} for family in entries
+    )
+    if SPAN_LENGTH in line:
+        data = entries["catenary"]
+        positions = getattr(getattr(data, "droppers", None), "positions", ())
+        ratio = line[SPAN_LENGTH] / data.span_length
+        line |= {f"{DROPPERS}.{k}": ratio * place for k, place in enumerate(positions)}
+    return change_together(entries["catenary"], line), change_together(entries["pantograph"], pantograph)

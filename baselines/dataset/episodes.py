@@ -1,0 +1,191 @@
+"""Episodes as they are recorded: what a policy did, and what the environment answered."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.base.errors import InputError
+from panto_env.policies import Policy, errors_name, find_policy, wishes
+
+from ..benchmark.seeds import DATA
+from .settings import ENVIRONMENT, EpisodesSettings, Plan
+
+INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
+"""Infos of the environment that are kept, beside the terms of the reward."""
+NOISE_STREAM = 1
+"""Beside an episode's seed, it seeds the noise on its actions: other numbers than those of its line."""
+
+
+class Episode(NamedTuple):
+    """One recorded episode of n steps; the first row of infos is the start's, which has no action."""
+
+    observations: NDArray[np.float32]  # (n + 1, entries): as the environment shows it
+    actions: NDArray[np.float32]  # (n, actions): what was done, in -1..1
+    rewards: NDArray[np.float64]  # (n,)
+    terminations: NDArray[np.bool_]  # (n,)
+    truncations: NDArray[np.bool_]  # (n,)
+    infos: dict[
+        str, NDArray[np.float64]
+    ]  # (n + 1,): INFOS, "reward_terms/...", "policy_action" (n + 1, actions)
+    figures: dict[str, float]  # of the whole episode, as the environment's info has them
+
+
+class Beginning(NamedTuple):
+    """The start of an episode."""
+
+    policy: Policy
+    twin: (
+        gymnasium.Env[Any, Any] | None
+    )  # that shows the policy what it asks for; None: it sees what is recorded
+    observation: NDArray[np.float32]  # that is recorded
+    seen: NDArray[np.float32]  # by the policy
+    info: dict[str, Any]
+
+
+def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
+    """The environment that is recorded, made so that others can make it again; with other arguments, if any.
+
+    Raises InputError where its arguments are not valid.
+    """
+    try:
+        return gymnasium.make(f"panto_env:{ENVIRONMENT}", **settings.arguments() | changes)
+    except TypeError as error:
+        raise InputError(f"The arguments of the environment are not valid: {error}.") from error
+
+
+def check_places(settings: EpisodesSettings) -> None:
+    """Raise InputError unless each policy can begin at each place, at both ends of its speeds."""
+    stage = Stage(settings)
+    for policy in dict.fromkeys(policy for each in settings.sets for policy in each.policies):
+        for place in settings.places:
+            for speed in place.speed_kmh:
+                stage.begin(policy, DATA[0], place.options() | {"speed_kmh": [speed, speed]})
+
+
+def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> None:
+    """Record episodes one after another into a file, as ``read_episodes`` reads them."""
+    arrays: dict[str, NDArray[Any]] = {}
+    stage = Stage(settings)
+    for plan in plans:
+        episode = stage.play(plan)
+        for name, value in episode._asdict().items():
+            values = value if isinstance(value, dict) else {"": value}
+            for key, array in values.items():
+                arrays[f"{plan.number}|{name}|{key}"] = np.asarray(array)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def read_episodes(path: Path, plans: Sequence[Plan]) -> list[Episode]:
+    """Episodes that ``record`` wrote, in the order of the plans."""
+    with np.load(path) as file:
+        tables: dict[int, dict[str, Any]] = {plan.number: {"infos": {}, "figures": {}} for plan in plans}
+        for key in file.files:
+            number, name, part = key.split("|")
+            value = file[key]
+            if part == "":
+                tables[int(number)][name] = value
+            else:
+                tables[int(number)][name][part] = value if name == "infos" else float(value)
+    return [Episode(**tables[plan.number]) for plan in plans]
+
+
+class Stage:
+    """Where episodes are recorded: the environment, and a twin for each other observation that is asked for.
+
+    A policy that asks for another observation than what is recorded is shown it by a twin, which has the same
+    seed and gets the same actions. It moves alike bit for bit: the observation decides only what is seen.
+    """
+
+    def __init__(self, settings: EpisodesSettings) -> None:
+        self._settings, self._env = settings, make(settings)
+        self._twins: dict[str, gymnasium.Env[Any, Any]] = {}
+
+    def play(self, plan: Plan) -> Episode:
+        """One episode. Raises InputError where the policy fails, or its twin does not move alike."""
+        env, options = self._env, self._settings.options(plan)
+        policy, twin, observation, seen, info = self.begin(plan.policy, plan.seed, options)
+        random = np.random.default_rng([plan.seed, NOISE_STREAM])
+        shape = env.action_space.shape or ()
+        observations, infos = [observation], [_kept(info, np.zeros(shape))]
+        steps: list[tuple[Any, ...]] = []
+        ended = False
+        while not ended:
+            wanted = _action(policy, plan.policy, seen, shape)
+            noisy = wanted + plan.noise * random.standard_normal(shape)
+            action = np.clip(noisy, -1.0, 1.0).astype(np.float32)
+            observation, reward, terminated, truncated, info = env.step(action)
+            seen = observation if twin is None else _seen(twin, action, info, plan.policy)
+            ended = terminated or truncated
+            steps.append((action, reward, terminated, truncated))
+            observations.append(observation)
+            infos.append(_kept(info, wanted))
+        actions, rewards, terminations, truncations = (np.array(each) for each in zip(*steps, strict=True))
+        return Episode(
+            np.array(observations),
+            actions,
+            rewards.astype(np.float64),
+            terminations,
+            truncations,
+            {key: np.array([each[key] for each in infos], dtype=np.float64) for key in infos[0]},
+            info["figures"],
+        )
+
+    def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
+        """The start of an episode. Raises InputError where the policy cannot begin it."""
+        policy = find_policy(name)
+        twin = self._twin(policy)
+        observation, info = self._env.reset(seed=seed, options=options)
+        seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
+        with errors_name(name, "reset"):
+            policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
+        return Beginning(policy, twin, observation, seen, info)
+
+    def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
+        """The environment that a policy asks for; None where that is the one that is recorded."""
+        offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
+        asked = {key: value for key, value in wishes(policy).items() if value != getattr(offered, key)}
+        key = repr(sorted(asked.items()))
+        if asked and key not in self._twins:
+            self._twins[key] = make(self._settings, **asked)
+        return self._twins.get(key)
+
+
+def _seen(
+    twin: gymnasium.Env[Any, Any], action: NDArray[np.float32], info: dict[str, Any], policy: str
+) -> NDArray[np.float32]:
+    """What a policy sees next. Raises InputError where its twin does not move alike."""
+    seen: NDArray[np.float32]
+    seen, _, _, _, other = twin.step(action)
+    if other["contact_force"] != info["contact_force"]:
+        raise InputError(
+            f"The policy '{policy}' asks for an observation under which the same seed gives another run, so "
+            "that it cannot be recorded beside others; leave it out."
+        )
+    return seen
+
+
+def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[Any]:
+    """What a policy does, within -1..1."""
+    with errors_name(name, "act"):
+        returned = policy.act(seen.copy())  # a copy: it may keep what it was shown
+        action = np.asarray(returned, dtype=float)
+        if action.shape != shape or not np.isfinite(action).all():
+            raise InputError(
+                f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
+            )
+    clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
+    return clipped
+
+
+def _kept(info: dict[str, Any], wanted: NDArray[Any]) -> dict[str, Any]:
+    """What is kept of an info, flat."""
+    terms = {f"reward_terms/{name}": value for name, value in info["reward_terms"].items()}
+    return {name: info[name] for name in INFOS} | terms | {"policy_action": wanted}

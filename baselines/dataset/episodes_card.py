@@ -1,0 +1,97 @@
+"""What stands beside a data set of episodes: where it comes from, what is in it, and how to use it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from panto_env.control.observation import Layout
+
+from .episodes import Episode
+from .settings import ENVIRONMENT, EpisodesSettings, Plan, PolicySet
+
+REWARD = (
+    "The reward is that of the environment: minus the cost function CF and the contact-loss ratio CL of "
+    "paper 1 over the control step, the rate of the action and the deviation of a running mean of the "
+    "contact force, with the weights of its argument `reward`; `infos/reward_terms` holds the terms, not "
+    "weighted."
+)
+
+
+def description(settings: EpisodesSettings, policy_set: PolicySet) -> str:
+    """A paragraph on what a data set is."""
+    places = "; ".join(
+        f"{each.pantograph} on {each.catenary}, {each.speed_kmh[0]:g} to {each.speed_kmh[1]:g} km/h"
+        for each in settings.places
+    )
+    plans = list(settings.plans(policy_set))
+    own = f" {policy_set.description}" if policy_set.description else ""
+    return (
+        f"Episodes of {ENVIRONMENT}, simulated: {places}. Policies: {', '.join(policy_set.policies)}; rms of "
+        f"the noise on the action: {', '.join(f'{noise:g}' for noise in policy_set.noise)}.{own} {REWARD} "
+        f"Seeds {plans[0].seed} to {plans[-1].seed}, which nothing was trained, chosen or judged on."
+    )
+
+
+def card(
+    settings: EpisodesSettings,
+    policy_set: PolicySet,
+    rows: Sequence[tuple[Plan, Mapping[str, Any]]],
+    layout: Layout,
+    made_of: Mapping[str, Any],
+) -> str:
+    """The card as Markdown. rows: each episode's plan and ``summary``."""
+    lines = [
+        f"# {settings.dataset_id(policy_set)}",
+        "",
+        description(settings, policy_set),
+        "",
+        f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
+        f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
+        "",
+        "| policy | noise | line | episodes | steps | return | σ (N) | mean force (N) | ended early |",
+        "|---|---:|---|---:|---:|---:|---:|---:|---:|",
+        *_table(settings, rows),
+        "",
+        "Means over whole episodes, their start included. Each row has seeds, and so lines and speeds, of "
+        "its own: it says what is in the data and ranks no policy, as `panto benchmark` does.",
+        "",
+        "| | observed | value of 0 | value of 1 more |",
+        "|---:|---|---:|---:|",
+        *(f"| {k} | {e.name} | {e.centre:g} | {e.scale:g} {e.unit} |" for k, e in enumerate(layout.entries)),
+        "",
+        "`actions`: what was done, share of the actuator's force limit. `infos`: row k + 1 is of step k, row "
+        "0 of the start; `policy_action` is what the policy wanted before noise was added. An episode's "
+        "metadata hold policy, noise, line, speed, figures, and seed and options: `env.reset(seed=seed, "
+        "options=options)` and the actions give it again, bit for bit.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def summary(episode: Episode) -> dict[str, float]:
+    """What the card tells of an episode."""
+    return {
+        "steps": len(episode.rewards),
+        "return": float(np.sum(episode.rewards)),
+        "std": episode.figures["std"],
+        "mean": episode.figures["mean"],
+        "terminated": float(episode.terminations[-1]),
+    }
+
+
+def _table(settings: EpisodesSettings, rows: Sequence[tuple[Plan, Mapping[str, Any]]]) -> list[str]:
+    kinds = dict.fromkeys((plan.policy, plan.noise, plan.place) for plan, _ in rows)
+    lines = []
+    for kind in kinds:
+        own = [told for plan, told in rows if (plan.policy, plan.noise, plan.place) == kind]
+        policy, noise, place = kind
+        steps, early = (int(sum(each[name] for each in own)) for name in ("steps", "terminated"))
+        means = [np.mean([each[name] for each in own]) for name in ("return", "std", "mean")]
+        lines.append(
+            f"| {policy} | {noise:g} | {settings.places[place].catenary} | {len(own)} | {steps:,} | "
+            f"{means[0]:.1f} | {means[1]:.1f} | {means[2]:.1f} | {early} |"
+        )
+    return lines

@@ -1,0 +1,127 @@
+"""Work in parts, each a file that is written whole: whatever ends it, it goes on with what is missing."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from panto_env.analysis.pool import Progress
+from panto_env.backend.cache import source_hash
+from panto_env.base.errors import InputError
+from panto_env.base.files import make_folder, write_whole
+from panto_env.base.version import __version__, commit
+from panto_env.cluster import spread
+
+Job = Callable[[Path], None]
+"""Work that writes its result to a path; ``functools.partial`` of a function of a module."""
+PARTS = ".parts"
+"""Folder in the output with one for each data set's parts; hidden, so that Minari does not look into it."""
+IDENTITY = "identity.json"
+
+
+def identity(kind: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """What a data set is made of, plain data: results of the same are the same."""
+    made_by = {"version": __version__, "commit": commit(), "sources": source_hash()}
+    return {"kind": kind, **made_by, "settings": json.loads(json.dumps(settings))}
+
+
+def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
+    """Make the folder of a data set's parts, or go on with it; made_of: what ``identity`` gives.
+
+    Raises InputError where it holds parts of something else.
+    """
+    make_folder(folder)
+    path = folder / IDENTITY
+    if not path.is_file():
+        with write_whole(path) as temporary:
+            temporary.write_text(json.dumps(made_of, indent=1) + "\n", encoding="utf-8")
+        return
+    difference = first_difference(json.loads(path.read_text(encoding="utf-8")), made_of)
+    if difference:
+        raise InputError(
+            f"{folder} holds parts of another data set ({difference}); finish that one, remove the folder, "
+            "or take another --output."
+        )
+
+
+def make_parts(
+    jobs: Mapping[Path, Job],
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Make all files, each by its job; those that are there are kept.
+
+    workers, ray: as ``spread`` takes them. progress: called with the files there, and of all.
+    """
+    missing = {path: job for path, job in jobs.items() if not path.is_file()}
+    kept = len(jobs) - len(missing)
+    if progress is not None:
+        progress(kept, len(jobs))
+    if missing:
+        spread(
+            [partial(_write, job, path) for path, job in missing.items()],
+            workers=workers,
+            ray=ray,
+            progress=None if progress is None else lambda done, _: progress(kept + done, len(jobs)),
+        )
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what is needed no more."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder in which nothing is left."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Within the body no other process makes data in the folder, as far as files can be locked there.
+
+    The system opens the lock of a process that is killed. Raises InputError where another one holds it.
+    """
+    make_folder(folder)
+    lock = FileLock(folder / ".lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise InputError(
+            f"Another process makes data in {folder}; wait until it has ended, or end it."
+        ) from error
+    except (OSError, NotImplementedError):
+        pass  # files cannot be locked here
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """The first thing in which two identities differ, as a clause; "" where there is none."""
+    before, now = ({**each, **each.get("settings", {})} for each in (old, new))
+    for key in sorted(before.keys() | now.keys()):
+        if key != "settings" and before.get(key) != now.get(key):
+            return f"its {key} is {_short(before.get(key))}, this is {_short(now.get(key))}"
+    return ""
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _write(job: Job, path: Path) -> None:
+    with write_whole(path) as temporary:
+        job(temporary)

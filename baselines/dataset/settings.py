@@ -1,0 +1,152 @@
+"""What data sets of episodes hold: policies, places and how many, from a TOML file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from panto_configs import find
+from panto_env.base.errors import InputError
+from panto_env.base.files import read_toml
+from panto_env.base.ranges import Between
+from panto_env.base.settings import NonNegative, Settings, parse
+from panto_env.control.settings import description
+
+from ..benchmark.seeds import DATA
+
+ENVIRONMENT = "Pantograph-v0"
+"""Id of the environment that episodes are recorded in."""
+NAMESPACE = "pantograph"
+"""First part of the ids of all data sets."""
+_Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*[a-z0-9]$")]
+_Speed = Annotated[float, Between(1, 600, "km/h")]
+
+
+class Place(Settings):
+    """A pantograph on a line, and the speeds that episodes draw from."""
+
+    catenary: str = Field(description=description("catenary"))
+    pantograph: str = Field(description=description("pantograph"))
+    speed_kmh: tuple[_Speed, _Speed] = Field(description="lowest and highest speed (km/h)")
+
+    def options(self) -> dict[str, Any]:
+        """Options of ``reset`` that bring an episode here."""
+        return {
+            "catenary": self.catenary,
+            "pantograph": self.pantograph,
+            "speed_kmh": list(self.speed_kmh),
+        }
+
+
+class PolicySet(Settings):
+    """One data set: episodes of each policy, with each noise, at each place."""
+
+    name: _Name = Field(description="last part of its id, before the version: small letters, digits and '-'")
+    policies: tuple[str, ...] = Field(min_length=1, description="names, or model files, as the benchmark's")
+    noise: tuple[NonNegative, ...] = Field(
+        (0.0,), min_length=1, description="rms of what is added to each action, drawn anew at each step (-)"
+    )
+    episodes: Annotated[int, Field(gt=0)] = Field(
+        description="number of them for each policy, noise and place"
+    )
+    description: str = Field("", description="what it is for, a sentence or two")
+
+    @field_validator("policies", "noise")
+    @classmethod
+    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _checked_distinct(value)
+
+
+class Plan(NamedTuple):
+    """One episode to record."""
+
+    number: int  # within its data set, from 0
+    policy: str
+    noise: float  # rms of what is added to actions (-)
+    place: int  # which of the places
+    seed: int
+
+
+class EpisodesSettings(Settings):
+    """Data sets of one group of places."""
+
+    title: _Name = Field(description="middle part of the ids: small letters, digits and '-'")
+    version: Annotated[int, Field(ge=0)] = Field(0, description="last part of the ids")
+    author: str = Field("The panto-env authors", description="of the data sets")
+    seed: Annotated[int, Field(ge=0)] = Field(
+        0, description="where each set's seeds begin within those that are for data"
+    )
+    environment: dict[str, Any] = Field(
+        default_factory=dict, description=f"arguments of {ENVIRONMENT} that differ from its own"
+    )
+    places: tuple[Place, ...] = Field(min_length=1, description="lines, with pantograph and speeds")
+    sets: tuple[PolicySet, ...] = Field(min_length=1, description="data sets")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        _checked_distinct(tuple(each.name for each in self.sets))
+        _checked_distinct(tuple((each.catenary, each.pantograph) for each in self.places))
+        of_a_place = next((key for key in Place.model_fields if key in self.environment), None)
+        if of_a_place is not None:
+            raise ValueError(f"{of_a_place} belongs into places, not into environment")
+        most = max(self.count(each) for each in self.sets)
+        if self.seed + most > len(DATA):
+            raise ValueError(
+                f"a set has {most:,} episodes from seed {self.seed:,} on, of {len(DATA):,} seeds"
+            )
+        return self
+
+    def dataset_id(self, policy_set: PolicySet) -> str:
+        """Minari's name of a data set."""
+        return f"{NAMESPACE}/{self.title}/{policy_set.name}-v{self.version}"
+
+    def count(self, policy_set: PolicySet) -> int:
+        """Number of episodes of a data set."""
+        kinds = len(self.places) * len(policy_set.policies) * len(policy_set.noise)
+        return kinds * policy_set.episodes
+
+    def plans(self, policy_set: PolicySet) -> Iterator[Plan]:
+        """Episodes of a data set in order: places, policies and noises take turns, each under a seed of its
+        own; sets of as many episodes have the same seeds.
+        """
+        kinds = list(product(range(len(self.places)), policy_set.policies, policy_set.noise))
+        for number in range(self.count(policy_set)):
+            place, policy, noise = kinds[number % len(kinds)]
+            yield Plan(number, policy, noise, place, DATA[self.seed + number])
+
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the environment: its place is the first one, the others are options of ``reset``."""
+        return self.environment | self.places[0].options()
+
+    def options(self, plan: Plan) -> dict[str, Any]:
+        """Options of ``reset`` for an episode: none at the first place."""
+        return self.places[plan.place].options() if plan.place else {}
+
+
+def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    twice = next((value for value, count in Counter(values).items() if count > 1), None)
+    if twice is not None:
+        raise ValueError(f"{twice!r} is given twice")
+    return values
+
+
+def load_episodes(path: str | Path) -> EpisodesSettings:
+    """Read a TOML file of ``EpisodesSettings``, given by its path or by a name of ``configs/``.
+
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    """
+    return parse(EpisodesSettings, read_toml(find(path, "dataset")), str(path))
+
+
+def chosen(settings: EpisodesSettings, names: tuple[str, ...]) -> EpisodesSettings:
+    """The settings with these of their sets alone. Raises InputError for a name that none of them has."""
+    known = {each.name: each for each in settings.sets}
+    wrong = next((name for name in names if name not in known), None)
+    if wrong is not None:
+        raise InputError(f"There is no set '{wrong}' in this file: it has {', '.join(known)}.")
+    return settings.model_copy(update={"sets": tuple(known[name] for name in dict.fromkeys(names))})
