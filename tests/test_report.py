@@ -221,7 +221,7 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("run.parquet", "", "run.parquet must end in .json"),
+        ("run.parquet", "", "run.parquet is not a whole trajectory file"),
         ("out.json", None, "there is no such file"),
         ("out.json", "{", "is not JSON"),
         ("out.json", "[1]", "is no result of `panto benchmark --output RESULT.json`"),
