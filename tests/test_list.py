@@ -201,3 +201,18 @@ def test_a_sweep_and_an_evaluation_carry_it_too(panto):
     assert told["settings"]["version"] == __version__
     assert told["settings"]["time_step"] > 0
     assert set(told["verdict"]) == {"ratio", "qualified"}
+
+
+def test_a_line_of_the_catalogue_is_a_start_for_one_of_yours(tmp_path):
+    shown = CliRunner().invoke(make_app(), ["list", "re250", "--toml"])
+    assert shown.exit_code == 0
+    mine = tmp_path / "mine.toml"
+    mine.write_text(shown.stdout, encoding="utf-8")
+    given = load_catenary("re250").model_dump(exclude={"name"})
+    assert load_catenary(mine).model_dump(exclude={"name"}) == given
+    for arguments, words in (
+        (["--toml"], "Name a line or a pantograph"),
+        (["pd", "--toml"], "is called 'pd'"),
+    ):
+        refused = CliRunner().invoke(make_app(), ["list", *arguments])
+        assert words in str(refused.exception)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ..base.errors import InputError
 from ..base.explanation import explain
 from ..base.files import read_toml
-from ..base.names import nearest
+from ..base.names import nearest, suggest
 from ..base.settings import Settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.pantograph.schema import PantographData
@@ -47,6 +47,18 @@ def load_pantograph(source: str | Path | PantographData) -> PantographData:
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
     return source if isinstance(source, PantographData) else _load("pantograph", source)
+
+
+def text_of(name: str) -> str:
+    """The TOML file of a line or a pantograph of the catalogue, as a start for one's own.
+
+    Raises InputError where neither is called so.
+    """
+    for family in FOLDERS:
+        if name in available(family):
+            return (FOLDERS[family] / f"{name}.toml").read_text(encoding="utf-8")
+    known = [each for family in FOLDERS for each in available(family)]
+    raise InputError(f"No line or pantograph of the catalogue is called '{name}': {suggest(name, known)}.")
 
 
 def _load(family: str, source: str | Path) -> Any:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
+from ..base.errors import InputError
+from ..catalog.loader import text_of
 from ..terminal import Json, console, print_json
 from .descriptions import LOADERS, POLICY, PRESETS, Description, described, everything
 
@@ -20,9 +23,17 @@ def list_entries(
             "or TOML file."
         ),
     ] = None,
+    toml: Annotated[
+        bool, typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """List lines, pantographs, policies and presets, or every value of one with its source or default."""
+    if toml:
+        if name is None:
+            raise InputError("Name a line or a pantograph: panto list en50318-2002 --toml.")
+        sys.stdout.write(text_of(name))
+        return
     if name is not None:
         found = described(name)
         if json:

@@ -3,8 +3,8 @@
 LEFT_OUT = """
 Stitch wires, stagger and the lateral plane, longitudinal motion of droppers and arms, large rotations,
 aerodynamic force on the wires, temperature. Motion is linear about the static shape, except for slack
-droppers and the unilateral contact. A line is anchored at both ends; this influences its first and last spans.
-EN 50318:2018 is not claimed.
+droppers and the unilateral contact. A line is anchored at both ends; this influences its first and last
+spans. EN 50318:2018 is not claimed.
 """.strip()
 """As in docs/validation.md, which a test compares."""
 ACCURACY = """
