@@ -10,9 +10,9 @@ import time
 
 import gymnasium
 
-from panto_env.base.machine import processor
 from panto_env.base.table import Table
 from panto_env.envs import IDS
+from panto_env.studies.throughput.processor import describe
 from panto_env.terminal import print_table
 
 FRAMES = 300
@@ -33,10 +33,15 @@ def milliseconds(name: str) -> float:
     return statistics.median(taken)
 
 
+def main() -> None:
+    """Measure and print."""
+    rows = []
+    for name in IDS:
+        taken = milliseconds(name)
+        rows.append((name, f"{taken:.1f}", f"{1e3 / taken:.0f}"))
+    title = f"Frames of 1280 x 720, {describe()['processor']}"
+    print_table(Table(title, ("id", "ms per frame", "frames per second"), rows))
+
+
 if __name__ == "__main__":
-    rows = [
-        (name, f"{value:.1f}", f"{1e3 / value:.0f}") for name, value in ((n, milliseconds(n)) for n in IDS)
-    ]
-    print_table(
-        Table(f"Frames of 1280 x 720, {processor()}", ("id", "ms per frame", "frames per second"), rows)
-    )
+    main()
