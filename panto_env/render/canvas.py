@@ -51,6 +51,12 @@ class Canvas:
 
         cv2.polylines(self.pixels, [_exact(points)], False, colour, max(1, round(width)), cv2.LINE_AA, PARTS)
 
+    def wire(self, points: Any, colour: Colour, width: int) -> None:
+        """A nearly level line of so many pixels: several thin ones, in a third of the time of a broad one."""
+        points = np.asarray(points, dtype=float)
+        for k in range(width):
+            self.line(points + np.array([0.0, 0.8 * (k - (width - 1) / 2)]), colour)
+
     def shape(self, points: Any, colour: Colour) -> None:
         """A filled convex polygon."""
         import cv2

@@ -27,7 +27,7 @@ class Picture:
     """Draws moments of one lane, frame after frame."""
 
     def __init__(self, width: int, height: int) -> None:
-        """Raises InputError where pygame is not installed."""
+        """Raises InputError where OpenCV is not installed."""
         self._size = width, height
         self.canvas, self._still = Canvas(width, height), Canvas(width, height)
         self._layout: Layout | None = None
@@ -38,16 +38,18 @@ class Picture:
         layout = self._layout
         if layout is None or layout.span_length != moment.span_length or moment.time == 0:
             layout = self._layout = Layout.of(moment, *self._size)
-        what = (layout, moment.title, moment.largest_force, moment.nominal_force)
+        rows = _rows(moment)
+        what = (layout, moment.title, moment.largest_force, moment.nominal_force, *rows)
         if self._drawn_for != what:
             self._drawn_for = what
             _draw_still(self._still, layout, moment)
+            _draw_rows(self._still, layout, list(rows), named=True)
         self.canvas.start_from(self._still)
         _draw_line(self.canvas, layout, moment)
         _draw_pantograph(self.canvas, layout, moment)
         _draw_actuators(self.canvas, layout, moment)
         _draw_force(self.canvas, layout, moment)
-        _draw_figures(self.canvas, layout, moment)
+        _draw_rows(self.canvas, layout, list(rows.values()), named=False)
         return self.canvas.pixels
 
 
@@ -112,7 +114,7 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
     for x in layout.across(line.supports, at).tolist():
         _draw_mast(canvas, layout, x, contact, upper if line.messenger.size else None)
     if line.messenger.size:
-        canvas.line(upper, METAL, 1.6)
+        canvas.wire(upper, METAL, 2)
     for x, slack in zip(layout.across(line.droppers, at).tolist(), line.slack.tolist(), strict=True):
         top, bottom = (float(np.interp(x, wire[:, 0], wire[:, 1])) for wire in (upper, contact))
         if slack:
@@ -121,7 +123,7 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
             canvas.line(points, BAD, 2)
         else:
             canvas.line([(x, top), (x, bottom)], QUIET)
-    canvas.line(contact, INK, 3)
+    canvas.wire(contact, INK, 3)
     _name_parts(canvas, layout, contact, upper if line.messenger.size else None, bool(line.slack.any()))
 
 
@@ -215,26 +217,31 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment) -> None:
         if support < layout.pantograph:
             canvas.line([(support, layout.chart[0]), (support, layout.chart[1])], FAINT)
     canvas.line(np.column_stack([x, layout.forces(moment.force, largest)]), RAW)
-    canvas.line(np.column_stack([x, layout.forces(moment.filtered, largest)]), FORCE, 2.4)
+    canvas.line(np.column_stack([x, layout.forces(moment.filtered, largest)])[::-2], FORCE, 2.4)
     for place in x[lost(moment.force)].tolist():
         canvas.box(place - 1, float(layout.forces(0.0, largest)) - 4, 3, 9, BAD)
     canvas.dot(layout.pantograph, float(layout.forces(float(moment.filtered[-1]), largest)), 5, FORCE, GROUND)
 
 
-def _draw_figures(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Numbers, to the right of the chart."""
-    size, x = _size(layout), layout.pantograph + 0.03 * layout.width
+def _rows(moment: Moment) -> dict[str, str]:
+    """Numbers that stand to the right of the chart, by name."""
     span = int(moment.position // moment.span_length) + 1
-    rows = {
+    force = f"{moment.filtered[-1]:.0f} N" if moment.filtered.size else "–"
+    return {
         "speed": f"{3.6 * moment.speed:.0f} km/h",
         "place": f"{moment.position:.0f} m, span {span}",
         "time": f"{moment.time:.2f} s",
+        "contact force": force,
+        "nominal force (- - -)": f"{moment.nominal_force:.0f} N",
+        **moment.figures,
     }
-    if moment.filtered.size:
-        rows["contact force"] = f"{moment.filtered[-1]:.0f} N"
-    rows["nominal force (- - -)"] = f"{moment.nominal_force:.0f} N"
-    y = layout.chart[0]
-    for name, value in (rows | moment.figures).items():
-        canvas.words(x, y, name, QUIET, size)
-        canvas.words(0.985 * layout.width, y, value, INK, size, bold=True, anchor="right")
-        y += 1.42 * size
+
+
+def _draw_rows(canvas: Canvas, layout: Layout, words: list[str], *, named: bool) -> None:
+    """The names of these numbers, which stand still, or the numbers."""
+    size, y = _size(layout), layout.chart[0]
+    x = layout.pantograph + 0.03 * layout.width if named else 0.985 * layout.width
+    anchor, colour = ("left", QUIET) if named else ("right", INK)
+    for each in words:
+        canvas.words(x, y, each, colour, size, bold=not named, anchor=anchor)
+        y += 1.25 * size
