@@ -1,5 +1,6 @@
 """Pictures show what the plant does: where things are, which way a force points, what is slack or lost."""
 
+import io
 import itertools
 import pickle
 from dataclasses import replace
@@ -7,6 +8,7 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
@@ -24,6 +26,7 @@ from panto_env.render.film import frames, shown
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
 from panto_env.render.picture import Picture
+from panto_env.render.strip import Strip, strip
 from panto_env.render.video import write_film
 
 SIZE = (640, 360)
@@ -324,3 +327,45 @@ def test_wrong_arguments_are_refused(arguments, words):
 def test_a_lane_that_is_not_there_is_refused():
     with pytest.raises(InputError, match="render_lanes has lane 4, but lanes are 0 to 3"):
         gymnasium.make_vec("Pantograph-v0", num_envs=4, render_lanes=(0, 4))
+
+
+def test_a_run_that_is_watched_is_the_same_run():
+    for policy in (None, "pd"):
+        seen = []
+        plain = simulate("periodic-stiffness", "three-mass", 300.0, policy, distance=300.0)
+        watched = simulate(
+            "periodic-stiffness", "three-mass", 300.0, policy, distance=300.0, watch=seen.append
+        )
+        np.testing.assert_array_equal(plain.contact_force, watched.contact_force)
+        assert watched.policy == plain.policy
+        assert len(seen) == round(300.0 / (300 / 3.6 * 0.01))
+
+
+def test_a_terminal_shows_the_force_as_bars():
+    now = moment(driven(steps=200))
+    shown = strip(replace(now, filtered=np.full(len(now.filtered), now.largest_force / 2))).plain.splitlines()
+    bars = [line[8:] for line in shown[:12]]
+    assert [bar[-1] for bar in bars] == [" "] * 6 + ["█"] * 6
+    assert "350 N" in shown[0]
+    assert "!" not in shown[12].removesuffix("! no contact")
+    lost = strip(replace(now, filtered=np.zeros(len(now.filtered)))).plain.splitlines()
+    assert "!" in lost[12].removesuffix("! no contact")
+    assert f"{now.position:.0f} m" in shown[13]
+
+
+def test_a_strip_leaves_the_terminal_as_it_was():
+    written = io.StringIO()
+    console = Console(file=written, force_terminal=True, width=100)
+    with Strip(console) as drawn:
+        task = driven(steps=50)
+        for _ in range(12):
+            task.step(np.zeros((1, 1)))
+            drawn(task)
+    assert "contact force" in written.getvalue()
+    assert "\x1b[?25h" in written.getvalue()  # the cursor is back
+
+
+def test_live_says_so_where_there_is_no_terminal():
+    command = ["simulate", "--live", "--distance", "1140", "--json"]
+    result = CliRunner().invoke(make_app(), command)
+    assert result.exit_code == 0, result.output

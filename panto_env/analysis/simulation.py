@@ -9,9 +9,11 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..base.arrays import Array
 from ..base.errors import InputError
-from ..control import Task, passive_mean, trim_of_pass
+from ..control import Context, Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
@@ -32,6 +34,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     record_droppers: bool = True,
     evaluated: SpanChoice = None,
+    watch: Callable[[Task], None] | None = None,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
@@ -40,8 +43,8 @@ def simulate(
     ``name`` if it has one, else by its class; it is shown the observation that it asks for by an attribute
     ``observation``, unless that is among the settings. seed: of all that is drawn and the sensors' noise.
     progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
-    spans over which a mean force is met, as ``Trajectory.summary`` takes them. catenary, pantograph,
-    speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
+    spans over which a mean force is met, as ``Trajectory.summary`` takes them. watch: called with the task
+    after every control step. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
     ``help(panto_env.envs.PantographEnv)``.
 
     A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
@@ -57,10 +60,13 @@ def simulate(
     given |= wishes(driver) | settings
     task = _ready(given, seed, evaluated, record_droppers)
     if driver is None:
-        task.run_passively()
+        if watch is None:
+            task.run_passively()
+        else:
+            run_policy(task, _Idle(), "passive", progress, watch)
         return task.trajectory(0, seed=seed, last=True)
     name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
-    run_policy(task, driver, name, progress)
+    run_policy(task, driver, name, progress, watch)
     return task.trajectory(0, policy=name, seed=seed, last=True)
 
 
@@ -82,16 +88,34 @@ def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, 
     return _ready(wishes(driver) | settings, seed, None, record_droppers=False), driver
 
 
+class _Idle:
+    """A driver that leaves its actuators alone: the passive pantograph, step by step."""
+
+    def reset(self, context: Context) -> None:
+        self._action = np.zeros(context.actions)
+
+    def act(self, observation: NDArray[np.float32]) -> Array:
+        return self._action
+
+
 def run_policy(
-    task: Task, policy: Policy, name: str, progress: Callable[[float], None] | None = None
+    task: Task,
+    policy: Policy,
+    name: str,
+    progress: Callable[[float], None] | None = None,
+    watch: Callable[[Task], None] | None = None,
 ) -> None:
     """Drive lane 0, already reset, to the end of its run; name: of the policy, for errors.
+
+    progress, watch: called after every control step, with the share done and with the task.
 
     Raises InputError where the policy fails, or its action is not finite or not of the right shape.
     """
     for share in steps_of_policy(task, policy, name):
         if progress is not None:
             progress(share)
+        if watch is not None:
+            watch(task)
 
 
 def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:

@@ -31,6 +31,9 @@ def simulate(
         typer.Option(help="Save the run to this Parquet file (.parquet).", callback=writable(SUFFIXES)),
     ] = None,
     plot: Plot = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Draw the contact force in the terminal while it runs.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
@@ -39,17 +42,20 @@ def simulate(
     chosen = parse_spans(spans)
     if plot is not None:
         from ..analysis.plots import plot_run, save
-    with Progress(
-        console=progress_console, transient=True, disable=not progress_console.is_terminal
-    ) as progress:
-        bar = progress.add_task("simulating", total=1.0)
-        trajectory = run(
-            policy=policy,
-            seed=seed,
-            evaluated=chosen,
-            progress=lambda share: progress.update(bar, completed=share),
-            **settings,
-        )
+    given = {"policy": policy, "seed": seed, "evaluated": chosen, **settings}
+    if live and progress_console.is_terminal:
+        from ..render.strip import Strip
+
+        with Strip(progress_console) as strip:
+            trajectory = run(watch=strip, **given)
+    else:
+        with Progress(
+            console=progress_console, transient=True, disable=not progress_console.is_terminal
+        ) as progress:
+            bar = progress.add_task("simulating", total=1.0)
+            trajectory = run(progress=lambda share: progress.update(bar, completed=share), **given)
+        if live:
+            progress_console.print("--live draws on a terminal alone, and this is none.")
     if output is not None:
         trajectory.save(output)
     if plot is not None:
