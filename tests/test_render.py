@@ -22,7 +22,7 @@ from panto_env.plant.state import Place, Row
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import frames, shown
+from panto_env.render.film import frames, shown, source
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
 from panto_env.render.picture import Picture
@@ -273,14 +273,29 @@ def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
 
 
 def test_a_film_shows_the_pass_that_simulate_makes():
-    settings = {"speed_kmh": 300.0, "spans": 14}
-    runs = [simulate(policy="pd", seed=2, **settings)]
-    what = shown(runs[0], 0.01, 10, 0.2, 4.0)
+    made = source("pd", {"speed_kmh": 300.0, "spans": 14}, 2)
+    what = shown(made.run, 0.01, 10, 0.2, 4.0)
     assert what.begin == pytest.approx(9 * 60 / (300 / 3.6))
-    (first, *_) = frames(["pd"], runs, settings, 2, what, SIZE)
-    task = Task(run_settings(settings))
+    (first, *_) = frames([made], what, SIZE)
     assert first.shape == (360, 640, 3)
-    assert task.plant.time_step == runs[0].time_step
+
+
+def test_a_saved_run_is_filmed_by_its_own_settings_or_refused(tmp_path):
+    path, film = tmp_path / "run.parquet", tmp_path / "film.mp4"
+    own = {"actuator": "realistic", "sensors": "realistic", "line_condition": "as-built", "spans": 14}
+    run = simulate("shinkansen-simple", "identified-2dof", 250.0, "pd", seed=4, **own)
+    run.save(path)
+    again = source(str(path), {}, 0)
+    np.testing.assert_array_equal(again.run.contact_force, run.contact_force)
+    assert again.seed == 4
+    result = CliRunner().invoke(make_app(), ["film", str(path), "--output", str(film), "--seconds", "0.2"])
+    assert result.exit_code == 0, result.output
+    replace(run, contact_force=run.contact_force + 5.0).save(path)
+    with pytest.raises(InputError, match="does not come out again here"):
+        source(str(path), {}, 0)
+    replace(run, design={}).save(path)
+    with pytest.raises(InputError, match="written by an older version"):
+        source(str(path), {}, 0)
 
 
 def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):

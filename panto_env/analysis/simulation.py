@@ -44,8 +44,8 @@ def simulate(
     ``observation``, unless that is among the settings. seed: of all that is drawn and the sensors' noise.
     progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
     spans over which a mean force is met, as ``Trajectory.summary`` takes them. watch: called with the task
-    after every control step. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full list is in the signature and in
-    ``help(panto_env.envs.PantographEnv)``.
+    after every control step. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full
+    list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
     A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
     its ``ending`` says where and why.

@@ -44,10 +44,9 @@ def film(
 
     Several policies drive the same line under the same seed, above each other; their figures stand beside.
     """
-    from ..analysis.simulation import simulate
     from ..base.errors import InputError
     from ..control.settings import run_settings
-    from ..render.film import frames, shown
+    from ..render.film import frames, shown, source
 
     if len(policies) > MOST:
         raise InputError(f"A film shows up to {MOST} policies, not {len(policies)}.")
@@ -60,20 +59,21 @@ def film(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
         bar = progress.add_task("running the whole passes", total=len(policies))
-        runs = []
+        sources = []
         for policy in policies:
-            runs.append(simulate(policy=policy, seed=seed, **settings))
+            sources.append(source(policy, settings, seed))
             progress.advance(bar)
-        interval = run_settings(settings).control_interval
-        what = shown(runs[0], interval, first_span, seconds, slow_motion)
+        interval = run_settings(sources[0].settings).control_interval
+        what = shown(sources[0].run, interval, first_span, seconds, slow_motion)
         bar = progress.add_task("drawing", total=1.0)
-        drawn = frames(
-            policies, runs, settings, seed, what, whole, lambda share: progress.update(bar, completed=share)
-        )
-        write_film(drawn, output, what.rate, whole)
-    for run in runs:
-        if run.terminated:
-            console.print(f"{run.policy}: {run.ending}", markup=False, soft_wrap=True)
+
+        def done(share: float) -> None:
+            progress.update(bar, completed=share)
+
+        write_film(frames(sources, what, whole, done), output, what.rate, whole)
+    for each in sources:
+        if each.run.terminated:
+            console.print(f"{each.run.policy}: {each.run.ending}", markup=False, soft_wrap=True)
     console.print(
         f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than life.",
         markup=False,

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.simulation import ready_pass, steps_of_policy
+from ..analysis.simulation import ready_pass, simulate, steps_of_policy
 from ..base.errors import InputError
-from ..control import Task
+from ..control.settings import RunSettings
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
-from ..metrics.trajectory import Trajectory
+from ..metrics.trajectory import SUFFIXES, Trajectory
+from ..plant.catenary import CATENARIES
+from ..plant.pantograph.schema import PantographData
 from ..plant.state import Row
-from ..policies import Policy
 from .moment import moment_of
 from .picture import Picture
 
+SAME = 0.5
+"""By which forces of a pass that is made again may differ (N): another processor rounds otherwise."""
 FASTEST = 25.0
 """Frames per second that a film has at most."""
 
@@ -56,25 +59,57 @@ def shown(run: Trajectory, interval: float, first_span: int, seconds: float, slo
     return Shown(begin, end, every, 1 / (every * interval * slow_motion))
 
 
+@dataclass(frozen=True)
+class Source:
+    """A pass that is filmed: who drives, on what, and the record of it."""
+
+    policy: Any
+    settings: dict[str, Any]
+    seed: int
+    run: Trajectory
+
+
+def source(policy: str, settings: dict[str, Any], seed: int) -> Source:
+    """Of a policy; or of a saved run, "run.parquet", by its own settings and seed, made again.
+
+    Raises InputError where a saved run cannot be made again: its line is not in the file, or it comes out
+    differently here.
+    """
+    if not policy.endswith(SUFFIXES):
+        return Source(policy, settings, seed, simulate(policy=policy, seed=seed, **settings))
+    saved = Trajectory.load(policy)
+    if not saved.design:
+        raise InputError(
+            f"{policy} was written by an older version, without its line and pantograph; simulate it anew "
+            "with `panto simulate --output`."
+        )
+    own = {name: value for name, value in saved.settings.items() if name in RunSettings.model_fields}
+    line = CATENARIES[saved.design["catenary"]["kind"]].schema
+    own["catenary"] = line.model_validate(saved.design["catenary"])
+    own["pantograph"] = PantographData.model_validate(saved.design["pantograph"])
+    again = simulate(policy=saved.policy, seed=saved.seed, **own | {"speed_kmh": saved.speed_kmh})
+    same = len(again.time) == len(saved.time)
+    if not (same and np.allclose(again.contact_force, saved.contact_force, rtol=1e-3, atol=SAME)):
+        raise InputError(
+            f"{policy} does not come out again here: its policy or the program is another one; simulate "
+            "it anew with `panto simulate --output`."
+        )
+    return Source(saved.policy, own | {"speed_kmh": saved.speed_kmh}, saved.seed, saved)
+
+
 def frames(
-    policies: Sequence[Any],
-    runs: Sequence[Trajectory],
-    settings: dict[str, Any],
-    seed: int,
+    sources: Sequence[Source],
     what: Shown,
     size: tuple[int, int],
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Frames, (height, width, 3), of policies above each other.
+    """Frames, (height, width, 3), of passes above each other.
 
-    runs: the whole pass of each, whose figures are told; settings, seed: of all; size: width and height of
-    the film (px); progress: called with the share done.
+    size: width and height of the film (px); progress: called with the share done.
     """
-    width, height = size[0], size[1] // len(policies)
-    passes = [
-        _Pass(ready_pass(policy, settings, seed), run, figures_in_words(run, runs[0]), (width, height))
-        for policy, run in zip(policies, runs, strict=True)
-    ]
+    width, height = size[0], size[1] // len(sources)
+    first = sources[0].run
+    passes = [_Pass(each, figures_in_words(each.run, first), (width, height)) for each in sources]
     number = 0
     while passes[0].time < what.end and all(each.step() for each in passes):
         if passes[0].time < what.begin:
@@ -91,10 +126,9 @@ def frames(
 class _Pass:
     """One policy's pass, drawn as it goes."""
 
-    def __init__(
-        self, ready: tuple[Task, Policy], run: Trajectory, figures: dict[str, str], size: tuple[int, int]
-    ) -> None:
-        self.task, driver = ready
+    def __init__(self, made: Source, figures: dict[str, str], size: tuple[int, int]) -> None:
+        self.task, driver = ready_pass(made.policy, made.settings, made.seed)
+        run = made.run
         self._steps = steps_of_policy(self.task, driver, run.policy)
         self._picture = Picture(*size)
         self._title = f"{run.policy}: pantograph {run.pantograph}, line {run.catenary}"
