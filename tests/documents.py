@@ -187,7 +187,7 @@ def _pip(command, words):
     assert words[0] == "install", command.place
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     for word in words[1:]:
-        wanted = Requirement(word)
+        wanted = Requirement(f"panto-env{word[1:]}" if word.startswith(".") else word)
         assert wanted.name == "panto-env", f"{command.place}: {wanted.name} is not this project"
         unknown = wanted.extras - set(extras)
         assert not unknown, f"{command.place}: there is no extra {', '.join(sorted(unknown))}"
