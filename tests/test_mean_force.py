@@ -29,7 +29,9 @@ def empty_store(tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
     runs = []
     run_passively = Task.run_passively
-    monkeypatch.setattr(Task, "run_passively", lambda self: (runs.append(1), run_passively(self))[1])
+    monkeypatch.setattr(
+        Task, "run_passively", lambda self, watch=None: (runs.append(1), run_passively(self, watch))[1]
+    )
     return tmp_path / "mean_force", runs
 
 

@@ -152,7 +152,9 @@ def test_a_policy_is_shown_what_it_asks_for():
 def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
     runs, whole = [], Task.run_passively
-    monkeypatch.setattr(Task, "run_passively", lambda self: (runs.append(1), whole(self))[1])
+    monkeypatch.setattr(
+        Task, "run_passively", lambda self, watch=None: (runs.append(1), whole(self, watch))[1]
+    )
     make = lambda **given: gymnasium.make(LIGHT, normalise=300, **given).unwrapped.context.layout  # noqa: E731
     first = make()
     assert len(runs) == 1

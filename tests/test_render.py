@@ -1,6 +1,5 @@
 """Pictures show what the plant does: where things are, which way a force points, what is slack or lost."""
 
-import io
 import itertools
 import pickle
 from dataclasses import replace
@@ -8,7 +7,6 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
@@ -22,11 +20,11 @@ from panto_env.plant.state import Place, Row
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import frames, shown, source
+from panto_env.render.film import frames, shown
+from panto_env.render.filmed import policy_pass
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
 from panto_env.render.picture import Picture
-from panto_env.render.strip import Strip, strip
 from panto_env.render.video import write_film
 
 SIZE = (640, 360)
@@ -273,39 +271,24 @@ def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
 
 
 def test_a_film_shows_the_pass_that_simulate_makes():
-    made = source("pd", {"speed_kmh": 300.0, "spans": 14}, 2)
-    what = shown(made.run, 0.01, 10, 0.2, 4.0)
+    settings = {"speed_kmh": 300.0, "spans": 14}
+    filmed = policy_pass("pd", settings, 2)
+    what = shown(filmed, 10, 0.2, 4.0)
     assert what.begin == pytest.approx(9 * 60 / (300 / 3.6))
-    (first, *_) = frames([made], what, SIZE)
+    (first, *_) = frames([filmed], what, SIZE)
+    task = Task(run_settings(settings))
     assert first.shape == (360, 640, 3)
-
-
-def test_a_saved_run_is_filmed_by_its_own_settings_or_refused(tmp_path):
-    path, film = tmp_path / "run.parquet", tmp_path / "film.mp4"
-    own = {"actuator": "realistic", "sensors": "realistic", "line_condition": "as-built", "spans": 14}
-    run = simulate("shinkansen-simple", "identified-2dof", 250.0, "pd", seed=4, **own)
-    run.save(path)
-    again = source(str(path), {}, 0)
-    np.testing.assert_array_equal(again.run.contact_force, run.contact_force)
-    assert again.seed == 4
-    result = CliRunner().invoke(make_app(), ["film", str(path), "--output", str(film), "--seconds", "0.2"])
-    assert result.exit_code == 0, result.output
-    replace(run, contact_force=run.contact_force + 5.0).save(path)
-    with pytest.raises(InputError, match="does not come out again here"):
-        source(str(path), {}, 0)
-    replace(run, design={}).save(path)
-    with pytest.raises(InputError, match="written by an older version"):
-        source(str(path), {}, 0)
+    assert task.plant.time_step == filmed.run.time_step
 
 
 def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
-    run = simulate("periodic-stiffness", "three-mass", 200.0, distance=200.0)
+    short = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 200.0}
     with pytest.raises(InputError, match="before span 10; begin in an earlier one"):
-        shown(run, 0.01, 10, 1.0, 1.0)
+        shown(policy_pass("passive", short, 0), 10, 1.0, 1.0)
     with pytest.raises(InputError, match=r"must end in one of \.mp4, \.gif"):
         write_film([], tmp_path / "film.avi", 25, SIZE)
     for arguments, words in (
-        (["passive"] * 5, "up to 4 policies, not 5"),
+        (["passive"] * 5, "up to 4 passes, not 5"),
         (["passive", "--size", "641", "480"], "even numbers of pixels"),
     ):
         result = CliRunner().invoke(make_app(), ["film", *arguments, "--output", str(tmp_path / "film.mp4")])
@@ -342,45 +325,3 @@ def test_wrong_arguments_are_refused(arguments, words):
 def test_a_lane_that_is_not_there_is_refused():
     with pytest.raises(InputError, match="render_lanes has lane 4, but lanes are 0 to 3"):
         gymnasium.make_vec("Pantograph-v0", num_envs=4, render_lanes=(0, 4))
-
-
-def test_a_run_that_is_watched_is_the_same_run():
-    for policy in (None, "pd"):
-        seen = []
-        plain = simulate("periodic-stiffness", "three-mass", 300.0, policy, distance=300.0)
-        watched = simulate(
-            "periodic-stiffness", "three-mass", 300.0, policy, distance=300.0, watch=seen.append
-        )
-        np.testing.assert_array_equal(plain.contact_force, watched.contact_force)
-        assert watched.policy == plain.policy
-        assert len(seen) == round(300.0 / (300 / 3.6 * 0.01))
-
-
-def test_a_terminal_shows_the_force_as_bars():
-    now = moment(driven(steps=200))
-    shown = strip(replace(now, filtered=np.full(len(now.filtered), now.largest_force / 2))).plain.splitlines()
-    bars = [line[8:] for line in shown[:12]]
-    assert [bar[-1] for bar in bars] == [" "] * 6 + ["█"] * 6
-    assert "350 N" in shown[0]
-    assert "!" not in shown[12].removesuffix("! no contact")
-    lost = strip(replace(now, filtered=np.zeros(len(now.filtered)))).plain.splitlines()
-    assert "!" in lost[12].removesuffix("! no contact")
-    assert f"{now.position:.0f} m" in shown[13]
-
-
-def test_a_strip_leaves_the_terminal_as_it_was():
-    written = io.StringIO()
-    console = Console(file=written, force_terminal=True, width=100)
-    with Strip(console) as drawn:
-        task = driven(steps=50)
-        for _ in range(12):
-            task.step(np.zeros((1, 1)))
-            drawn(task)
-    assert "contact force" in written.getvalue()
-    assert "\x1b[?25h" in written.getvalue()  # the cursor is back
-
-
-def test_live_says_so_where_there_is_no_terminal():
-    command = ["simulate", "--live", "--distance", "1140", "--json"]
-    result = CliRunner().invoke(make_app(), command)
-    assert result.exit_code == 0, result.output

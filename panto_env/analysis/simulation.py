@@ -9,11 +9,9 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Array
 from ..base.errors import InputError
-from ..control import Context, Task, passive_mean, trim_of_pass
+from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
@@ -32,9 +30,9 @@ def simulate(
     *,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    watch: Callable[[Task], None] | None = None,
     record_droppers: bool = True,
     evaluated: SpanChoice = None,
-    watch: Callable[[Task], None] | None = None,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
@@ -42,10 +40,11 @@ def simulate(
     policy: None, a name ("pd"), a model file, or an object with reset and act, which is called by its
     ``name`` if it has one, else by its class; it is shown the observation that it asks for by an attribute
     ``observation``, unless that is among the settings. seed: of all that is drawn and the sensors' noise.
-    progress: called with the share done. record_droppers: keep the tension of every dropper. evaluated:
-    spans over which a mean force is met, as ``Trajectory.summary`` takes them. watch: called with the task
-    after every control step. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full
-    list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
+    progress: called with the share done. watch: called with the task that runs, whose lane 0 this is, after
+    each control step, without a policy after some together; it must change nothing. record_droppers: keep
+    the tension of every dropper. evaluated: spans over which a mean force is met, as ``Trajectory.summary``
+    takes them. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full list is in
+    the signature and in ``help(panto_env.envs.PantographEnv)``.
 
     A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
     its ``ending`` says where and why.
@@ -60,13 +59,14 @@ def simulate(
     given |= wishes(driver) | settings
     task = _ready(given, seed, evaluated, record_droppers)
     if driver is None:
-        if watch is None:
-            task.run_passively()
-        else:
-            run_policy(task, _Idle(), "passive", progress, watch)
+        task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)
     name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
-    run_policy(task, driver, name, progress, watch)
+    for share in steps_of_policy(task, driver, name):
+        if progress is not None:
+            progress(share)
+        if watch is not None:
+            watch(task)
     return task.trajectory(0, policy=name, seed=seed, last=True)
 
 
@@ -88,38 +88,12 @@ def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, 
     return _ready(wishes(driver) | settings, seed, None, record_droppers=False), driver
 
 
-class _Idle:
-    """A driver that leaves its actuators alone: the passive pantograph, step by step."""
-
-    def reset(self, context: Context) -> None:
-        self._action = np.zeros(context.actions)
-
-    def act(self, observation: NDArray[np.float32]) -> Array:
-        return self._action
-
-
-def run_policy(
-    task: Task,
-    policy: Policy,
-    name: str,
-    progress: Callable[[float], None] | None = None,
-    watch: Callable[[Task], None] | None = None,
-) -> None:
-    """Drive lane 0, already reset, to the end of its run; name: of the policy, for errors.
-
-    progress, watch: called after every control step, with the share done and with the task.
-
-    Raises InputError where the policy fails, or its action is not finite or not of the right shape.
-    """
-    for share in steps_of_policy(task, policy, name):
-        if progress is not None:
-            progress(share)
-        if watch is not None:
-            watch(task)
-
-
 def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
-    """The same, a control step at a time; yields the share done after each."""
+    """Drive lane 0, already reset, to the end of its run; yields the share done after each control step.
+
+    name: of the policy, for errors. Raises InputError where the policy fails, or its action is not finite or
+    not of the right shape.
+    """
     with errors_name(name, "reset"):
         policy.reset(task.context(0))
     results, shape = task.results, (len(task.actuator.places),)

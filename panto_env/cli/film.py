@@ -1,4 +1,4 @@
-"""``panto film``: a film of one policy, or of several above each other."""
+"""``panto film``: a film of one policy or saved run, or of several above each other."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress
 
-from ..analysis.options import Seed, with_settings
+from ..analysis.options import RENAMED, with_settings
 from ..render.video import FILMS, write_film
 from ..terminal import console, progress_console, writable
 
 MOST = 4
-"""Policies in one film."""
+"""Passes in one film."""
 
 
 @with_settings(left_out=("observation",))
@@ -21,7 +21,8 @@ def film(
     policies: Annotated[
         list[str],
         typer.Argument(
-            help="Policies, above each other: a name, name:key=value,..., a model file, file.py:Class."
+            help="What is shown, above each other: a policy as a name, name:key=value,..., a model file or "
+            "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then hold for all."
         ),
     ],
     output: Annotated[
@@ -38,42 +39,57 @@ def film(
         tuple[int, int] | None,
         typer.Option(help="Width and height (px); by default 1280 x 720, twice 480 high for two policies."),
     ] = None,
-    seed: Seed = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Seed of irregularity and noise; 0, unless a saved run has its own."),
+    ] = None,
 ) -> None:
     """Write a film of a pass along a line: wires, pantograph, actuator and contact force.
 
     Several policies drive the same line under the same seed, above each other; their figures stand beside.
+    A saved run is made anew from its settings, and refused where its contact force comes out another.
     """
     from ..base.errors import InputError
-    from ..control.settings import run_settings
-    from ..render.film import frames, shown, source
+    from ..render.film import frames, shown
+    from ..render.filmed import Filmed, check_together, policy_pass, saved_passes
 
     if len(policies) > MOST:
-        raise InputError(f"A film shows up to {MOST} policies, not {len(policies)}.")
+        raise InputError(f"A film shows up to {MOST} passes, not {len(policies)}.")
     whole = size or (1280, 720 if len(policies) == 1 else 480 * len(policies))
-    if any(pixels % (2 * len(policies)) or not 64 <= pixels <= 4096 for pixels in whole):
+    even = whole[0] % 2 == 0 and whole[1] % (2 * len(policies)) == 0
+    if not (even and all(64 <= pixels <= 4096 for pixels in whole)):
         raise InputError(
-            f"The size must be even numbers of pixels, from 64 to 4096, for each policy's part, not {whole}."
+            f"The size must be even numbers of pixels from 64 to 4096, and the height for each pass's part, "
+            f"not {whole}."
         )
+    saved = saved_passes(policies)
+    if saved:
+        check_together(list(saved.values()))  # before any work begins
+        first = next(iter(saved.values()))
+        given = [f"--{RENAMED.get(name, name).replace('_', '-')}" for name in settings]
+        given += [] if seed is None else ["--seed"]
+        if given:
+            raise InputError(
+                f"All settings of the film are those of {first.file}; leave out {', '.join(given)}."
+            )
+        settings, seed = first.settings, first.seed
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
         bar = progress.add_task("running the whole passes", total=len(policies))
-        sources = []
+        filmed: list[Filmed] = []
         for policy in policies:
-            sources.append(source(policy, settings, seed))
+            each = saved.get(policy) or policy_pass(policy, settings, seed or 0)
+            each.check()
+            filmed.append(each)
             progress.advance(bar)
-        interval = run_settings(sources[0].settings).control_interval
-        what = shown(sources[0].run, interval, first_span, seconds, slow_motion)
+        what = shown(filmed[0], first_span, seconds, slow_motion)
         bar = progress.add_task("drawing", total=1.0)
-
-        def done(share: float) -> None:
-            progress.update(bar, completed=share)
-
-        write_film(frames(sources, what, whole, done), output, what.rate, whole)
-    for each in sources:
+        drawn = frames(filmed, what, whole, lambda share: progress.update(bar, completed=share))
+        write_film(drawn, output, what.rate, whole)
+    for each in filmed:
         if each.run.terminated:
-            console.print(f"{each.run.policy}: {each.run.ending}", markup=False, soft_wrap=True)
+            console.print(f"{each.title}: {each.run.ending}", markup=False, soft_wrap=True)
     console.print(
         f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than life.",
         markup=False,

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -32,7 +35,7 @@ def simulate(
     ] = None,
     plot: Plot = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Draw the contact force in the terminal while it runs.")
+        bool, typer.Option("--live", help="Draw force and heights in the terminal while the run goes on.")
     ] = False,
     json: Json = False,
 ) -> None:
@@ -42,20 +45,10 @@ def simulate(
     chosen = parse_spans(spans)
     if plot is not None:
         from ..analysis.plots import plot_run, save
-    given = {"policy": policy, "seed": seed, "evaluated": chosen, **settings}
-    if live and progress_console.is_terminal:
-        from ..render.strip import Strip
-
-        with Strip(progress_console) as strip:
-            trajectory = run(watch=strip, **given)
-    else:
-        with Progress(
-            console=progress_console, transient=True, disable=not progress_console.is_terminal
-        ) as progress:
-            bar = progress.add_task("simulating", total=1.0)
-            trajectory = run(progress=lambda share: progress.update(bar, completed=share), **given)
-        if live:
-            progress_console.print("--live draws on a terminal alone, and this is none.")
+    with _shown(live, policy or "passive") as (progress, watch):
+        trajectory = run(
+            policy=policy, seed=seed, evaluated=chosen, progress=progress, watch=watch, **settings
+        )
     if output is not None:
         trajectory.save(output)
     if plot is not None:
@@ -84,6 +77,26 @@ def simulate(
         )
     console.print(table)
     print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
+
+
+@contextmanager
+def _shown(
+    live: bool, policy: str
+) -> Iterator[tuple[Callable[[float], None] | None, Callable[[Any], None] | None]]:
+    """What tells a person how far a run is, a bar or the run itself: ``progress`` and ``watch`` of a run."""
+    if live and console.is_terminal and not console.is_dumb_terminal:
+        from ..render.live import live as on_terminal
+
+        with on_terminal(console, policy) as watch:
+            yield None, watch
+        return
+    if live:
+        print("panto: --live needs a terminal to draw in; the run goes on without.", file=sys.stderr)
+    with Progress(
+        console=progress_console, transient=True, disable=not progress_console.is_terminal
+    ) as progress:
+        bar = progress.add_task("simulating", total=1.0)
+        yield lambda share: progress.update(bar, completed=share), None
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from ..base.files import finite
 from ..base.version import __version__
+from ..plant.catenary import CATENARIES
+from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
@@ -31,6 +34,25 @@ def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, 
     came_to = {"time_step": plant.time_step, "spans": plant.spans, "distance": distance}
     grid = plant.model.grid or dict.fromkeys(("spacing", "window", "precision"))
     return {"version": __version__, **plain(settings), **came_to, **grid}
+
+
+def settings_of(identity: Mapping[str, Any], design: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that a run of this identity was made with, to make it anew; the inverse of ``identity``.
+
+    design: line and pantograph by value, as ``Trajectory.design`` has them. What only a policy sees is not
+    among the settings. Raises KeyError or ValueError where something is missing or not valid.
+    """
+    line = design["catenary"]
+    values = {
+        name: value
+        for name, value in identity.items()
+        if name in RunSettings.model_fields and value is not None  # what is None was not asked for
+    }
+    values["catenary"] = CATENARIES[line["kind"]].schema.model_validate(line)
+    values["pantograph"] = PantographData.model_validate(design["pantograph"])
+    if "known_pantograph" in values:
+        values["known_pantograph"] = PantographData.model_validate(values["known_pantograph"])
+    return values
 
 
 def _data(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -319,12 +320,17 @@ class Task:
         plant = self.plant
         return [*plant.run.table, *plant.actuators.table, *self.sensors.tables, self.episode.table]
 
-    def run_passively(self) -> None:
-        """Run all lanes, just reset, to their ends without actuators."""
+    def run_passively(self, watch: Callable[[Task], None] | None = None) -> None:
+        """Run all lanes, just reset, to their ends without actuators.
+
+        watch: called with the task now and then, after some control steps; it must change nothing.
+        """
         ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
         while not ended.all():
             self.coast(np.where(ended, 0, at_once), self.results)
             ended = self.results.terminated | self.results.truncated
+            if watch is not None:
+                watch(self)
 
     @property
     def _one_by_one(self) -> bool:

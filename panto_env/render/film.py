@@ -1,29 +1,23 @@
-"""Films of policies on one line, above each other, each in a pass of its own under the same seed."""
+"""Films of passes above each other, such as several policies on one line under the same seed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.simulation import ready_pass, simulate, steps_of_policy
+from ..analysis.simulation import ready_pass, steps_of_policy
 from ..base.errors import InputError
-from ..control.settings import RunSettings
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
-from ..metrics.trajectory import SUFFIXES, Trajectory
-from ..plant.catenary import CATENARIES
-from ..plant.pantograph.schema import PantographData
 from ..plant.state import Row
+from .filmed import Filmed, alike
 from .moment import moment_of
 from .picture import Picture
 
-SAME = 0.5
-"""By which forces of a pass that is made again may differ (N): another processor rounds otherwise."""
 FASTEST = 25.0
 """Frames per second that a film has at most."""
 
@@ -37,18 +31,14 @@ class Shown:
     every: int  # control steps from frame to frame
     rate: float  # frames per second
 
-    @property
-    def frames(self) -> int:
-        """How many frames the film has, unless a pass ends before."""
-        return int((self.end - self.begin) * self.rate)
 
-
-def shown(run: Trajectory, interval: float, first_span: int, seconds: float, slow_motion: float) -> Shown:
+def shown(first: Filmed, first_span: int, seconds: float, slow_motion: float) -> Shown:
     """What a film of a pass shows: so many seconds from the start of a span on.
 
-    interval: of control (s). Frames are control steps, all of them or every so many-th. Raises InputError
-    where the pass has no such span.
+    Frames are control steps, all of them or every so many-th. Raises InputError where the pass has no such
+    span.
     """
+    run, interval = first.run, first.control_interval
     begin = (first_span - 1) * run.span_length / (run.speed_kmh / 3.6)
     if begin >= run.time[-1]:
         raise InputError(
@@ -59,46 +49,8 @@ def shown(run: Trajectory, interval: float, first_span: int, seconds: float, slo
     return Shown(begin, end, every, 1 / (every * interval * slow_motion))
 
 
-@dataclass(frozen=True)
-class Source:
-    """A pass that is filmed: who drives, on what, and the record of it."""
-
-    policy: Any
-    settings: dict[str, Any]
-    seed: int
-    run: Trajectory
-
-
-def source(policy: str, settings: dict[str, Any], seed: int) -> Source:
-    """Of a policy; or of a saved run, "run.parquet", by its own settings and seed, made again.
-
-    Raises InputError where a saved run cannot be made again: its line is not in the file, or it comes out
-    differently here.
-    """
-    if not policy.endswith(SUFFIXES):
-        return Source(policy, settings, seed, simulate(policy=policy, seed=seed, **settings))
-    saved = Trajectory.load(policy)
-    if not saved.design:
-        raise InputError(
-            f"{policy} was written by an older version, without its line and pantograph; simulate it anew "
-            "with `panto simulate --output`."
-        )
-    own = {name: value for name, value in saved.settings.items() if name in RunSettings.model_fields}
-    line = CATENARIES[saved.design["catenary"]["kind"]].schema
-    own["catenary"] = line.model_validate(saved.design["catenary"])
-    own["pantograph"] = PantographData.model_validate(saved.design["pantograph"])
-    again = simulate(policy=saved.policy, seed=saved.seed, **own | {"speed_kmh": saved.speed_kmh})
-    same = len(again.time) == len(saved.time)
-    if not (same and np.allclose(again.contact_force, saved.contact_force, rtol=1e-3, atol=SAME)):
-        raise InputError(
-            f"{policy} does not come out again here: its policy or the program is another one; simulate "
-            "it anew with `panto simulate --output`."
-        )
-    return Source(saved.policy, own | {"speed_kmh": saved.speed_kmh}, saved.seed, saved)
-
-
 def frames(
-    sources: Sequence[Source],
+    filmed: Sequence[Filmed],
     what: Shown,
     size: tuple[int, int],
     progress: Callable[[float], None] | None = None,
@@ -107,9 +59,8 @@ def frames(
 
     size: width and height of the film (px); progress: called with the share done.
     """
-    width, height = size[0], size[1] // len(sources)
-    first = sources[0].run
-    passes = [_Pass(each, figures_in_words(each.run, first), (width, height)) for each in sources]
+    width, height = size[0], size[1] // len(filmed)
+    passes = [_Pass(each, figures_in_words(each, filmed[0]), (width, height)) for each in filmed]
     number = 0
     while passes[0].time < what.end and all(each.step() for each in passes):
         if passes[0].time < what.begin:
@@ -124,14 +75,14 @@ def frames(
 
 
 class _Pass:
-    """One policy's pass, drawn as it goes."""
+    """One pass, drawn as it goes."""
 
-    def __init__(self, made: Source, figures: dict[str, str], size: tuple[int, int]) -> None:
-        self.task, driver = ready_pass(made.policy, made.settings, made.seed)
-        run = made.run
+    def __init__(self, filmed: Filmed, figures: dict[str, str], size: tuple[int, int]) -> None:
+        run = filmed.run
+        self.task, driver = ready_pass(filmed.policy, filmed.settings, filmed.seed)
         self._steps = steps_of_policy(self.task, driver, run.policy)
         self._picture = Picture(*size)
-        self._title = f"{run.policy}: pantograph {run.pantograph}, line {run.catenary}"
+        self._title = f"{filmed.title}: pantograph {run.pantograph}, line {run.catenary}"
         self._figures = figures
 
     @property
@@ -148,14 +99,18 @@ class _Pass:
         return self._picture.draw(moment_of(self.task, 0, self._title, self._figures))
 
 
-def figures_in_words(run: Trajectory, first: Trajectory) -> dict[str, str]:
-    """Mean and σ of a whole pass, and by how much its σ differs from that of the first one."""
+def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
+    """Mean and σ of a whole pass, and by how much its σ differs from that of the first one.
+
+    The difference is told only of passes that differ in their control alone.
+    """
+    run = filmed.run
     if run.terminated:
         return {"figures": "none: it ends early"}
     figures, spans = run.summary(), in_words(run.spans())
     values = {"mean": figures.mean, "std": figures.std}
     told = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
-    if run is not first and not first.terminated:
-        change = 100 * (figures.std / first.summary().std - 1)
-        told[f"σ beside {first.policy}"] = f"{change:+.1f} %"
+    if filmed is not first and not first.run.terminated and alike(filmed.run, first.run):
+        change = 100 * (figures.std / first.run.summary().std - 1)
+        told[f"σ beside {first.title}"] = f"{change:+.1f} %"
     return told

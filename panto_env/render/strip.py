@@ -1,77 +1,134 @@
-"""A run drawn in the terminal as it goes: the contact force over the last span, and numbers."""
+"""The contact as text for a terminal: force and height of the head along the last spans."""
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Self
-
 import numpy as np
-from rich.console import Console
-from rich.live import Live
+from numpy.typing import NDArray
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from ..base.arrays import Array
 from ..control import Task
-from .moment import Moment, moment_of
+from ..metrics import en50367
+from ..plant.state import Row
+from .moment import Felt, felt, position_of
 
-ROWS, COLUMNS = 12, 72
-"""Of the chart, in letters."""
-EIGHTHS = " ▁▂▃▄▅▆▇█"
-EVERY = 5
-"""Control steps between two drawings: twenty a second at 10 ms, were it to run in real time."""
+SPANS = 3.0
+"""How much of the line is shown (spans)."""
+FORCE_ROWS, HEIGHT_ROWS = 10, 6
+NARROW, WIDE = 40, 120
+"""Columns that are drawn at least and at most."""
+AXIS = 9
+"""Columns of the numbers beside a chart."""
+EMPTY = "\u2800"
+DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+"""Of a character of Unicode's Braille patterns: four rows of two dots."""
 
 
 class Strip:
-    """Draws lane 0 of a task, call after call; within a ``with``, at whose end the terminal is as before."""
+    """What a task's first lane has felt, drawn as wide as the terminal is."""
 
-    def __init__(self, console: Console) -> None:
-        """console: where to draw."""
-        self._live = Live(console=console, transient=True, refresh_per_second=20)
-        self._steps = 0
+    def __init__(self, task: Task, policy: str) -> None:
+        """policy: its name. The task must keep its samples."""
+        plant = task.plant
+        where = f"{plant.pantograph.name} on {plant.catenary.name} at {3.6 * task.speed[0]:.4g} km/h"
+        self._title = f"{where}, policy {policy}"
+        self._share = plant.of(0, Row.STEP) / task.end(0)
+        self._felt, self._position = felt(task, 0, SPANS), position_of(task, 0)
+        self._span = plant.catenary.span_length
+        self._time = plant.of(0, Row.STEP) * plant.time_step
+        self._limit = en50367.maximum_limit(float(task.speed[0]))
 
-    def __enter__(self) -> Self:
-        self._live.start()
-        return self
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        width = max(NARROW, min(options.max_width, WIDE))
+        columns = width - AXIS
+        seen, length = self._felt, SPANS * self._span
+        begin = max(0.0, self._position - length)
+        across = (seen.places - begin) / length * columns  # columns from the left
+        yield Text(self._title, style="bold", no_wrap=True, overflow="ellipsis")
+        done = round(self._share * width)
+        yield Text.assemble(("━" * done, "bright_blue"), ("━" * (width - done), "dim"))
+        yield Text("contact force (N), low-passed at 20 Hz; ╌ limit of EN 50367; x contact lost", style="dim")
+        yield from self._force_chart(across, columns)
+        yield Text("height of the head (mm); 0: contact wire at a support", style="dim")
+        yield from chart(across, 1e3 * seen.head, _round(1e3 * seen.head), HEIGHT_ROWS, columns)
+        ends = f"{begin:.0f} m", f"{begin + length:.0f} m"
+        yield Text(" " * AXIS + ends[0] + ends[1].rjust(columns - len(ends[0])), style="dim")
+        yield Text(_in_words(seen, self._time, self._position, self._span))
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._live.stop()
-
-    def __call__(self, task: Task) -> None:
-        """Draw what the task is doing now, every few steps."""
-        self._steps += 1
-        if self._steps % EVERY == 1:
-            self._live.update(strip(moment_of(task, 0, "", {})))
+    def _force_chart(self, across: Array, columns: int) -> list[Text]:
+        """The low-passed force from 0 to beyond its limit, and where contact was lost."""
+        seen = self._felt
+        highest = max(self._limit, float(seen.filtered.max(initial=0.0)))
+        lines = chart(across, seen.filtered, (0.0, 1.1 * highest), FORCE_ROWS, columns, self._limit)
+        marks = np.full(columns, " ")
+        marks[_column(across[seen.force <= 0], columns)] = "x"
+        return [*lines, Text.assemble(" " * AXIS, ("".join(marks), "bold red"))]
 
 
-def strip(moment: Moment) -> Text:
-    """The force as bars, low-passed, the latest at the right; below it the wire's height and numbers."""
-    force = binned(moment.places, moment.filtered, moment.position, moment.span_length)
-    text = Text()
-    filled = np.nan_to_num(np.clip(force / moment.largest_force, 0.0, 1.0)) * ROWS
-    for row in reversed(range(ROWS)):
-        level = moment.largest_force * (row + 1) / ROWS
-        bars = "".join(EIGHTHS[round(8 * min(max(each - row, 0.0), 1.0))] for each in filled)
-        text.append(f"{level:5.0f} N ", style="dim")
-        text.append(f"{bars}\n", style="blue")
-    marks = "".join("!" if each <= 0 else " " for each in np.nan_to_num(force, nan=1.0))
-    text.append(f"        {marks}  ! no contact\n", style="red" if "!" in marks else "dim")
-    now = moment.filtered[-1] if moment.filtered.size else moment.nominal_force
-    text.append(
-        f"{moment.position:7.0f} m, {moment.time:6.2f} s   contact force {now:4.0f} N   "
-        f"wire {1e3 * moment.wire:+4.0f} mm   "
-        + "   ".join(f"{place.name.lower()} {value:+4.0f} N" for place, value in moment.actuators.items())
+def chart(
+    across: Array,
+    values: Array,
+    extent: tuple[float, float],
+    rows: int,
+    columns: int,
+    line: float | None = None,
+) -> list[Text]:
+    """A curve in Braille, as rows of text, with the ends of its extent beside it.
+
+    across: (n,), rising, in columns from the left; values: (n,); extent: lowest and highest value drawn, at
+    whose edge lies what is beyond; line: value at which a level line is drawn.
+    """
+    low, high = extent
+    dots = np.zeros((4 * rows, 2 * columns), dtype=bool)
+    up = np.clip((values - low) / (high - low), 0.0, 1.0) * (4 * rows - 1)
+    place = _column(2 * across, 2 * columns)
+    level = 4 * rows - 1 - np.round(up).astype(int)
+    # A curve's neighbours are joined, so that it has no gaps where it is steep.
+    for k in range(len(place)):
+        first, last = sorted((level[k], level[max(0, k - 1)]))
+        dots[first : last + 1, place[k]] = True
+    beside = {0: f"{high:.0f}", rows - 1: f"{low:.0f}"}
+    lined = None
+    if line is not None:
+        lined = round((high - line) / (high - low) * (rows - 1))
+        beside[lined] = f"{line:.0f}"
+    texts = []
+    for row, characters in enumerate(_characters(dots)):
+        text = Text.assemble((f"{beside.get(row, ''):>{AXIS - 2}} │", "dim"), no_wrap=True, overflow="crop")
+        curve = "".join(characters)
+        text.append(curve.replace(EMPTY, "╌") if row == lined else curve, style="bright_blue")
+        if row == lined:
+            text.highlight_regex("╌+", style="red")
+        texts.append(text)
+    return texts
+
+
+def _characters(dots: NDArray[np.bool_]) -> NDArray[np.str_]:
+    """Braille of dots, (4 rows, 2 columns), as (rows, columns)."""
+    rows, columns = dots.shape[0] // 4, dots.shape[1] // 2
+    cells = dots.reshape(rows, 4, columns, 2).transpose(0, 2, 1, 3)
+    codes = ord(EMPTY) + (cells * DOTS).sum(axis=(2, 3))
+    return np.array([[chr(code) for code in row] for row in codes.tolist()])
+
+
+def _column(across: Array, columns: int) -> NDArray[np.intp]:
+    return np.asarray(np.clip(across.astype(int), 0, columns - 1))
+
+
+def _round(heights: Array) -> tuple[float, float]:
+    """Tens of millimetres about heights (mm)."""
+    if not heights.size:
+        return 0.0, 10.0
+    low, high = 10 * np.floor(heights.min() / 10), 10 * np.ceil(heights.max() / 10)
+    return float(low), float(max(high, low + 10))
+
+
+def _in_words(seen: Felt, time: float, position: float, span_length: float) -> str:
+    if not seen.filtered.size:
+        return f"{time:.2f} s  {position:.0f} m"
+    force, span = seen.filtered, int(seen.places[-1] // span_length) + 1
+    return (
+        f"{time:.2f} s  {position:.0f} m, span {span}  force {force[-1]:.0f} N  "
+        f"of what is shown: mean {force.mean():.0f} N, σ {force.std():.0f} N"
     )
-    return text
-
-
-def binned(places: Array, values: Array, position: float, span_length: float) -> Array:
-    """Values at places up to ``position`` (m) in bins over the last span: means, nan where none."""
-    edges = np.linspace(position - span_length, position, COLUMNS + 1)
-    which = np.digitize(places, edges) - 1
-    inside = (which >= 0) & (which < COLUMNS)
-    count = np.bincount(which[inside], minlength=COLUMNS)
-    total = np.bincount(which[inside], weights=values[inside], minlength=COLUMNS)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(total / count)

@@ -1,0 +1,83 @@
+"""The passes of a film: policies under settings, and saved runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..analysis.saved_run import check_made_anew, is_saved_run, load_with_settings
+from ..analysis.simulation import simulate
+from ..base.errors import InputError
+from ..control.settings import run_settings
+from ..metrics.trajectory import Trajectory
+
+OF_CONTROL = ("version", "actuator", "sensors", "estimator", "known_pantograph")
+"""What of a run's settings may differ where two runs are told as one line under two controls."""
+
+
+class Filmed(NamedTuple):
+    """One pass of a film."""
+
+    title: str  # what a picture calls it
+    policy: Any
+    settings: dict[str, Any]
+    seed: int
+    run: Trajectory  # the whole pass, of which figures are told
+    file: str = ""  # that it was saved to; empty: it was not
+
+    @property
+    def control_interval(self) -> float:
+        """Time between two actions (s)."""
+        return run_settings(self.settings).control_interval
+
+    def check(self) -> None:
+        """Raise InputError where it is a saved run that comes out another one today."""
+        if self.file:
+            check_made_anew(self.run, self.settings, self.file)
+
+
+def saved_passes(sources: Sequence[str]) -> dict[str, Filmed]:
+    """Those of the sources that are files of saved runs. Raises InputError where one cannot be read."""
+    found = {}
+    for source in sources:
+        if is_saved_run(source):
+            run, settings = load_with_settings(source)
+            title = f"{run.policy} ({Path(source).name})"
+            found[source] = Filmed(title, run.policy, settings, run.seed, run, source)
+    return found
+
+
+def policy_pass(policy: str, settings: dict[str, Any], seed: int) -> Filmed:
+    """The pass of a policy, simulated. Raises InputError as ``simulate`` does."""
+    run = simulate(policy=policy, seed=seed, **settings)
+    return Filmed(run.policy, policy, settings, seed, run)
+
+
+def check_together(filmed: Sequence[Filmed]) -> None:
+    """Raise InputError unless passes can stand above each other: in step, the same spans at the same time."""
+    first = filmed[0]
+    for other in filmed[1:]:
+        pairs = {
+            "speed (km/h)": (first.run.speed_kmh, other.run.speed_kmh),
+            "span length (m)": (first.run.span_length, other.run.span_length),
+            "control_interval (s)": (first.control_interval, other.control_interval),
+        }
+        for name, (one, two) in pairs.items():
+            if abs(one - two) > 1e-9 * abs(one):
+                raise InputError(
+                    f"Passes above each other must have the same {name}, but {first.title} has {one:g} and "
+                    f"{other.title} {two:g}; make a film of each."
+                )
+
+
+def alike(one: Trajectory, other: Trajectory) -> bool:
+    """Whether two runs differ in their control alone."""
+    return _but_for_control(one) == _but_for_control(other)
+
+
+def _but_for_control(run: Trajectory) -> str:
+    """As text, in which what is no number is like itself, too."""
+    settings = {name: value for name, value in run.settings.items() if name not in OF_CONTROL}
+    return json.dumps([settings, run.design, run.seed, run.speed_kmh, run.nominal_force], sort_keys=True)
