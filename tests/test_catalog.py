@@ -413,7 +413,7 @@ BAD: list[tuple[str, str, str, str, str]] = [
     ("line", "spans = 5", "spans = 2", "spans", "a whole number from 3 to 1,000 (given: 2)"),
     ("line", "spans = 5", "spans = 5.5", "spans", "a whole number from 3 to 1,000 (given: 5.5)"),
     ("spring", "= 0.4", "= 1.0", "stiffness_variation", "a number from 0 to 0.99 (given: 1.0)"),
-    ("spring", "mean_stiffness = 4000", "", "mean_stiffness", "missing: k_m (N/m)"),
+    ("spring", "mean_stiffness = 4000", "", "mean_stiffness", "missing: mean stiffness k_m (N/m)"),
 ]
 
 
