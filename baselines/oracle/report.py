@@ -9,6 +9,7 @@ import numpy as np
 
 from panto_env.analysis.plots import mark_supports
 from panto_env.base.colours import BLUE
+from panto_env.base.legend import legend_above
 from panto_env.base.table import Table
 from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
@@ -150,6 +151,6 @@ def plot(oracle: Oracle) -> Figure:
     search.axhline(problem.figures.std, color="0.6", linestyle=":", label="passive")
     search.set(xlabel="iteration", ylabel="σ (N)", ylim=(0, None))
     for axis in (force, actuator, search):
-        axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize="small", frameon=False)
+        legend_above(axis)
     figure.suptitle(f"{title(oracle)}: σ {100 * oracle.change:+.1f} %")
     return figure

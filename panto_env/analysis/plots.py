@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.colours import BLUE, GREEN, LIMIT, PURPLE, VERMILION
 from ..base.files import PICTURES, check_output, write_whole
+from ..base.legend import legend_above
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.spans import SpanChoice, Spans, in_words, limits, within
@@ -52,7 +53,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
         axis.set(ylabel="actuator force (N)")
     for axis in figure.axes:
         mark_supports(axis, run)
-        _legend_above(axis)
+        legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else limits(covered, run.span_length)
     figure.axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(run, covered)}", xlim=(begin, end))
     where = f"pantograph {run.pantograph}, line {run.catenary}, {run.speed_kmh:g} km/h"
@@ -72,7 +73,7 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
         note = ", ended early" if run.terminated else ""
         axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
         mark_supports(axis, run)
-    _legend_above(axes[0])
+    legend_above(axes[0])
     axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(runs[0], spans)}", xlim=limits(spans, runs[0].span_length))
     figure.suptitle(title)
     return figure
@@ -112,11 +113,6 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
     axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
     axis.set(ylabel="contact force (N)")
-
-
-def _legend_above(axis: Axes) -> None:
-    """A legend that covers no data."""
-    axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize="small", frameon=False)
 
 
 def _not_shown(run: Trajectory, shown: Spans | None) -> str:

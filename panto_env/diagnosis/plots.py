@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.colours import BLUE, LIMIT, ORANGE
+from ..base.legend import legend_above
 from .diagnosis import Diagnosis
 from .tables import place
 
@@ -37,20 +38,11 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {finding.span}, {place(finding)}"
-        force.annotate(
-            words,
-            (finding.position, 1.0),
-            (3, -4),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            rotation=90,
-            va="top",
-            fontsize="small",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
-        )
+        above = force.get_xaxis_transform()
+        force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
     score.set(
         ylabel="score (-)", xlabel="position (m); grey lines: supports", xlim=(diagnosis.begin, diagnosis.end)
     )
-    score.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize="small", frameon=False)
+    legend_above(score, 3)
     figure.suptitle(title)
     return figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..base.arrays import Array
 from ..base.colours import BLUE, LIMIT, ORANGE
+from ..base.legend import legend_above
 from ..metrics.low_pass import low_pass_in_place
 from .estimate import Estimate
 from .verdict import WINDOW_NIS
@@ -37,7 +38,7 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     drawn = low_pass_in_place(estimate.force, step)[shown]
     force.plot(time, drawn, color="black", linewidth=1, label="estimated")
     force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
-    force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, fontsize="small", frameon=False)
+    legend_above(force, 2)
     tested = estimate.consistency
     innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3)
     innovations.axhline(1.0, color="0.4", linestyle=":")

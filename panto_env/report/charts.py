@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.colours import BLUE, LIMIT, series_colour
+from ..base.legend import legend_above
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.spectrum import amplitudes
@@ -55,7 +56,7 @@ def force_along(one: Findings) -> str:
             axes.axvline(support * run.span_length, color="0.85", linewidth=0.8, zorder=0)
         axes.set(xlabel="position (m); grey lines: supports", ylabel="contact force (N)")
         axes.set_xlim(position[0], position[-1])
-        _legend(axes)
+        legend_above(axes, 4)
 
     return drawn(draw)
 
@@ -75,7 +76,7 @@ def force_folded(found: Sequence[Findings]) -> str:
             xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1)
         )
         axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
-        _legend(axes)
+        legend_above(axes, 4)
 
     return drawn(draw)
 
@@ -99,7 +100,7 @@ def spectrum(found: Sequence[Findings]) -> str:
                           rotation=90, va="top", ha="right", fontsize="small")  # fmt: skip
         axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N), raw force", xlim=(0, HIGHEST))
         axes.set_ylim(bottom=0)
-        _legend(axes)
+        legend_above(axes, 4)
 
     return drawn(draw)
 
@@ -115,7 +116,7 @@ def uplifts(found: Sequence[Findings]) -> str:
             at = np.array(numbers) + width * (k - (len(found) - 1) / 2)
             axes.bar(at, heights, width, color=series_colour(k), label=name_of(found, one))
         axes.set(xlabel="support", ylabel="largest uplift (mm)", xticks=[n for n, _, _ in found[0].uplifts])
-        _legend(axes)
+        legend_above(axes, 4)
 
     return drawn(draw, 2.6)
 
@@ -144,7 +145,3 @@ def name_of(found: Sequence[Findings], one: Findings) -> str:
 def _parts(one: Findings) -> tuple[str, ...]:
     run = one.run
     return run.catenary, run.pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"
-
-
-def _legend(axes: Axes) -> None:
-    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False)

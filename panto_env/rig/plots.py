@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import mark_supports
 from ..base.colours import series_colour
+from ..base.legend import legend_above
 from ..metrics.low_pass import low_pass_in_place
 from ..metrics.spectrum import amplitudes
 from .comparison import Pair
@@ -48,7 +49,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         axis.set(ylabel=f"{label}, without mean", xlim=(begin, end))
         axis.grid(color="0.92")
         mark_supports(axis, first)
-    axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False)
+    legend_above(axes[0], 4)
     axes[2].set_xlabel("position (m); grey lines: supports")
     for k, (who, run) in enumerate(drawn.items()):
         force = run.contact_force[run.inside(pairs[0].spans)]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...analysis.plots import mark_supports, say_what_is_hidden
 from ...base.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, series_colour
+from ...base.legend import legend_above
 from ...metrics.labels import LABELS
 from ...metrics.spans import limits
 from .angles import cost_over_angle
@@ -91,7 +92,7 @@ def forces_along_line(speed: int) -> Figure:
     lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
     for axis in (upper, lower):
         mark_supports(axis, active)
-        axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize="small", frameon=False)
+        legend_above(axis, 3)
     lower.set_xlim(limits(SHOWN_SPANS, active.span_length))
     for axis in (upper, lower):
         say_what_is_hidden(axis)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
-from ...base.colours import LIMIT
+from ...base.colours import LIMIT, series_colour
+from ...base.legend import legend_above
 from ...base.table import Table
 from ...diagnosis import diagnose
 from ...diagnosis.cases import Track, draw_defect, drive
@@ -135,17 +136,18 @@ def plot_rates(rows: Sequence[dict[str, float]]) -> Figure:
 
     figure = Figure(figsize=(6.5, 4.5), layout="constrained")
     axis = figure.subplots()
-    for count in MEANS:
-        own = [row for row in rows if row["passes"] == count]
-        rate = [row["rate"] for row in own]
-        axis.semilogx(rate, [100 * row["located"] for row in own], "o-", label=f"mean of {count}")
-        axis.fill_between(rate, [100 * r["low"] for r in own], [100 * r["high"] for r in own], alpha=0.15)
-    axis.axhline(100 * WANTED, color=LIMIT, linestyle="--", linewidth=0.9)
-    axis.axvline(FALSE_ALARMS, color=LIMIT, linestyle="--", linewidth=0.9)
+    for k, count in enumerate(MEANS):
+        own, colour = [row for row in rows if row["passes"] == count], series_colour(k)
+        rate, located = [row["rate"] for row in own], [100 * row["located"] for row in own]
+        axis.semilogx(rate, located, "o-", color=colour, label=f"mean of {count}")
+        low, high = ([100 * row[end] for row in own] for end in ("low", "high"))
+        axis.fill_between(rate, low, high, color=colour, alpha=0.15, linewidth=0)
+    axis.axhline(100 * WANTED, color=LIMIT, linestyle="--", linewidth=0.9, label=f"bar of {WANTED:.0%}")
+    axis.axvline(FALSE_ALARMS, color=LIMIT, linestyle=":", label=f"default of {FALSE_ALARMS:g} per km")
     axis.set(
         xlabel="false alarms per km that set the threshold", ylabel="broken droppers within an interval (%)"
     )
-    axis.legend()
+    legend_above(axis, 3)
     return figure
 
 
@@ -172,7 +174,9 @@ def example() -> Figure:
     defects = tuple(draw_defect(EXAMPLE, *each, random) for each in wanted)
     healthy = [drive(EXAMPLE, k) for k in range(HEALTHY)]
     found = diagnose([drive(EXAMPLE, HEALTHY, defects)], healthy)
-    figure = plot_diagnosis(found, f"{EXAMPLE.catenary} at {EXAMPLE.speed_kmh:g} km/h, one pass")
+    figure = plot_diagnosis(
+        found, f"{EXAMPLE.catenary} at {EXAMPLE.speed_kmh:g} km/h, one pass; dotted: the true defects"
+    )
     for axis in figure.axes:
         for defect in defects:
             axis.axvline(defect.position, color="black", linestyle=":", linewidth=1.0)

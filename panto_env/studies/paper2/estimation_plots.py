@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.colours import ORANGE
+from ...base.colours import ORANGE, series_colour
+from ...base.legend import legend_above
 from ...estimation.motion import Motion
 from ...estimation.score import COHERENT, phases
 from .estimation import MISMATCH, OBSERVATIONS, SPEED_KMH, START
@@ -34,11 +35,9 @@ def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
     axis.plot(motion.time[shown], motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
     axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
     axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
-    axis.set_title(
-        f"As Fig. {number}: from {observation}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %",
-        fontsize="medium",
-    )
-    axis.legend(fontsize="small", loc="upper right")
+    words = f"as Fig. {number} of paper 2, from {observation}"
+    figure.suptitle(f"{words}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %", fontsize="medium")
+    legend_above(axis)
     axis.grid(color="0.9")
     return figure
 
@@ -51,13 +50,14 @@ def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
     kept = slice(round(START / motion.time_step), None)
     figure = Figure(figsize=(8, 4.2), layout="constrained")
     axis = figure.subplots()
-    for name, force in forces.items():
+    for k, (name, force) in enumerate(forces.items()):
         found = phases(motion.contact_force[kept], force[kept], motion.time_step)
         late = np.where(found.coherence >= COHERENT, 1e3 * found.delay, np.nan)
-        axis.plot(found.frequency, late, "o-", markersize=3, label=name)
+        axis.plot(found.frequency, late, "o-", markersize=3, color=series_colour(k), label=name)
     axis.axhline(0, color="0.4", linewidth=0.8)
     axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
-    axis.set_title(f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent", fontsize="medium")
-    axis.legend(fontsize="small")
+    words = f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent"
+    figure.suptitle(words, fontsize="medium")
+    legend_above(axis, 3)
     axis.grid(color="0.9")
     return figure

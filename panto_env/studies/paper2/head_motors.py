@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.colours import series_colour
+from ...base.legend import legend_above
 from ..study import Comparison, Outcome, Report
 from .motor_bench import BenchRun, bench_run, line_pass
 from .motors import (
@@ -144,7 +145,7 @@ def _plot(bench: Sequence[BenchRun]) -> Figure:
         over_frequency.plot(frequency[inside], amplitude[inside], **style)
     over_time.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(0, SHOWN))
     over_frequency.set(xlabel="frequency (Hz)", ylabel="amplitude (N)", xlim=(0, BANDS[-1][1]))
-    over_time.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False)
+    legend_above(over_time, 4)
     for axis in (over_time, over_frequency):
         axis.grid(color="0.92")
     figure.suptitle(

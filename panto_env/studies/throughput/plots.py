@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...base.colours import series_colour
+from ...base.legend import legend_above
 from .tables import Row
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def _draw_lanes(axis: Axes, rows: Sequence[Row]) -> None:
     rates = [row["yardstick_steps_per_second"] for row in widest]
     axis.loglog([row["lanes"] for row in widest], rates, "s:", color="0.5", label=widest[0]["yardstick"])
     axis.set(xlabel="lanes, on all cores", ylabel="environment steps per second")
-    _legend_above(axis)
+    legend_above(axis, 2)
 
 
 def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
@@ -64,12 +65,7 @@ def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
         )
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
     axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
-    _legend_above(axis)
-
-
-def _legend_above(axis: Axes) -> None:
-    """A legend that covers no data."""
-    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, fontsize="small", frameon=False)
+    legend_above(axis, 2)
 
 
 def _by_environment(rows: Sequence[Row]) -> dict[str, list[Row]]:

@@ -1,0 +1,13 @@
+"""The legend of pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def legend_above(axis: Axes, columns: int = 5) -> None:
+    """A legend above the axis, at the right, where it covers no data."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=columns, fontsize="small", frameon=False)
