@@ -19,9 +19,9 @@ LINE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": "
 SHOWN_SPANS = 3
 HIGHEST = 30.0  # Hz
 PANELS = (
-    ("head", 1e3, "collectors (mm)"),
-    ("frame", 1e3, "frame (mm)"),
-    ("contact_force", 1.0, "contact force to 20 Hz (N)"),
+    ("head", 1e3, "collectors", "mm"),
+    ("frame", 1e3, "frame", "mm"),
+    ("contact_force", 1.0, "contact force to 20 Hz", "N"),
 )
 
 
@@ -37,17 +37,17 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
     end = begin + SHOWN_SPANS * first.span_length
     drawn = {f"on {pair.rig.catenary}": pair.rig for pair in pairs}
     drawn |= {f"under line {pair.reference.catenary}": pair.reference for pair in pairs}
-    for axis, (name, scale, label) in zip(axes, PANELS, strict=False):
+    for axis, (name, scale, label, unit) in zip(axes, PANELS, strict=False):
         for k, (who, run) in enumerate(drawn.items()):
             values = getattr(run, name)
             if name == "contact_force":
                 values = low_pass_in_place(values, run.time_step)
             values = scale * (values - values[run.inside(pairs[0].spans)].mean())
             shown = (run.position >= begin) & (run.position <= end)
-            style = LINE_STYLE if who.startswith("under") else {"color": series_colour(k)}
+            style = LINE_STYLE if who.startswith("under") else _rig_style(k)
             axis.plot(run.position[shown], values[shown], label=who, **style)
-        axis.set(ylabel=f"{label}, without mean", xlim=(begin, end))
-        axis.grid(color="0.92")
+        axis.set(ylabel=f"{label},\nwithout mean ({unit})", xlim=(begin, end))
+        axis.grid(axis="y", color="0.92")
         mark_supports(axis, first)
     legend_above(axes[0], 4)
     axes[2].set_xlabel("position (m); grey lines: supports")
@@ -55,9 +55,14 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         force = run.contact_force[run.inside(pairs[0].spans)]
         frequency, amplitude = amplitudes(force, run.time_step)
         shown = frequency <= HIGHEST
-        style = LINE_STYLE if who.startswith("under") else {"color": series_colour(k)}
+        style = LINE_STYLE if who.startswith("under") else _rig_style(k)
         axes[3].plot(frequency[shown], amplitude[shown], label=who, **style)
-    axes[3].set(xlabel="frequency (Hz)", ylabel="amplitude of the contact force (N)", xlim=(0, HIGHEST))
+    axes[3].set(xlabel="frequency (Hz)", ylabel="amplitude of the\ncontact force (N)", xlim=(0, HIGHEST))
     axes[3].grid(color="0.92")
     figure.suptitle(f"{first.pantograph} at {first.speed_kmh:g} km/h, as Figs 5 to 8 of paper 2")
     return figure
+
+
+def _rig_style(number: int) -> dict[str, Any]:
+    """Broad, so that it is seen where the line's own curve covers it."""
+    return {"color": series_colour(number), "linewidth": 2.5}
