@@ -211,3 +211,17 @@ def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
     ):
         with pytest.raises(InputError, match=re.escape(words)):
             report_command(files, None)
+
+
+def test_runs_that_share_a_name_stay_apart(run):
+    """A line's file edited between two runs, and runs that differ in what their names do not tell."""
+    softer = {**run.design["catenary"], "span_length": 61.0}
+    edited = replace(run, design={**run.design, "catenary": softer})
+    without = replace(run, dropper_position=run.dropper_position[:0], dropper_force=run.dropper_force[:, :0])
+    text = html.unescape(page([Findings(run, "a"), Findings(without, "b"), Findings(edited, "c")]))
+    headings = re.findall(r"<h3>(.*?)</h3>", text)
+    assert headings == ["en50318-2002 (a, b)", "en50318-2002 (c)", "en50318-2002"]
+    captions = re.findall(r"<caption>(.*?): forces while", text)
+    assert captions == ["300 km/h (a)", "300 km/h (c)"]
+    values = re.findall(r"<code>span_length</code></th><td[^>]*>([\d.]+)<", text)
+    assert values == ["60.0", "61.0"]

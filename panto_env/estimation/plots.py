@@ -40,11 +40,12 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
     legend_above(force, 2)
     tested = estimate.consistency
-    innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3)
-    innovations.axhline(1.0, color="0.4", linestyle=":")
-    innovations.axhline(WINDOW_NIS, color=LIMIT, linestyle="--", linewidth=0.9)
+    innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3, label="found")
+    innovations.axhline(1.0, color="0.4", linestyle=":", label="expected")
+    innovations.axhline(WINDOW_NIS, color=LIMIT, linestyle="--", linewidth=0.9, label="doubted above")
     rest = f"; the record ends at {estimate.time[-1]:.4g} s" if end < estimate.time[-1] else ""
-    innovations.set(xlabel=f"time (s){rest}", ylabel="innovations\n(squared, 1: as expected)")
+    innovations.set(xlabel=f"time (s){rest}", ylabel="squared\ninnovations (-)")
+    legend_above(innovations)
     for axis in (force, innovations):
         axis.grid(color="0.9")
     figure.suptitle(title, fontsize="medium", x=0.01, ha="left")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,17 +61,20 @@ def force_along(one: Findings) -> str:
     return drawn(draw)
 
 
-def force_folded(found: Sequence[Findings]) -> str:
-    """Contact force over the place within the span: median of all spans, and from least to largest."""
+def force_folded(names: Mapping[Findings, str]) -> str:
+    """Contact force over the place within the span: median of all spans, and from least to largest.
+
+    names: runs, and what each is called.
+    """
 
     def draw(axes: Axes) -> None:
-        for k, one in enumerate(found):
+        for k, one in enumerate(names):
             folded = one.folded
             if folded is None:
                 continue
             share = folded.place / one.run.span_length
             axes.fill_between(share, folded.low, folded.high, color=series_colour(k), alpha=0.2, linewidth=0)
-            axes.plot(share, folded.median, color=series_colour(k), label=f"{name_of(found, one)}: median")
+            axes.plot(share, folded.median, color=series_colour(k), label=f"{names[one]}: median")
         axes.set(
             xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1)
         )
@@ -81,19 +84,21 @@ def force_folded(found: Sequence[Findings]) -> str:
     return drawn(draw)
 
 
-def spectrum(found: Sequence[Findings]) -> str:
-    """Amplitudes of the force, with what passes once per span and once per dropper marked."""
+def spectrum(names: Mapping[Findings, str]) -> str:
+    """Amplitudes of the force of runs, by name, and what passes per span and per dropper in the first one."""
+    first = next(iter(names))
+    of = f", {names[first]}" if len(names) > 1 else ""
 
     def draw(axes: Axes) -> None:
-        for k, one in enumerate(found):
+        for k, one in enumerate(names):
             frequency, amplitude = amplitudes(one.run.contact_force[one.inside], one.run.time_step)
             shown = frequency <= HIGHEST
-            axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=name_of(found, one))
-        run = found[0].run
-        passing = {"per span": run.speed_kmh / 3.6 / run.span_length}
-        places = np.diff([dropper.position for dropper in found[0].droppers])
+            axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=names[one])
+        run = first.run
+        passing = {f"per span{of}": run.speed_kmh / 3.6 / run.span_length}
+        places = np.diff([dropper.position for dropper in first.droppers])
         if places.size:
-            passing["per dropper"] = run.speed_kmh / 3.6 / float(np.median(places))
+            passing[f"per dropper{of}"] = run.speed_kmh / 3.6 / float(np.median(places))
         for words, at in passing.items():
             axes.axvline(at, color="0.5", linestyle=":", linewidth=1)
             axes.annotate(f"{words}: {at:.2f} Hz", (at, 0.98), xycoords=("data", "axes fraction"),
@@ -105,17 +110,18 @@ def spectrum(found: Sequence[Findings]) -> str:
     return drawn(draw)
 
 
-def uplifts(found: Sequence[Findings]) -> str:
-    """Largest uplift at each support."""
+def uplifts(names: Mapping[Findings, str]) -> str:
+    """Largest uplift of runs, by name, at each support."""
+    supports = sorted({number for one in names for number, _, _ in one.uplifts})
 
     def draw(axes: Axes) -> None:
-        for k, one in enumerate(found):
+        for k, one in enumerate(names):
             numbers = [number for number, _, _ in one.uplifts]
             heights = [1e3 * uplift for _, _, uplift in one.uplifts]
-            width = 0.8 / len(found)
-            at = np.array(numbers) + width * (k - (len(found) - 1) / 2)
-            axes.bar(at, heights, width, color=series_colour(k), label=name_of(found, one))
-        axes.set(xlabel="support", ylabel="largest uplift (mm)", xticks=[n for n, _, _ in found[0].uplifts])
+            width = 0.8 / len(names)
+            at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
+            axes.bar(at, heights, width, color=series_colour(k), label=names[one])
+        axes.set(xlabel="support", ylabel="largest uplift (mm)", xticks=supports)
         legend_above(axes, 4)
 
     return drawn(draw, 2.6)
@@ -134,12 +140,14 @@ def stiffness(one: Findings) -> str:
     return drawn(draw, 2.6)
 
 
-def name_of(found: Sequence[Findings], one: Findings) -> str:
-    """What a run is called beside the others: by what differs between them."""
-    differing = [
-        own for own, *others in zip(_parts(one), *map(_parts, found), strict=True) if len({*others}) > 1
-    ]
-    return ", ".join(differing) or f"{one.run.speed_kmh:g} km/h"
+def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
+    """What each run is called beside the others: by what differs, and by its file where that is not told."""
+    columns = list(zip(*map(_parts, found), strict=True))
+    told = [column for column in columns if len({*column}) > 1] or [columns[2]]
+    names = [", ".join(words) for words in zip(*told, strict=True)]
+    if len({*names}) < len(names):
+        names = [f"{name} ({one.file})" for name, one in zip(names, found, strict=True)]
+    return dict(zip(found, names, strict=True))
 
 
 def _parts(one: Findings) -> tuple[str, ...]:

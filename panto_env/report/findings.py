@@ -49,9 +49,9 @@ class Folded(NamedTuple):
     high: Array  # (n,): largest of all spans (N)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Findings:
-    """All of one run."""
+    """All of one run; like itself alone."""
 
     run: Trajectory
     file: str

@@ -40,25 +40,27 @@ def page(found: Sequence[Findings]) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "digits": digits, "limits": limits_in_words}
-    judged = [one for one in found if one.figures is not None]
-    lines = {one.run.catenary: one for one in found}
+    names = charts.names_of(found)
+    judged = {one: name for one, name in names.items() if one.figures is not None}
+    lines = _different(found, "line")
     return environment.get_template("page.html.jinja").render(
         version=__version__,
         title=_title(found),
-        names=[charts.name_of(found, one) for one in found],
+        names=[names[one] for one in found],
+        name_of=names,
         found=found,
         labels=LABELS,
         figures=[[getattr(one.figures, key, math.nan) for one in found] for key in LABELS],
         criteria=_side_by_side(found),
         values_of=values_of,
         in_words=in_words,
-        lines=list(lines.values()),
-        pantographs=list({one.run.pantograph: one for one in found}.values()),
-        stiffness={name: charts.stiffness(one) for name, one in lines.items() if one.elasticity},
+        lines=lines,
+        pantographs=_different(found, "pantograph"),
+        stiffness={one: charts.stiffness(one) for one in lines if one.elasticity},
         along=[charts.force_along(one) for one in found],
         folded=charts.force_folded(judged) if judged else "",
         spectrum=charts.spectrum(judged) if judged else "",
-        uplifts=charts.uplifts(found) if any(one.uplifts for one in found) else "",
+        uplifts=charts.uplifts(names) if any(one.uplifts for one in found) else "",
         words={"accuracy": ACCURACY, "filter": FILTER, "left_out": LEFT_OUT},
     )
 
@@ -89,6 +91,17 @@ def _title(found: Sequence[Findings]) -> str:
     pairs = {f"{one.run.pantograph} on {one.run.catenary}" for one in found}
     speeds = sorted({one.run.speed_kmh for one in found})
     return f"{', '.join(sorted(pairs))} at {', '.join(f'{speed:g}' for speed in speeds)} km/h"
+
+
+def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]]:
+    """Of each different line or pantograph the first run on it, and the files of all; part: which of both.
+
+    By value: a file of one's own may have been edited between two runs, and kept its name.
+    """
+    alike: dict[str, list[Findings]] = {}
+    for one in found:
+        alike.setdefault(getattr(one, part).model_dump_json(), []).append(one)
+    return {runs[0]: [one.file for one in runs] for runs in alike.values()}
 
 
 def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:
