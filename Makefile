@@ -101,9 +101,12 @@ oldest:
 	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt $(OLDEST_ONES) pytest --editable .
 	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_vector_rules.py
 
-# Every version of Python that is supported and at hand, the first one apart, without the extra 'agents'.
-PYTHONS := $(shell command -v python3.12 python3.13)
+# Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.
+PYENV = $(shell pyenv root 2> /dev/null)
+FOUND = python3.12 python3.13 $(wildcard $(PYENV)/versions/3.1[23].*/bin/python3.1[23])
+PYTHONS = $(foreach python,$(FOUND),$(shell $(python) -c '' 2> /dev/null && echo $(python)))
 pythons:
+	@test -n "$(PYTHONS)" || { echo "There is no Python 3.12 or 3.13 here; name them: make pythons PYTHONS=..."; exit 1; }
 	for python in $(PYTHONS); do \
 	  venv=.venv-$$(basename $$python); \
 	  $$python -m venv $$venv && \
