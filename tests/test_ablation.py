@@ -65,6 +65,7 @@ def test_ours_is_valid():
         assert (training == whole) == ((name, seed) == (REFERENCE, 0))
 
 
+@pytest.mark.slow
 def test_runs_are_kept_and_compared(config, tmp_path, monkeypatch):
     arguments = ["ablation", str(config), "--output", str(tmp_path / "runs"), "--workers", "1", "--json"]
     result = CliRunner().invoke(make_app(), arguments)
@@ -83,6 +84,7 @@ def test_runs_are_kept_and_compared(config, tmp_path, monkeypatch):
     assert folder.model.stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_a_table_says_what_is_lost(config, tmp_path):
     result = CliRunner().invoke(make_app(), ["ablation", str(config), "--output", str(tmp_path / "runs")])
     assert result.exit_code == 0, result.output

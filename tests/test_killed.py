@@ -72,6 +72,7 @@ def same_weights(one: Path, other: Path) -> bool:
     return all(np.array_equal(left, right) for left, right in pairs)
 
 
+@pytest.mark.slow
 def test_a_training_killed_between_two_checkpoints_loses_only_what_came_after_the_first(tmp_path):
     folder = tmp_path / "run"
     policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.zip")

@@ -101,7 +101,7 @@ def test_figures_are_drawn(trajectory, tmp_path):
     forces = {observation: method(motion, known_pantograph(0), observation) for observation in OBSERVATIONS}
     for number, observation in ((11, BOTH), (12, ONE)):
         figure = figure_11_12(motion, forces[observation], observation)
-        assert f"As Fig. {number}" in figure.axes[0].get_title()
+        assert f"as Fig. {number} of paper 2" in figure.get_suptitle()
         save(figure, tmp_path / f"{number}.png")
     figure = delay_plot(motion, forces)
     late = {line.get_label(): np.nanmean(line.get_ydata()) for line in figure.axes[0].lines[:2]}

@@ -35,6 +35,7 @@ def result(tmp_path_factory):
     return json.loads(told.stdout)
 
 
+@pytest.mark.slow
 def test_every_plant_and_environment_is_measured(result):
     plants = {"en50318-2002", "periodic-stiffness", "ohl-three-span"}
     assert {row["catenary"] for row in result["plants"]} == plants
@@ -42,6 +43,7 @@ def test_every_plant_and_environment_is_measured(result):
     assert {row["id"] for row in result["environments"]} == set(IDS)
 
 
+@pytest.mark.slow
 def test_cost_is_measured_over_spans_modes_grid_and_cores(result):
     scaling = result["scaling"]
     assert [row["spans"] for row in scaling["spans"]] == [3, 5, 8, 10, 12]
@@ -91,10 +93,12 @@ def keys(value):
 
 @chooses_cores
 @pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_stored_results_have_the_form_of_today(result, path):
     assert keys(study.read(path)) == keys(result)
 
 
+@pytest.mark.slow
 def test_each_environment_stands_beside_a_yardstick_over_whole_episodes(result):
     rows = result["environments"] + result["scaling"]["cores"]
     for row in rows:
@@ -104,6 +108,7 @@ def test_each_environment_stands_beside_a_yardstick_over_whole_episodes(result):
     assert [row["ideal"] for row in result["environments"][:2]] == [True, False]
 
 
+@pytest.mark.slow
 def test_the_processor_is_named_with_the_width_of_its_vectors(result):
     machine = result["machine"]
     assert machine["vector_bits"] in (64, 128, 256, 512)
@@ -111,6 +116,7 @@ def test_the_processor_is_named_with_the_width_of_its_vectors(result):
     assert f"vectors of {machine['vector_bits']} bits" in tables.machine(result)
 
 
+@pytest.mark.slow
 def test_results_of_several_machines_stand_side_by_side(result, tmp_path, capsys):
     other = json.loads(json.dumps(result))
     other["machine"]["processor"] = "Another One"
@@ -136,6 +142,7 @@ def test_what_is_no_result_is_refused(tmp_path, text):
         speed.speed([path])
 
 
+@pytest.mark.slow
 def test_markdown_is_printed_unbroken(result, monkeypatch, capsys):
     monkeypatch.setattr(study, "run", lambda repeats, report: result)
     speed.speed(markdown=True)
@@ -144,6 +151,7 @@ def test_markdown_is_printed_unbroken(result, monkeypatch, capsys):
     assert "yardsticks" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_where_cores_cannot_be_chosen_a_sentence_says_so(result, monkeypatch):
     monkeypatch.setattr(environments, "CAN_CHOOSE_CORES", False)
     assert environments.by_cores(1, lambda _: None) == []

@@ -93,6 +93,7 @@ def test_its_commands_find_what_they_come_with(python, tmp_path):
         assert words in shown.stdout
 
 
+@pytest.mark.slow
 def test_it_is_typed_for_those_who_use_it(python, tmp_path):
     """A mistake is found in code that only imports it, so its types are seen, not taken for Any."""
     (tmp_path / "user.py").write_text(USER)
