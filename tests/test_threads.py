@@ -2,6 +2,9 @@
 
 import functools
 import gc
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -56,7 +59,7 @@ class Batch:
     def __init__(self, cost, threads=3):
         shares, self.add = new_shares(), np.zeros(1)
         call = functools.partial(mark, shares, cost, self.add)
-        self.threads = LaneThreads(call, LANES, ABREAST, threads)
+        self.threads = LaneThreads(call, LANES, ABREAST, shares, threads)
 
     def step(self, steps=1):
         """What was done, and by whom, in arrays of this step."""
@@ -127,3 +130,39 @@ def test_threads_end_with_their_owner():
     for thread in ours:
         thread.join(timeout=10)
     assert not any(thread.is_alive() for thread in ours)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forked_process_steps_on_and_sees_what_its_parent_sees():
+    """A child has none of the threads that helped its parent: it waited for them for ever."""
+    code = """
+import os, sys, warnings
+import gymnasium, numpy as np
+from panto_env.base import machine
+machine.cores = lambda: 3
+import panto_env.backend.threads as threads
+threads.cores = machine.cores
+warnings.simplefilter("ignore")
+envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=512)
+envs.reset(seed=1)
+actions = np.zeros(envs.action_space.shape, dtype=np.float32)
+for _ in range(20):
+    envs.step(actions)
+assert envs.unwrapped.task._threads._helpers
+child = os.fork()
+for _ in range(20):
+    seen = envs.step(actions)
+digest = hash(seen[0].tobytes())
+if child == 0:
+    print(digest, flush=True)
+    os._exit(0)
+_, status = os.waitpid(child, 0)
+print(digest, status)
+"""
+    environment = os.environ | {"PYTHONHASHSEED": "0"}
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env=environment
+    )
+    assert told.returncode == 0, told.stderr
+    of_child, of_parent, status = told.stdout.split()
+    assert (of_child, status) == (of_parent, "0")

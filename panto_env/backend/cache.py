@@ -2,16 +2,21 @@
 
 Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
 So the cache folder is named by a hash of all of the package's sources: any edit opens a new one.
+What lies there is run: so a folder is used only if it is this user's own and no other can write to it.
 """
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import stat
 import tempfile
 from functools import cache
 from pathlib import Path
 
+import llvmlite
 import numba
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -19,28 +24,57 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 @cache
 def source_hash() -> str:
-    """Hash of every source file of the package."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    """Hash of every source file of the package, and of what compiles them."""
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
+    if numba.config.BOUNDSCHECK:
+        digest.update(b" with bounds checked")
     for path in sorted(PACKAGE.rglob("*.py")):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 @cache
-def cache_folder() -> Path:
-    """Folder of the compiled kernels, made on first use; in the temporary folder as a last resort.
+def cache_folder() -> Path | None:
+    """Folder of the compiled kernels, made on first use; None where nothing can be written.
 
-    ``PANTO_CACHE_DIR`` overrides where it lies.
+    ``PANTO_CACHE_DIR`` overrides where it lies. Where that cannot be used, it lies in the temporary folder;
+    where another user has put something under its name there, it is one for this process alone.
     """
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    base = Path(os.environ.get("PANTO_CACHE_DIR") or Path(home) / "panto_env")
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    for parent in (base, Path(tempfile.gettempdir()) / f"panto_env-{user}"):
-        folder = parent / source_hash()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    raise OSError(f"no folder can be written for compiled kernels; set PANTO_CACHE_DIR (not {base})")
+    own = _own_folder(Path(os.environ.get("PANTO_CACHE_DIR") or Path(home) / "panto_env"))
+    if own is not None:
+        return own
+    try:
+        common = Path(tempfile.gettempdir()) / f"panto_env-{_user()}"
+        own = _own_folder(common)
+        if own is not None and _private(common):
+            return own
+        alone = Path(tempfile.mkdtemp(prefix="panto_env-"))
+    except OSError:
+        return None
+    atexit.register(shutil.rmtree, alone, ignore_errors=True)
+    return alone
+
+
+def _own_folder(parent: Path) -> Path | None:
+    """The folder of these sources in another one; None where it cannot be made, or is not ours alone."""
+    folder = parent / source_hash()
+    try:
+        parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        return folder if _private(folder) and os.access(folder, os.W_OK) else None
+    except OSError:
+        return None
+
+
+def _user() -> int:
+    return os.getuid() if hasattr(os, "getuid") else 0
+
+
+def _private(folder: Path) -> bool:
+    """Whether a folder is a true one, of this user, that no other user can write to."""
+    if not hasattr(os, "getuid"):
+        return True  # as on Windows, where folders of a user are their own
+    found = folder.lstat()
+    others = stat.S_IWGRP | stat.S_IWOTH
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not found.st_mode & others

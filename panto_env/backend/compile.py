@@ -11,6 +11,7 @@ import numba
 from numba.core.extending import intrinsic
 
 from .cache import cache_folder
+from .kernel_files import check_files
 from .once import compile_once
 from .parts import KERNEL_OPTIONS, PART_OPTIONS, refuse_calls
 
@@ -32,15 +33,18 @@ def kernel(function: F) -> F:
     Of several processes that call it at the same time one compiles it. A kernel runs without Python's lock,
     so that threads can share the lanes of a batch.
     """
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_folder())  # read by Numba when it decorates
+    previous, folder = numba.config.CACHE_DIR, cache_folder()
+    numba.config.CACHE_DIR = str(folder or "")  # read by Numba when it decorates
     try:
-        compiled: F = numba.njit(cache=True, nogil=True, **KERNEL_OPTIONS, **OPTIONS)(function)
+        compiled: Any = numba.njit(cache=folder is not None, nogil=True, **KERNEL_OPTIONS, **OPTIONS)(
+            function
+        )
     finally:
         numba.config.CACHE_DIR = previous
-    if JIT:
-        compile_once(compiled)
-    return compiled
+    if JIT and folder is not None:
+        check_files(compiled._cache)
+        compile_once(compiled, folder)
+    return compiled  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:

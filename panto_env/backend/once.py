@@ -7,12 +7,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from filelock import FileLock, Timeout
 from numba.core.compiler_lock import global_compiler_lock
-
-from .cache import cache_folder
 
 PATIENCE = 300.0
 """Seconds to wait for another process, which may hang; one that dies lets go at once."""
@@ -22,8 +21,8 @@ PAUSE = 1.0
 _silent_until = 0.0
 
 
-def compile_once(dispatcher: Any) -> None:
-    """Let a kernel, to be kept on disk, be compiled by one process at a time."""
+def compile_once(dispatcher: Any, folder: Path) -> None:
+    """Let a kernel, to be kept on disk in a folder, be compiled by one process at a time."""
     compile_here: Callable[[Any], Any] = dispatcher.compile
     save: Callable[[Any, Any], None] = dispatcher._cache.save_overload
     name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
@@ -33,7 +32,7 @@ def compile_once(dispatcher: Any) -> None:
             return compile_here(signature)
         form = hashlib.sha256(str(signature).encode()).hexdigest()[:16]
         # A thread that waits for another process keeps Numba's own lock, which is always taken first.
-        with global_compiler_lock, _alone(f"{name}-{form}"):
+        with global_compiler_lock, _alone(folder / f"{name}-{form}.lock"):
             if _on_disk(dispatcher, signature):
                 return compile_here(signature)
             with _announced("Compiling kernels, about 10 s, once per version and kind of line ..."):
@@ -41,7 +40,7 @@ def compile_once(dispatcher: Any) -> None:
 
     def save_alone(signature: Any, result: Any) -> None:
         # Of two processes that save two forms of a kernel at once, Numba could keep one under both names.
-        with _alone(name):
+        with _alone(folder / f"{name}.lock"):
             save(signature, result)
 
     dispatcher.compile = compile_or_wait
@@ -55,9 +54,9 @@ def _on_disk(dispatcher: Any, signature: Any) -> bool:
 
 
 @contextmanager
-def _alone(name: str) -> Iterator[None]:
-    """Within the body no other process is in a body of this name, as far as the file system can see to it."""
-    lock = FileLock(cache_folder() / f"{name}.lock")
+def _alone(file: Path) -> Iterator[None]:
+    """Within the body no other process is in a body with this file, as far as the file system sees to it."""
+    lock = FileLock(file)
     try:
         try:
             lock.acquire(timeout=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 import weakref
@@ -11,7 +12,7 @@ from typing import Any
 
 from ..base.machine import cores
 from .compile import JIT
-from .shares import ALONE, HELPER, LEADER
+from .shares import ALONE, HELPER, LEADER, Shares
 
 WORTH = 4e-6
 """Shortest share (s) worth handing out: to hand over one takes some 0.2 us."""
@@ -31,19 +32,39 @@ class LaneThreads:
     The first steps are done alone and their time is taken: a batch too small to be shared never is.
     """
 
-    def __init__(self, run: Callable[..., Any], lanes: int, abreast: int, threads: int | None = None) -> None:
-        """run(first, last, size, role, patience): the kernel; abreast: lanes of a group.
+    def __init__(
+        self,
+        run: Callable[..., Any],
+        lanes: int,
+        abreast: int,
+        shares: Shares,
+        threads: int | None = None,
+    ) -> None:
+        """run(first, last, size, role, patience): the kernel; shares: its own; abreast: lanes of a group.
 
         threads: at most, by default as many as there are cores.
         """
         self._run, self._lanes, self._abreast = run, lanes, abreast
+        self._shares = shares
         # Plain Python has but one thread that could be inside a kernel.
         wanted = 1 if not JIT else cores() if threads is None else threads
         self._threads = min(wanted, -(-lanes // abreast))
+        self._begin_alone()
+        _ALL.add(self)
+
+    def _begin_alone(self) -> None:
+        """Nobody helps yet."""
         self._trials = TRIALS if self._threads > 1 else 0
         self._shortest = float("inf")  # time of a step (s)
         self._size = 0  # lanes of a share; 0: not shared
         self._helpers: list[_Helper] = []
+
+    def forget_threads(self) -> None:
+        """Begin anew: in a process that was forked there are no threads but the one that forked."""
+        for helper in self._helpers:
+            helper.forget()
+        self._shares.memory[:] = 0
+        self._begin_alone()
 
     def step(self, *work: Any) -> Any:
         """Do one step's ``work`` in all lanes; what the kernel returns."""
@@ -85,7 +106,11 @@ class _Helper:
         self._called, self._state = threading.Event(), _State()
         arguments = (help_with_steps, self._called, self._state)
         threading.Thread(target=_serve, args=arguments, name="panto", daemon=True).start()
-        weakref.finalize(self, _dismiss, self._called, self._state)
+        self._dismissal = weakref.finalize(self, _dismiss, self._called, self._state)
+
+    def forget(self) -> None:
+        """There is no thread to dismiss."""
+        self._dismissal.detach()
 
     def wake(self) -> None:
         if self._state.asleep:
@@ -112,3 +137,15 @@ def _serve(help_with_steps: Callable[[], Any], called: threading.Event, state: _
 def _dismiss(called: threading.Event, state: _State) -> None:
     state.dismissed = True
     called.set()
+
+
+_ALL: weakref.WeakSet[LaneThreads] = weakref.WeakSet()
+
+
+def _forget_threads() -> None:
+    for each in list(_ALL):
+        each.forget_threads()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_threads)

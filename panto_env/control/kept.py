@@ -8,24 +8,35 @@ from pathlib import Path
 from typing import Any
 
 from ..backend import cache_folder
+from ..base.errors import InputError
 from ..base.files import write_whole
 
 
-def kept_file(folder: str, inputs: Any) -> Path:
-    """Where the result of these inputs, plain data, is kept: in a folder of the sources' own cache."""
-    text = json.dumps(inputs, sort_keys=True)
-    return cache_folder() / folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
+def kept_file(folder: str, inputs: Any) -> Path | None:
+    """Where the result of these inputs, plain data, is kept: in a folder of the sources' own cache.
+
+    None where nothing can be kept.
+    """
+    cache, text = cache_folder(), json.dumps(inputs, sort_keys=True)
+    return cache and cache / folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
 
 
-def keep(file: Path, name: str, value: Any) -> None:
-    """Keep a value, plain data, under a name."""
-    file.parent.mkdir(exist_ok=True)
-    with write_whole(file) as temporary:
-        temporary.write_text(json.dumps({name: value, "check": _check(file, value)}))
+def keep(file: Path | None, name: str, value: Any) -> None:
+    """Keep a value, plain data, under a name, where something can be kept."""
+    if file is None:
+        return
+    try:
+        file.parent.mkdir(exist_ok=True)
+        with write_whole(file) as temporary:
+            temporary.write_text(json.dumps({name: value, "check": _check(file, value)}))
+    except (InputError, OSError):
+        pass  # no room: the next process works it out again
 
 
-def read_kept(file: Path, name: str) -> Any:
+def read_kept(file: Path | None, name: str) -> Any:
     """What was kept; None where there is nothing or it is damaged."""
+    if file is None:
+        return None
     try:
         kept: dict[str, Any] = json.loads(file.read_text())
         return kept[name] if kept["check"] == _check(file, kept[name]) else None

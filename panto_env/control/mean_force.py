@@ -126,7 +126,7 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
     )
 
 
-def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path:
+def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path | None:
     speed = settings.speed_kmh[0] / 3.6
     inputs = {
         # As any: of a line all values, not those alone that every kind has.

@@ -93,7 +93,7 @@ def _measured(run: Trajectory) -> list[list[float]]:
     return [[float(each[inside].mean()) for each in series], [float(each[inside].std()) for each in series]]
 
 
-def _file(settings: RunSettings) -> Path:
+def _file(settings: RunSettings) -> Path | None:
     return kept_file(
         "passive_run", settings.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
     )

@@ -154,9 +154,10 @@ class Task:
     def _bind(self) -> None:
         """Bind the kernels to the arrays."""
         self._action = self.episode.action[:, : self.lanes].T
-        packed = pack(*self.plant.arrays, *self._arrays, new_shares())
+        shares = new_shares()
+        packed = pack(*self.plant.arrays, *self._arrays, shares)
         run = bind(control_steps, packed, *self.results[1:], 0, self.lanes, self.lanes, ALONE, 0)
-        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast)
+        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast, shares)
         alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results[1:]
         self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
         self._observe_start = bind(observe_start, packed, *self.results[1:], 0, self.lanes)
