@@ -86,6 +86,12 @@ def tell(run, own, told, lane):
 
 
 @inlined
+def at_end(own, task):
+    """Whether a lane that goes by itself has come to the end of its episode."""
+    return number_at(own, ROW.STEP, 0) >= number_at(task, TASK_ROW.END, 0)
+
+
+@inlined
 def control_group(packed, scratch, now, entry, entries, values, flags, lane):
     """Control steps of the group of lanes that begins at ``lane``, none beyond the end of an episode.
 
@@ -97,6 +103,8 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
     take_action(line, episode, task, now, scratch, lane)
     ended = False
     for _ in range(episode.steps[lane]):
+        if width_of(line) == 1 and at_end(own, task):
+            break  # no step beyond it, whoever asks: there are neither line nor rows of samples
         begin_terms(task, now)
         now[NOW.STRIDE] = mean_stride(run, own, float(episode.control_steps), lane)
         for step in range(1, episode.control_steps + 1):

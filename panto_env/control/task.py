@@ -113,6 +113,8 @@ class Task:
         if settings.reward.target == "passive":
             self.passive = passive_run(settings, self.speed_range, passive_pass)
         self.speed = np.zeros(lanes)  # m/s
+        self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
+        self._any_over = True
         self.trim = trim
         self.odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
         self.episode = new_episode(settings, plant, self.layout, self.control_steps, self.odometers.arrays())
@@ -224,7 +226,10 @@ class Task:
         far it runs in are drawn; it is not asked for where nothing is. Results go to ``results``, by default
         the task's own. Raises InputError where a run leaves the plant's valid range before its episode.
         """
-        reset(self, np.atleast_1d(lanes), random, results or self.results)
+        lanes = np.atleast_1d(lanes)
+        self._over[lanes] = False
+        self._any_over = bool(self._over.any())
+        reset(self, lanes, random, results or self.results)
 
     def observe_start(self, lanes: Any, results: Results) -> None:
         """Write into results what is observed of lanes, (n,), that stand at their start."""
@@ -283,18 +288,20 @@ class Task:
         Returns whether an episode may have ended: False where none has. Actions are clipped to -1..1.
         Results go to ``results``, by default the task's own. Lanes that are skipped stay as they are; without
         ``keep``, they may be left anyhow, to be reset next. Raises InputError, and changes nothing, for an
-        action that is not finite.
+        action that is not finite, or a lane whose episode has ended or not begun.
         """
+        if self._any_over:
+            self._refuse_over(skip)
         self._action[...] = action
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
         if self.odometers.drawn:
             self.odometers.prepare(self.episode.odometer, skip)
         if skip is None and results is None:
-            return self._told(self._plain_step())  # the usual step, as short as it can be
+            return self._told(self._plain_step(), self.results)  # the usual step, as short as it can be
         results = results or self.results
         if skip is None:
-            return self._told(self._threads.step(*results[1:]))
+            return self._told(self._threads.step(*results[1:]), results)
         idle, lanes = self.episode.idle[: self.lanes], np.flatnonzero(skip)
         idle[:] = skip
         tables = self._tables if keep and self.plant.lanes_abreast > 1 else []
@@ -306,10 +313,22 @@ class Task:
             for each, before in zip(results[1:], told, strict=True):
                 each[:, lanes] = before
         idle[:] = False
-        return self._told(answer)
+        return self._told(answer, results, skip)
 
-    def _told(self, answer: int) -> bool:
+    def _refuse_over(self, skip: Flags | None) -> None:
+        """Raise InputError where a lane that is not skipped has nothing to step."""
+        over = self._over if skip is None else self._over & ~skip
+        if over.any():
+            raise InputError(
+                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
+            )
+
+    def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
         """What a kernel has answered: whether an episode may have ended; InputError for a wrong action."""
+        if answer > 0:
+            ended = results.terminated | results.truncated
+            self._over |= ended if skip is None else ended & ~skip
+            self._any_over = bool(self._over.any())
         if answer < 0:
             wrong = self._action[~np.isfinite(self._action).all(axis=1)][0]
             raise InputError(f"The action must be finite, not {wrong}; check the policy.")

@@ -22,6 +22,7 @@ from ..plant.actuators import actuator_settings
 from .episodes import task_with_options, with_longest_episode
 from .ids import IDS
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, first_info, told
+from .one_thread import InUse, one_at_a_time
 from .settings import EnvironmentSettings, render_metadata
 
 if TYPE_CHECKING:
@@ -115,6 +116,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         settings = read_settings(given, EnvironmentSettings)
         self.render_mode = settings.render_mode
         self.metadata = render_metadata(self.metadata, settings)
+        self._in_use = InUse()
         self._viewer: Viewer | None = None
         self._reward_so_far = 0.0  # told in pictures
         self._spec: EnvSpec | None = None
@@ -144,6 +146,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Record of the episode so far."""
         return self.task.trajectory(0, policy="environment")
 
+    @one_at_a_time
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
@@ -176,6 +179,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         vars(self).update(state)
         self._watch(self.task)
 
+    @one_at_a_time
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:

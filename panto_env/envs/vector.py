@@ -23,6 +23,7 @@ from ..control.settings import read_settings
 from .episodes import task_with_options, with_longest_episode
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer, Lanes
+from .one_thread import InUse, one_at_a_time
 from .settings import VectorSettings, render_metadata
 from .single import checked
 from .stable_baselines import NamedToStableBaselines
@@ -64,6 +65,7 @@ class PantographVectorEnv(
         self.task = Task(settings, lanes=self.num_envs, keep_samples=self.render_mode is not None)
         drawn = range(self.num_envs) if settings.render_lanes is None else settings.render_lanes
         self._drawn, self._render_size = tuple(drawn), settings.render_size
+        self._in_use = InUse()
         self._viewer: Viewer | None = None
         self._reward_so_far = np.zeros(self.num_envs)  # told in pictures
         self.single_observation_space = gymnasium.spaces.Box(
@@ -108,6 +110,7 @@ class PantographVectorEnv(
             seeds.append(self._seeds[lane])
         return tuple(seeds)  # type: ignore[arg-type]
 
+    @one_at_a_time
     def reset(
         self,
         *,
@@ -129,6 +132,7 @@ class PantographVectorEnv(
         answer = self._lanes.answer()
         return answer.results.observation, lane_infos(answer if mask is None else answer.of(mask))
 
+    @one_at_a_time
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], Array, Flags, Flags, dict[str, Any]]:

@@ -18,6 +18,7 @@ from ..backend import (
     set_lanes,
 )
 from ..base.arrays import Array
+from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
@@ -185,11 +186,28 @@ class Plant:
     def advance(self, command: Array, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` under commands (N), (lanes, contacts, places).
 
-        The sample of a lane's step n (counted from 0) is recorded in row n + 1.
+        The sample of a lane's step n (counted from 0) is recorded in row n + 1. Raises InputError where a
+        train would run beyond the line's end, or the samples have no row for a step.
         """
+        self._check_way(steps, samples)
         if self._advance is None:
             self._advance = bind(advance, pack(*self.arrays), samples, command, steps, 0, 1)
         self._advance(samples, command, steps, 0, self.lanes)
+
+    def _check_way(self, steps: int, samples: Samples) -> None:
+        """Raise InputError unless all lanes can advance by so many steps, and these can be recorded."""
+        end, rows = self.row(Row.STEP) + steps, samples.rows.shape[1]
+        if rows > 1 and end.max() >= rows:
+            raise InputError(
+                f"The samples have rows for {rows - 1} steps, not for {end.max():.0f}; ask for more."
+            )
+        lanes = np.arange(self.lanes)
+        position = end * self.row(Row.STRIDE) + self.ahead(lanes, end[:, None])[:, 0]
+        if not self.model.massless and position.max() > self.model.length + 1e-6:
+            raise InputError(
+                f"Lane {position.argmax()} would run to {position.max():.1f} m, beyond the line's end at "
+                f"{self.model.length:g} m; take fewer steps, or more spans."
+            )
 
     def advance_passively(self, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` without actuators."""

@@ -1,0 +1,121 @@
+"""Environments, tasks and plants used by two threads at once, or beyond their end: refused, never a crash."""
+
+import copy
+import threading
+
+import gymnasium
+import numpy as np
+import pytest
+
+from panto_env import InputError
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
+from panto_env.envs import IDS
+from panto_env.plant.plant import Plant
+
+
+def used_by_four_threads(step, ended):
+    """What each of four threads that step as fast as they can meets: results, and refusals."""
+    told, refused, start = [], [], threading.Barrier(4)
+
+    def use():
+        start.wait()
+        for _ in range(2000):
+            try:
+                told.append(step())
+            except InputError as error:
+                refused.append(str(error))
+                if ended(str(error)):
+                    return
+
+    threads = [threading.Thread(target=use) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return told, refused
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_an_environment_is_one_thread_s_at_a_time(name):
+    env = gymnasium.make(f"panto_env:{name}", disable_env_checker=True).unwrapped
+    env.reset(seed=0)
+    action = env.action_space.sample()
+    told, refused = used_by_four_threads(lambda: env.step(action)[0], lambda text: "has ended" in text)
+    assert all(np.isfinite(seen).all() for seen in told)
+    assert {text.split(";")[0] for text in refused} <= {
+        "Another thread is using this environment just now",
+        "The episode has not begun or has ended",
+    }
+    assert any("Another thread" in text for text in refused)
+    env.reset(seed=0)  # it goes on in order
+    assert np.isfinite(env.step(action)[0]).all()
+
+
+def test_a_vector_environment_is_one_thread_s_at_a_time():
+    envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=64)
+    envs.reset(seed=0)
+    actions = envs.action_space.sample()
+    told, refused = used_by_four_threads(lambda: envs.step(actions)[0], lambda text: False)
+    assert all(np.isfinite(seen).all() for seen in told)
+    assert any("Another thread" in text for text in refused)
+
+
+def test_a_copy_made_in_use_is_not_in_use():
+    env = gymnasium.make("panto_env:PantographStiffness-v0").unwrapped
+    env.reset(seed=0)
+    assert env._in_use.begin(False)
+    copy.deepcopy(env).step(np.zeros(1))
+    with pytest.raises(InputError, match="Another thread"):
+        env.step(np.zeros(1))
+
+
+@pytest.fixture(params=["en50318-2002", "periodic-stiffness", "ohl-three-span"])
+def task(request):
+    pantograph = {"periodic-stiffness": "three-mass", "ohl-three-span": "dsa350"}.get(request.param)
+    given = {"catenary": request.param, "pantograph": pantograph or "en50318-2002", "distance": 60.0}
+    return Task(run_settings(given), lanes=3)
+
+
+def test_a_lane_is_not_stepped_before_its_episode_nor_beyond(task):
+    action = np.zeros((3, 1))
+    with pytest.raises(InputError, match="lane 0 has ended or not begun"):
+        task.step(action)
+    task.reset(np.arange(3), np.random.default_rng(0))
+    task.run_passively()
+    before = [table.copy() for table in task._tables], task.samples.rows.copy()
+    with pytest.raises(InputError, match="lane 0 has ended"):
+        task.step(action)
+    with pytest.raises(InputError, match="lane 0 has ended"):
+        task.coast(np.full(3, 1000), task.results)
+    with pytest.raises(InputError, match="lane 1 has ended"):
+        task.step(action, np.array([True, False, True]))
+    for table, kept in zip((*task._tables, task.samples.rows), (*before[0], before[1]), strict=True):
+        np.testing.assert_array_equal(table, kept)
+    task.reset(1, np.random.default_rng(0))
+    task.step(action, np.array([True, False, True]))
+
+
+def test_the_kernel_makes_no_step_beyond_an_episode_s_end(task):
+    """Whoever calls it."""
+    task.reset(np.arange(3), np.random.default_rng(0))
+    task.run_passively()
+    if task.plant.lanes_abreast > 1:
+        pytest.skip("lanes that go together are on lines without an end")
+    kept = task.plant.run.table.copy()
+    task._over[:] = False
+    task._any_over = False
+    for _ in range(1000):
+        task.step(np.zeros((3, 1)))
+    np.testing.assert_array_equal(task.plant.run.table, kept)
+
+
+def test_a_plant_runs_neither_beyond_its_line_nor_without_rows():
+    plant = Plant(load_catenary("en50318-2002"), load_pantograph("en50318-2002"), spans=10)
+    plant.start(0, 80.0)
+    with pytest.raises(InputError, match="rows for 99 steps, not for 100; ask for more"):
+        plant.advance_passively(100, plant.samples(100))
+    plant.advance_passively(99, plant.samples(100))
+    with pytest.raises(InputError, match="beyond the line's end at"):
+        plant.advance_passively(10**6, plant.samples(1))
