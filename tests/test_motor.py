@@ -72,7 +72,7 @@ class Bench:
     def run(self, forces, interval):
         """Height, speed, current of each motor, and force, after each time step."""
         rows, place = [], len(MotorRow)  # where those of the motors on the head begin
-        samples = self.plant.samples(2)
+        samples = self.plant.samples(1)
         per_ampere = self.motor.force_per_ampere
         for force in forces:
             command = np.array([[[0.0, force]]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..backend import of_lanes
 from ..base.arrays import Array
@@ -13,7 +14,7 @@ from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.state import Row
-from ..plant.valid_range import Ending, reason
+from ..plant.valid_range import LARGEST_HEIGHT, Ending, reason
 from .identity import identity
 from .state import TaskRow
 
@@ -22,22 +23,24 @@ if TYPE_CHECKING:
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
-LARGEST_HEIGHT = 3.0
-"""Height of the wire (m), either way, beyond which it has, too."""
 
 
-def refuse_divergence(task: Task, lanes: Any, deviation: Array, height: Array) -> None:
-    """Raise InputError where the mean deviation of a lane, (n,), from its nominal force (N) or its wire
-    height (m) is that of no line.
+def diverged(task: Task, lanes: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
+    """Whether the mean deviation of lanes, (n,), from their nominal force (N), or their wire's height (m),
+    is that of no line.
     """
     possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
     endings = of_lanes(task.episode.table, lanes)[:, TaskRow.ENDING]
-    for lane in lanes[~possible | (endings == Ending.DIVERGED)].tolist():
-        plant = task.plant
-        raise InputError(
-            f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
-            f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; {_way_out(plant)}."
-        )
+    return np.asarray(~possible | (endings == Ending.DIVERGED))
+
+
+def divergence(task: Task, lane: int) -> str:
+    """That a lane's computation diverged, and what to do, as a sentence."""
+    plant = task.plant
+    return (
+        f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
+        f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; {_way_out(plant)}."
+    )
 
 
 def _way_out(plant: Plant) -> str:
@@ -63,7 +66,8 @@ def trajectory(
     if steps:
         deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - nominal_force))
         highest = np.max(np.abs(rows[:, Row.WIRE_HEIGHT]))
-        refuse_divergence(task, np.array([lane]), deviation[None], highest[None])
+        if diverged(task, np.array([lane]), deviation[None], highest[None])[0]:
+            raise InputError(divergence(task, lane))
     uplift, tension = (each[lane, 1 : steps + 1] for each in (task.samples.uplift, task.samples.tension))
     middle = (np.arange(steps) + 0.5) * plant.time_step
     return Trajectory(

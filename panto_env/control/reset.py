@@ -56,6 +56,13 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
+    low = nominal.argmin()
+    if not nominal[low] > 0:  # the reward is told in shares of it
+        raise InputError(
+            f"At {3.6 * task.speed[lanes[low]]:g} km/h nothing presses '{task.plant.pantograph.name}' "
+            f"against the wire, its lift is {nominal[low]:g} N; give it a static_force or an "
+            "aerodynamic_coefficient, or ask for a mean_force."
+        )
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
     rows[:, TaskRow.PER_SPREAD] = 1 / spread

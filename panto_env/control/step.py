@@ -31,7 +31,7 @@ from ..plant.drift import mean_stride, position_after
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import CONTACTS, PLACE, ROW, SCRATCH, SCRATCH_ROWS
 from ..plant.step import new_scratch, record_group, step_group
-from ..plant.valid_range import ENDING
+from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .observation import begin_history, entry_of, prepare_entries, remember
 from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
@@ -65,8 +65,11 @@ def end_episodes(line, wire, episode, own, task, values, flags, lane):
     """Whether episodes end here; those that end early pay for it."""
     ending = 0.0 * own[ROW.STEP] + ending_by_wire(line, wire, lane)
     ending = choose(task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit, ENDING.LOSS, ending)
-    ending = choose(magnitude(own[ROW.STATE]) <= episode.head_range, ending, ENDING.HEAD)  # nor is NaN
+    ending = choose(magnitude(own[ROW.STATE]) <= episode.head_range, ending, ENDING.HEAD)
+    ending = choose(magnitude(own[ROW.STATE]) <= LARGEST_HEIGHT, ending, ENDING.DIVERGED)  # nor is NaN
     early, at_end = ending > 0.0, own[ROW.STEP] >= task[TASK_ROW.END]
+    for k in range(RESULT.REWARD, RESULT.CONTACT_FORCE):  # reward and its terms
+        values[k] = choose(ending == ENDING.DIVERGED, 0.0, values[k])
     values[RESULT.REWARD] -= choose(early, early_end_charge(episode, own, task), 0.0)
     task[TASK_ROW.ENDING] = ending
     put_across(flags, FLAG.TERMINATED, lane, early)
@@ -121,7 +124,8 @@ def control_group(packed, scratch, now, entry, entries, values, flags, lane):
             break
     prepare_entries(episode, sensors, run, own, now, lane)
     for k in range(entries.shape[0]):
-        put_across(entries, k, lane, entry_of(episode, own, task, now, k, entry))
+        seen = entry_of(episode, own, task, now, k, entry)
+        put_across(entries, k, lane, choose(task[TASK_ROW.ENDING] == ENDING.DIVERGED, 0.0, seen))
     remember(episode, task, now)
     tell(run, own, told, lane)
     return ended

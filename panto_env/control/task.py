@@ -38,7 +38,7 @@ from .memory import check_memory, record_size
 from .normalise import normalised
 from .observation import layout
 from .passive_run import LOW_PASSED, PassiveRun, passive_run
-from .record import ending, refuse_divergence, trajectory
+from .record import diverged, divergence, ending, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
 from .settings import RunSettings, speed_range
@@ -378,27 +378,30 @@ class Task:
 
         Raises InputError where the computation diverged.
         """
-        values = self.figures_of(np.array([lane]))
+        values, without = self.figures_of(np.array([lane]))
+        if without.any():
+            raise InputError(divergence(self, lane))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
-    def figures_of(self, lanes: Any) -> dict[str, Array]:
-        """The same of several lanes, (n,), by name.
-
-        Raises InputError where the computation diverged.
-        """
+    def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
+        """The same of several lanes, (n,), by name; and which have none, as their computation diverged."""
         run, supports = of_lanes(self.plant.run.table[0], lanes), self.plant.model.supports
-        figures = figures_so_far(
-            of_lanes(self.episode.table, lanes),
-            self.running.peak[lanes],
-            run,
-            supports,
-            self.plant.time_step,
-            partial(self.plant.ahead, lanes),
-        )
+        with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
+            figures = figures_so_far(
+                of_lanes(self.episode.table, lanes),
+                self.running.peak[lanes],
+                run,
+                supports,
+                self.plant.time_step,
+                partial(self.plant.ahead, lanes),
+            )
         distance = figures["distance"]
         deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
-        refuse_divergence(self, lanes, deviation, run[:, Row.WIRE_HEIGHT])
-        return figures
+        return figures, diverged(self, lanes, deviation, run[:, Row.WIRE_HEIGHT])
+
+    def divergence(self, lane: int) -> str:
+        """That a lane's computation diverged, and what to do, as a sentence."""
+        return divergence(self, lane)
 
     def target_mean(self, lane: int) -> float:
         """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""

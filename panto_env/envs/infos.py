@@ -14,7 +14,7 @@ from ..control import Task
 from ..control.episode import Flags
 from ..control.state import Result
 from ..metrics.figures import Figures
-from .lanes import Answer
+from .lanes import Answer, ended_figures
 
 # Rows of results as plain integers: members of an enum would take longer.
 REWARD, TERM = int(Result.REWARD), int(Result.TERM)
@@ -27,9 +27,9 @@ FIGURES_TO_COME = {field.name: math.inf for field in fields(Figures)}
 no two infos with nan are equal, which Gymnasium's checkers ask, and some learners refuse it."""
 
 
-def told(figures: Figures) -> dict[str, float]:
-    """Figures of an ended episode for infos: infinite where it has none, as uplift without supports."""
-    return {name: math.inf if math.isnan(value) else value for name, value in figures.as_dict().items()}
+def told(task: Task) -> dict[str, float]:
+    """Figures of the ended episode of a task's only lane, for infos."""
+    return {name: float(value[0]) for name, value in ended_figures(task, np.zeros(1, dtype=np.int64)).items()}
 
 
 def lane_infos(answer: Answer) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
     """Figures, (lanes,), by name, of the lanes whose episodes have ended, as they stand in infos."""
     values: dict[str, Any] = {}
     for name, value in figures.items():
-        values[name], values[f"_{name}"] = np.where(np.isnan(value), np.inf, value), lanes.copy()
+        values[name], values[f"_{name}"] = value, lanes.copy()
     return {"figures": values, "_figures": lanes.copy()}
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
+from ..base.errors import AccuracyWarning
 from ..control import Task
 from ..control.episode import Flags, Results
 from ..control.start import LaneGenerators
@@ -92,12 +94,12 @@ class Lanes:
     def figures(self, lanes: Flags) -> dict[str, Array]:
         """Figures of the episodes of lanes, by name, (lanes,), zero for the others.
 
-        Raises InputError where a computation diverged.
+        Infinite, with an AccuracyWarning, where a computation diverged.
         """
         values: dict[str, Array] = {}
         for task, its in self._tasks():
             own = np.flatnonzero(its & lanes)
-            for name, value in task.figures_of(own).items() if len(own) else ():
+            for name, value in ended_figures(task, own).items() if len(own) else ():
                 values.setdefault(name, np.zeros(len(lanes)))[own] = value
         return values
 
@@ -109,3 +111,15 @@ class Lanes:
         if usual.any():
             yield self.usual, usual
         yield from self._others
+
+
+def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:
+    """Figures of lanes, (n,), whose episodes have ended, by name: what infos tell of them.
+
+    Infinite where a run has none: as uplift without supports, or all, with an AccuracyWarning that says why,
+    where its computation diverged.
+    """
+    figures, without = task.figures_of(lanes)
+    for lane in lanes[without].tolist():
+        warnings.warn(task.divergence(lane), AccuracyWarning, stacklevel=2)
+    return {name: np.where(without | np.isnan(value), np.inf, value) for name, value in figures.items()}

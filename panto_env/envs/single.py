@@ -211,7 +211,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         if terminated or truncated:
             self._running = False
-            info["figures"] = told(self.task.figures(0))
+            info["figures"] = told(self.task)
         if self.render_mode is not None:
             self._reward_so_far += reward
             if self.render_mode == "human":

@@ -103,7 +103,7 @@ class Plant:
         """The same of one lane."""
         return float(of_lanes(self.run.table[0], lane)[row])
 
-    def ahead(self, lanes: Array, steps: Array) -> Array:
+    def ahead(self, lanes: Any, steps: Array) -> Array:
         """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
         return ahead(of_lanes(self.run.drift, lanes), steps)
 
@@ -201,8 +201,8 @@ class Plant:
             raise InputError(
                 f"The samples have rows for {rows - 1} steps, not for {end.max():.0f}; ask for more."
             )
-        lanes = np.arange(self.lanes)
-        position = end * self.row(Row.STRIDE) + self.ahead(lanes, end[:, None])[:, 0]
+        drifted = self.ahead(np.arange(self.lanes), end[:, None])[:, 0]
+        position = end * self.row(Row.STRIDE) + drifted
         if not self.model.massless and position.max() > self.model.length + 1e-6:
             raise InputError(
                 f"Lane {position.argmax()} would run to {position.max():.1f} m, beyond the line's end at "

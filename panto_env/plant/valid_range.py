@@ -8,6 +8,8 @@ from ..backend import constants
 
 HEAD_RANGE = 0.3
 """Height of the head (m), either way, beyond which a run ends: outside the wire's clearance."""
+LARGEST_HEIGHT = 3.0
+"""Height of head or wire (m), either way, beyond which, ten times any real one, the computation diverged."""
 LOSS_TIME = 0.5
 """Time without contact (s) after which a run ends."""
 FREE_UPLIFT = 0.24
@@ -23,7 +25,7 @@ class Ending(IntEnum):
     """Why a run ended early."""
 
     NONE = 0  # it did not
-    HEAD = 1  # the head left HEAD_RANGE, or its height is no number
+    HEAD = 1  # the head left HEAD_RANGE
     LOSS = 2  # contact was lost for LOSS_TIME
     STOP = 3  # the contact wire reached the steady arm's stop
     WIRES = 4  # contact wire and messenger wire touched

@@ -17,6 +17,8 @@ HARD_STIFFNESS, HARD_DAMPING = 100e3, 300.0
 """Of a contact (N/m, N s/m) beyond which it needs a finer grid: see ``PantographData.hard_contact``."""
 STIFFEST_CONTACT = 1e6
 """Contact spring (N/m): beyond it, rounding and a moving point of contact can make a force that grows."""
+SOFTEST_SPRING = 1.0
+"""Spring between two masses (N/m): with less the frame's lift does not reach the head."""
 Contact = Annotated[float, Between(1e3, STIFFEST_CONTACT, "N/m")]
 
 
@@ -60,6 +62,12 @@ class PantographData(Settings):
                 raise ValueError(
                     f"{key} must hold one value a mass: {len(self.masses)} masses are given, "
                     f"but {len(getattr(self, key))} {key}"
+                )
+        for number, spring in enumerate(self.stiffnesses[:-1], start=1):
+            if spring < SOFTEST_SPRING:
+                raise ValueError(
+                    f"stiffnesses must be at least {SOFTEST_SPRING:g} N/m but for the last, to the ground: "
+                    f"nothing holds mass {number} up with {spring:g} N/m below it"
                 )
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
