@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.linear_algebra import one_thread
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ...state import CONTACTS
@@ -73,9 +74,10 @@ class ThreeSpan:
         check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
-        self.line: Any = _constants(data, self.time_step)
         places = np.linspace(0.0, 3 * data.span_length, VIEW_POINTS)
-        self._view_shapes = mode_shapes(data, modes(data)[1], places)
+        with one_thread():
+            self.line: Any = _constants(data, self.time_step)
+            self._view_shapes = mode_shapes(data, modes(data)[1], places)
         self.wire: Any = _at_rest(lanes, data.modes)
         self.contact_gain = contact_gain(self.line)
         self.usual_end = spans * data.span_length
