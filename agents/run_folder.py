@@ -96,7 +96,7 @@ class RunFolder:
             table = json.loads(self.settings.read_text(encoding="utf-8"))
             if not isinstance(table, dict):
                 raise ValueError("it holds no table")
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise InputError(
                 f"{self.settings} could not be read ({error}); train into another --output."
             ) from error

@@ -31,6 +31,10 @@ MOST_LANES = 65_536
 """Of which each has a line of its own in memory."""
 
 
+LARGEST_SEED = 1_000_000_000
+"""Of the libraries' generators, which take no number of any size."""
+
+
 class Evaluation(Settings):
     """How often the policy, without its exploration, is compared with the passive pantograph."""
 
@@ -45,7 +49,9 @@ class Training(Settings):
     """Everything that defines a training."""
 
     algorithm: str = Field(description="one of ALGORITHMS")
-    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all random numbers")
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = Field(
+        0, description="of all random numbers"
+    )
     total_steps: Count = Field(description="environment steps, summed over all lanes")
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
         8, description="environments stepped together"

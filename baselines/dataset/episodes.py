@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.control.action import numbers
 from panto_env.policies import Policy, errors_name, find_policy, wishes
 
 from ..benchmark.seeds import DATA
@@ -176,8 +177,8 @@ def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[i
     """What a policy does, within -1..1."""
     with errors_name(name, "act"):
         returned = policy.act(seen.copy())  # a copy: it may keep what it was shown
-        action = np.asarray(returned, dtype=float)
-        if action.shape != shape or not np.isfinite(action).all():
+        action = numbers(returned)
+        if action is None or action.shape != shape or not np.isfinite(action).all():
             raise InputError(
                 f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
             )

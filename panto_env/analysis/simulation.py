@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Task, passive_mean, trim_of_pass
+from ..control.action import numbers
 from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
@@ -101,8 +102,8 @@ def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
         with errors_name(name, "act"):
             # A copy: a policy may keep what it was shown.
             returned = policy.act(results.observation[0].copy())
-            action = np.asarray(returned, dtype=float)
-            if action.shape != shape or not np.isfinite(action).all():
+            action = numbers(returned)
+            if action is None or action.shape != shape or not np.isfinite(action).all():
                 raise InputError(
                     f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
                 )

@@ -17,7 +17,6 @@ from ..base.names import hint
 from ..base.settings import Settings
 from ..control import Task
 from ..control.arguments import check_arguments
-from ..control.memory import check_memory
 from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice, in_words
@@ -149,9 +148,9 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
     longest = max(passes, key=_seconds)
     given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
     with _named(longest):
-        needed = Task(run_settings(given)).memory
+        cost = Task(run_settings(given)).cost
     at_once = workers_for(len(passes), workers)
-    check_memory(at_once * needed, f"{at_once} passes at once", ", or fewer workers")
+    cost._replace(memory=at_once * cost.memory).check(f"{at_once} passes at once", ", or fewer workers")
 
 
 def _seconds(one_pass: _Pass) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -77,7 +78,7 @@ def _find(family: str, source: str | Path) -> Path:
         return FOLDERS[family] / f"{text}.toml"
     if text.endswith(".toml"):
         path = Path(text)
-        if path.is_file():
+        if os.path.isfile(path):  # which no name is too odd for
             return path
         raise InputError(f"The {family} file {text} does not exist; give the path of a TOML file.")
     near = nearest(text, available(family))

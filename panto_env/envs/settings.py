@@ -11,6 +11,8 @@ from ..base.errors import InputError
 from ..base.ranges import Between
 from ..control.settings import RunSettings
 
+MOST_LANES = 10_000_000
+"""As many as a large machine's memory holds where the wire has no mass; fewer where it has."""
 Pixels = Annotated[int, Between(64, 4096)]
 SlowMotion = Field(
     1.0, description="how many times slower than in life a film of the frames is, as `render_fps` tells (-)"
@@ -38,13 +40,15 @@ class EnvironmentSettings(RunSettings):
 class VectorSettings(RunSettings):
     """Arguments of ``PantographVectorEnv``."""
 
-    num_envs: int = Field(1, description="lanes: environments side by side")
+    num_envs: Annotated[int, Between(1, MOST_LANES)] = Field(
+        1, description="lanes: environments side by side"
+    )
     autoreset_mode: AutoresetMode = Field(
         AutoresetMode.NEXT_STEP,
         description='when a lane whose episode has ended begins anew: "NextStep", "SameStep" or "Disabled"',
     )
-    max_episode_steps: int | None = Field(
-        None, ge=1, description="steps after which an episode is truncated; by default the line's end"
+    max_episode_steps: Annotated[int, Between(1, 10**12)] | None = Field(
+        None, description="steps after which an episode is truncated; by default the line's end"
     )
     render_mode: Literal["rgb_array"] | None = Field(
         None, description='None, or "rgb_array" for frames from `render()`, one per lane that is drawn'
