@@ -19,6 +19,7 @@ from .base import plugins
 from .base.errors import InputError
 from .base.inline import parse_inline
 from .base.names import suggest
+from .base.shown import shown
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
 
@@ -49,7 +50,7 @@ def find_policy(source: Any) -> Policy:
         if hasattr(source, "reset") and hasattr(source, "act"):
             return source  # type: ignore[no-any-return]
         raise InputError(
-            f"A policy must have the methods reset and act, or be a name; {source!r} is neither."
+            f"A policy must have the methods reset and act, or be a name; {shown(source)} is neither."
         )
     name, _, parameters = str(source).partition(":")
     known = plugins.installed(plugins.POLICIES)

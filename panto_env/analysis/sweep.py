@@ -15,6 +15,7 @@ from typing import Any
 from ..base.errors import InputError
 from ..base.names import hint
 from ..base.settings import Settings
+from ..base.shown import shown
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
@@ -126,7 +127,7 @@ def _check(
         raise InputError("There is no policy to run; name at least one, or leave policies at its default.")
     for policy in policies:
         if not (policy is None or isinstance(policy, str | Path)):
-            raise InputError(f"A sweep takes policies by name or model file, not {policy!r}.")
+            raise InputError(f"A sweep takes policies by name or model file, not {shown(policy)}.")
     for name, values in parameters.items():
         _check_name(name, entries)
         if len(values) == 0:

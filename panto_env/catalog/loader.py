@@ -15,6 +15,7 @@ from ..base.explanation import explain
 from ..base.files import read_toml
 from ..base.names import nearest, suggest
 from ..base.settings import Settings
+from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.pantograph.schema import PantographData
 
@@ -113,7 +114,7 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
     if not isinstance(table["kind"], str) or table["kind"] not in schemas:
-        raise _TableError(f"key 'kind' must be {kinds} (given: {table['kind']!r})")
+        raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
     return schemas[table["kind"]]
 
 

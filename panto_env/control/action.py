@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import reprlib
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import shortly
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 NUMBERS = "fiub"
@@ -20,7 +20,7 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     plain = type(action) is np.ndarray and (action.dtype is SINGLE or action.dtype is DOUBLE)
     force: Array | None = action if plain else numbers(action)
     if force is None:
-        raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {reprlib.repr(action)}.")
+        raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {shortly(action)}.")
     if force.shape != shape:
         raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
     return force

@@ -22,6 +22,7 @@ from ..backend import (
 )
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import shown
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
@@ -71,7 +72,7 @@ class Task:
         the pantograph as designed. Raises InputError for what is not valid together.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
-            raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
+            raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.catenary.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or take another line.")
         self.settings, self.lanes, self.actuator = settings, lanes, settings.actuator

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError
 from ..base.ranges import Between
+from ..base.shown import shown
 from ..control.settings import RunSettings
 
 MOST_LANES = 10_000_000
@@ -33,7 +34,7 @@ class EnvironmentSettings(RunSettings):
     @classmethod
     def _known(cls, value: object) -> object:
         if value not in (None, "human", "rgb_array"):
-            raise InputError(f"render_mode must be None, 'human' or 'rgb_array', not {value!r}.")
+            raise InputError(f"render_mode must be None, 'human' or 'rgb_array', not {shown(value)}.")
         return value
 
 
@@ -66,14 +67,14 @@ class VectorSettings(RunSettings):
             return AutoresetMode(value)
         except ValueError as error:
             names = ", ".join(mode.value for mode in AutoresetMode)
-            raise InputError(f"autoreset_mode must be one of {names}, not {value!r}.") from error
+            raise InputError(f"autoreset_mode must be one of {names}, not {shown(value)}.") from error
 
     @field_validator("render_mode", mode="before")
     @classmethod
     def _pictures(cls, value: object) -> object:
         if value not in (None, "rgb_array"):
             raise InputError(
-                f"render_mode of the vector environment must be None or 'rgb_array', not {value!r}."
+                f"render_mode of the vector environment must be None or 'rgb_array', not {shown(value)}."
             )
         return value
 

@@ -8,7 +8,6 @@ begins at it.
 from __future__ import annotations
 
 import math
-import reprlib
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import shortly
 from ..plant.catenary.schema import MOST_SPANS
 
 Spans: TypeAlias = tuple[int, int]
@@ -39,7 +39,7 @@ def check_spans(spans: Any) -> None:
     if not (whole and 1 <= pair[0] <= pair[1] <= MOST_SPANS):
         raise InputError(
             f"spans must be two whole numbers, first and last, counted from 1 to {MOST_SPANS}, not "
-            f"{reprlib.repr(spans)}."
+            f"{shortly(spans)}."
         )
 
 
