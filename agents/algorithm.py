@@ -15,9 +15,14 @@ if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
     from .demonstrations import Demonstrations
 
-Count = Annotated[int, Field(gt=0, strict=True)]
 MOST_KEPT = 50_000_000
 """Steps of environments that may be kept in memory: about 10 GB."""
+MOST_STEPS = 1_000_000_000
+"""Of a training, and of anything that is counted in it: some days, on the fastest machines."""
+Count = Annotated[int, Field(gt=0, le=MOST_STEPS, strict=True)]
+MOST_UNITS, MOST_LAYERS = 4096, 16
+"""Of a network: wider and deeper ones take minutes a step, and learn nothing here that small ones don't."""
+Units = Annotated[int, Field(gt=0, le=MOST_UNITS, strict=True)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
 
@@ -29,7 +34,9 @@ class Algorithm(Settings, ABC):
     )
     batch_size: Count = Field(256, description="transitions in a minibatch")
     gamma: Share = Field(0.97, description="discount of a reward one control step later")
-    net_arch: tuple[Count, ...] = Field((64, 64), description="widths of the hidden layers")
+    net_arch: tuple[Units, ...] = Field(
+        (64, 64), max_length=MOST_LAYERS, description="widths of the hidden layers"
+    )
     activation: Literal["tanh", "relu"] = Field("tanh", description="of the hidden layers")
 
     @abstractmethod

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.control.settings import RunSettings
 from panto_env.policies import errors_name, find_policy, wishes
 
@@ -43,6 +44,6 @@ def check_wishes(name: str, settings: RunSettings) -> None:
         offered = getattr(settings, key)
         if wanted != offered:
             raise InputError(
-                f"the policy '{name}' asks for {key} = {wanted!r}, and the environment has {offered!r}; set "
-                "it so"
+                f"the policy '{name}' asks for {key} = {shown(wanted)}, and the environment has "
+                f"{shown(offered)}; set it so"
             )

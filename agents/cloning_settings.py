@@ -8,7 +8,9 @@ from pydantic import Field
 
 from panto_env.base.settings import NonNegative, Positive, Settings
 
-_Count = Annotated[int, Field(gt=0, strict=True)]
+from .algorithm import MOST_KEPT
+
+_Count = Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)]
 
 
 class Cloning(Settings):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.control.context import Context
 from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.policies import Policy, find_policy
@@ -63,7 +64,7 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
     for name in OBSERVATION_SETTINGS:
         needed, here = getattr(needs, name), getattr(offered, name)
         if needed != here:
-            return f"it was trained with {name}={needed!r}, this is {here!r}; set it so"
+            return f"it was trained with {name}={shown(needed)}, this is {shown(here)}; set it so"
     if needs.channels != offered.channels:
         needed, here = PLACES[needs.channels], PLACES[offered.channels]
         return (

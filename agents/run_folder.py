@@ -14,6 +14,7 @@ from filelock import FileLock, Timeout
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
+from panto_env.base.shown import shown
 
 from .evaluation import Pair
 from .model_file import read_model
@@ -54,7 +55,7 @@ class RunFolder:
         before = self.read_settings()
         old, new = (_dotted(settings.model_dump(mode="json")) for settings in (before, training))
         differing = [
-            f"{key} is {new.get(key)!r}, was {old.get(key)!r}"
+            f"{key} is {shown(new.get(key))}, was {shown(old.get(key))}"
             for key in sorted(old.keys() | new.keys())
             if key != EXTENDABLE and new.get(key) != old.get(key)
         ]
@@ -96,7 +97,7 @@ class RunFolder:
             table = json.loads(self.settings.read_text(encoding="utf-8"))
             if not isinstance(table, dict):
                 raise ValueError("it holds no table")
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise InputError(
                 f"{self.settings} could not be read ({error}); train into another --output."
             ) from error

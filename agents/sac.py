@@ -24,7 +24,7 @@ class SAC(Algorithm):
     buffer_size: Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)] = Field(
         200_000, description="transitions that the replay buffer holds"
     )
-    learning_starts: Annotated[int, Field(ge=0, strict=True)] = Field(
+    learning_starts: Annotated[int, Field(ge=0, le=MOST_KEPT, strict=True)] = Field(
         2_000, description="steps with random actions before learning starts"
     )
     tau: Share = Field(0.005, description="share of the critic that its target takes over per update")

@@ -14,6 +14,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
 from panto_env.base.settings import Positive, Settings, parse
+from panto_env.base.shown import shown
 from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
@@ -31,6 +32,10 @@ MOST_LANES = 65_536
 """Of which each has a line of its own in memory."""
 
 
+LARGEST_SEED = 1_000_000_000
+"""Of the libraries' generators, which take no number of any size."""
+
+
 class Evaluation(Settings):
     """How often the policy, without its exploration, is compared with the passive pantograph."""
 
@@ -45,7 +50,9 @@ class Training(Settings):
     """Everything that defines a training."""
 
     algorithm: str = Field(description="one of ALGORITHMS")
-    seed: Annotated[int, Field(ge=0, strict=True)] = Field(0, description="of all random numbers")
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = Field(
+        0, description="of all random numbers"
+    )
     total_steps: Count = Field(description="environment steps, summed over all lanes")
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
         8, description="environments stepped together"
@@ -84,7 +91,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     """
     name = environment.get("id")
     if not isinstance(name, str) or name not in IDS:
-        raise InputError(f"unknown id {name!r}: {suggest(str(name), list(IDS))}.")
+        raise InputError(f"unknown id {shown(name)}: {suggest(shown(name), list(IDS))}.")
     own = {key: value for key, value in environment.items() if key != "id"}
     _check_keys(own, tuple(fields()), "[environment]")
     return {**IDS[name], **own}
@@ -114,7 +121,9 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         _check_keys(table, tuple(Training.model_fields), "the top level")
         algorithm = table.get("algorithm")
         if not isinstance(algorithm, str) or algorithm not in ALGORITHMS:
-            raise InputError(f"unknown algorithm {algorithm!r}: {suggest(str(algorithm), list(ALGORITHMS))}")
+            raise InputError(
+                f"unknown algorithm {shown(algorithm)}: {suggest(shown(algorithm), list(ALGORITHMS))}"
+            )
         algorithm_type = ALGORITHMS[algorithm]
         known: dict[str, type[Settings]] = {
             "hyperparameters": algorithm_type,

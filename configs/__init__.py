@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -34,7 +35,7 @@ def find(source: str | Path, kind: Kind) -> Path:
     Raises InputError where there is none.
     """
     path = Path(source)
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     if str(source) in names(kind):
         return FOLDER / f"{source}.toml"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import runpy
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -18,6 +19,7 @@ from .base import plugins
 from .base.errors import InputError
 from .base.inline import parse_inline
 from .base.names import suggest
+from .base.shown import shown
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
 
@@ -48,7 +50,7 @@ def find_policy(source: Any) -> Policy:
         if hasattr(source, "reset") and hasattr(source, "act"):
             return source  # type: ignore[no-any-return]
         raise InputError(
-            f"A policy must have the methods reset and act, or be a name; {source!r} is neither."
+            f"A policy must have the methods reset and act, or be a name; {shown(source)} is neither."
         )
     name, _, parameters = str(source).partition(":")
     known = plugins.installed(plugins.POLICIES)
@@ -59,7 +61,7 @@ def find_policy(source: Any) -> Policy:
     if name.endswith(".py"):
         return _policy_from_file(str(source), Path(name), parameters)
     if path.suffix[1:] in loaders:
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise InputError(f"The model file {path} does not exist; check the path.")
         loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
         return loaded
@@ -141,7 +143,7 @@ def _policy_from_file(source: str, path: Path, text: str) -> Policy:
     name, _, parameters = text.partition(":")
     if not name:
         raise InputError(f"Policy '{source}' must name a class in the file, as {path}:Name.")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"The Python file {path} does not exist; check the path.")
     content = _run_file(path.resolve(), path.stat().st_mtime_ns)
     if not callable(content.get(name)):

@@ -14,9 +14,10 @@ import rich.progress
 import rich.table
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from .base.files import PICTURES, check_output, finite
-from .base.table import Table
+from .base.table import Alarm, Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 
@@ -37,8 +38,17 @@ Plot = Annotated[
     typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
 ]
 
-console = Console()
-progress_console = Console(stderr=True)
+# Without markup: names and descriptions are a user's, who may write brackets into them.
+console = Console(markup=False)
+progress_console = Console(stderr=True, markup=False)
+ALARM = "bold red"
+"""Style of what is wrong."""
+
+
+def alert(words: str, rest: str = "", to: Console | None = None) -> None:
+    """Print a line whose first words say that something is wrong, by default to standard output."""
+    text = Text.assemble((words, ALARM), f" {rest}" if rest else "")
+    (to or console).print(text, soft_wrap=True)
 
 
 def print_json(value: Any) -> None:
@@ -47,18 +57,29 @@ def print_json(value: Any) -> None:
     sys.stdout.write("\n")
 
 
+LONGEST = 1000
+"""Letters of a message: what a user gave may be a whole file."""
+
+
+def one_line(text: str) -> str:
+    """A message as one line that any terminal bears: what is no letter is escaped, a long middle left out."""
+    plain = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} [...] {plain[-LONGEST // 2 :]}"
+
+
 def this_command() -> str:
     """The command that is running, as it is noted beside what it makes."""
     return shlex.join(["panto", *sys.argv[1:]])
 
 
 def print_table(table: Table) -> None:
-    """Print a table to standard output; cells may hold markup of Rich."""
+    """Print a table to standard output."""
     shown = rich.table.Table(title=table.title)
     for column, heading in enumerate(table.headings):
         shown.add_column(heading, justify="left" if column < table.text_columns else "right")
     for row, cells in enumerate(table.cells):
-        shown.add_row(*cells, end_section=row in table.section_ends)
+        styled = (Text(cell, ALARM) if isinstance(cell, Alarm) else cell for cell in cells)
+        shown.add_row(*styled, end_section=row in table.section_ends)
     console.print(shown)
 
 

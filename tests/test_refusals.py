@@ -17,7 +17,7 @@ from panto_env.base.settings import parse
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.control import Task
-from panto_env.control.memory import SHARE
+from panto_env.control.cost import SHARE
 from panto_env.control.settings import run_settings
 from panto_env.envs import BARE
 from panto_env.plant.pantograph import build
@@ -211,7 +211,7 @@ def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monke
 
 def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypatch):
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
-    needed = Task(run_settings({"distance": 540.0})).memory
+    needed = Task(run_settings({"distance": 540.0})).cost.memory
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 1.5 * needed / SHARE)
     with pytest.raises(InputError, match=r"The record of 2 passes at once would take .*, or fewer workers"):
         sweep({"pantograph.masses.0": [7.0, 8.0]}, distance=540.0, workers=2)

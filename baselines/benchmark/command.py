@@ -83,9 +83,9 @@ def benchmark(
     if json:
         print_json(outcome.as_dict())
         return
-    console = Console()
+    console = Console(markup=False)
     if not console.is_terminal:
-        console = Console(width=WIDTH)
+        console = Console(markup=False, width=WIDTH)
     console.print(tables(outcome))
 
 

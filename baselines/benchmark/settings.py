@@ -12,15 +12,19 @@ from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, mo
 from panto_configs import find
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
+from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
+from panto_env.base.shown import shown
 from panto_env.control.settings import default, description
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
+from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 
 from .seeds import TEST, check_seeds
 
 S = TypeVar("S", bound=Settings)
+_Span = Annotated[int, Between(1, MOST_SPANS)]
 REFERENCE = "passive"
 """The policy that every other one is compared with."""
 
@@ -52,7 +56,7 @@ class Line(Settings):
     pantograph: str = Field(default("pantograph"), description=description("pantograph"))
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
     distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
-    spans: tuple[int, int] | None = Field(
+    spans: tuple[_Span, _Span] | None = Field(
         None,
         description="first and last span that the figures cover, counted from 1; by default from the "
         "tenth, where the start has died out, to the last one that every run covers completely",
@@ -141,7 +145,7 @@ class BenchmarkSettings(Settings):
 def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     twice = next((value for value, count in Counter(values).items() if count > 1), None)
     if twice is not None:
-        raise ValueError(f"{twice!r} is given twice")
+        raise ValueError(f"{shown(twice)} is given twice")
     return values
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shortly
+from panto_env.control.action import numbers
 from panto_env.policies import Policy, errors_name, find_policy, wishes
 
 from ..benchmark.seeds import DATA
@@ -176,11 +177,9 @@ def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[i
     """What a policy does, within -1..1."""
     with errors_name(name, "act"):
         returned = policy.act(seen.copy())  # a copy: it may keep what it was shown
-        action = np.asarray(returned, dtype=float)
-        if action.shape != shape or not np.isfinite(action).all():
-            raise InputError(
-                f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
-            )
+        action = numbers(returned)
+        if action is None or action.shape != shape or not np.isfinite(action).all():
+            raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
     clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
     return clipped
 

@@ -15,6 +15,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.ranges import Between
 from panto_env.base.settings import NonNegative, Settings, parse
+from panto_env.base.shown import shown
 from panto_env.control.settings import description
 
 from ..benchmark.seeds import DATA
@@ -131,7 +132,7 @@ class EpisodesSettings(Settings):
 def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     twice = next((value for value, count in Counter(values).items() if count > 1), None)
     if twice is not None:
-        raise ValueError(f"{twice!r} is given twice")
+        raise ValueError(f"{shown(twice)} is given twice")
     return values
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -87,7 +88,7 @@ def oracle(
     settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
     command = this_command()
     wanted = asked(settings)
-    before = read(output)["cells"] if output is not None and Path(output).exists() else []
+    before = read(output)["cells"] if output is not None and os.path.exists(output) else []
     done: list[dict[str, Any] | None] = [
         next((each for each in before if each["asked"] == one), None) for one in wanted
     ]

@@ -11,8 +11,8 @@ import numpy as np
 from panto_env.analysis.pool import in_threads, workers_for
 from panto_env.base.arrays import Array
 from panto_env.control import Task
+from panto_env.control.cost import check_record
 from panto_env.control.mean_force import Trim
-from panto_env.control.memory import check_memory
 from panto_env.control.settings import RunSettings
 from panto_env.plant.state import CONTACTS, SAMPLE_ROWS, Place, Row, Samples
 
@@ -84,7 +84,7 @@ class _Group:
         self._first = begin * task.control_steps
         rows = self._first + control_steps * task.control_steps + 1
         shape = (lanes, rows, CONTACTS, SAMPLE_ROWS)
-        check_memory(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
+        check_record(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never touched, and so take no memory.
         self._samples = Samples(
             rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))

@@ -10,6 +10,7 @@ import numpy as np
 from panto_env import Trajectory
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.low_pass import low_pass_in_place
 
@@ -118,7 +119,7 @@ def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterat
     elif start == "random":
         knots = problem.knots.within(noise(problem))
     elif start != "zero":
-        raise InputError(f"A start must be one of {', '.join(STARTS)}, not {start!r}.")
+        raise InputError(f"A start must be one of {', '.join(STARTS)}, not {shown(start)}.")
     yield descend(problem, start, knots, progress=progress)
 
 

@@ -10,13 +10,18 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from panto_configs import find
 from panto_env.base.files import read_toml
+from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control.settings import default, description
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
+from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
 from .search import STARTS
 
+MOST_HOPS = 1000
+"""Each takes about as long as the first search."""
+_Span = Annotated[int, Between(1, MOST_SPANS)]
 Start = Literal[STARTS]  # type: ignore[valid-type]
 _Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(actuator_settings)]]
 
@@ -41,12 +46,15 @@ class OracleSettings(Settings):
 
     cells: tuple[Cell, ...] = Field((Cell(),), min_length=1, description="lines, actuators and speeds")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
-    spans: tuple[int, int] | None = Field(
+    spans: tuple[_Span, _Span] | None = Field(
         None, description="first and last span over which σ is least; by default those after the start"
     )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
     hops: int = Field(
-        0, ge=0, description="searches that follow from the best so far, shaken: more find steadier forces"
+        0,
+        ge=0,
+        le=MOST_HOPS,
+        description="searches that follow from the best so far, shaken: more find steadier forces",
     )
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"

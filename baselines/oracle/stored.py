@@ -124,7 +124,7 @@ def read(path: str | Path) -> dict[str, Any]:
     try:
         data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
         [one["fingerprint"] for one in (each["asked"] for each in data["cells"])]
-    except (ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
             f"{path} holds no oracles of this version; remove it, or name another file."
         ) from error

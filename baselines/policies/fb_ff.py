@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number
@@ -67,9 +68,9 @@ class FeedbackFeedforward(ForceLaw):
         self.amplitude = number("amplitude", amplitude, lowest=0)
         self.dead_zone = number("dead_zone", dead_zone, lowest=0)
         if reading not in READINGS:
-            raise ValueError(f"reading must be one of {', '.join(READINGS)}, not {reading!r}")
+            raise ValueError(f"reading must be one of {', '.join(READINGS)}, not {shown(reading)}")
         if speed_unit not in SPEED_UNITS:
-            raise ValueError(f"speed_unit must be one of {', '.join(SPEED_UNITS)}, not {speed_unit!r}")
+            raise ValueError(f"speed_unit must be one of {', '.join(SPEED_UNITS)}, not {shown(speed_unit)}")
         self.reading = reading
         self.speed_unit = speed_unit
 

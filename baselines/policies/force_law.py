@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.shown import shown
 from panto_env.control.context import Context
 
 
@@ -43,5 +44,5 @@ def number(name: str, value: object, lowest: float = -math.inf) -> float:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value) or value < lowest:  # type: ignore[arg-type,operator]
         bound = f" of at least {lowest:g}" if math.isfinite(lowest) else ""
-        raise ValueError(f"{name} must be a finite number{bound}, not {value!r}")
+        raise ValueError(f"{name} must be a finite number{bound}, not {shown(value)}")
     return float(value)  # type: ignore[arg-type]

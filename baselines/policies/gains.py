@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -67,7 +68,7 @@ def gain_file(source: str | Path) -> Path:
 
 def load_gains(path: Path) -> GainFile:
     """Read a file of gains. Raises InputError, naming the file, where it cannot be read or is not valid."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(
             f"There are no gains in {path}: make them with `panto tune`, or give them by the parameter gains."
         )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.control.context import Context
 
 from .gains import Source, find_gains
@@ -77,7 +78,9 @@ class TunableLaw(LanesLaw):
         if not isinstance(gains, str) and not (
             len(gains) and all(isinstance(each, int | float) and np.isfinite(each) for each in gains)
         ):
-            raise ValueError(f"gains must be finite numbers or the name of a file of gains, not {gains!r}")
+            raise ValueError(
+                f"gains must be finite numbers or the name of a file of gains, not {shown(gains)}"
+            )
         self._source = gains
 
     def begin(self, context: Context, lanes: int) -> None:

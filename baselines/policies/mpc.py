@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
 from panto_env.control.context import Context
 
 from .gains import Source
@@ -52,7 +53,7 @@ class PredictiveControl(TunableLaw):
         """
         super().__init__(gains)
         if not rate > 0:
-            raise ValueError(f"rate must be a positive number, not {rate!r}")
+            raise ValueError(f"rate must be a positive number, not {shown(rate)}")
         self._delays, self._rate = (delay, lag), rate
 
     def begin(self, context: Context, lanes: int) -> None:

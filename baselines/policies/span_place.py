@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from panto_env.base.shown import shown
+
 from .lanes_law import Array, LanesLaw, Observations
 
 PLACES = ("read", "counted")
@@ -16,7 +18,7 @@ class SpanPlace:
     def __init__(self, place: str) -> None:
         """place: one of PLACES; raises ValueError for another."""
         if place not in PLACES:
-            raise ValueError(f"place must be one of {', '.join(PLACES)}, not {place!r}")
+            raise ValueError(f"place must be one of {', '.join(PLACES)}, not {shown(place)}")
         self._counts = place == "counted"
 
     def begin(self, lanes: int) -> None:

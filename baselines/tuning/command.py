@@ -32,9 +32,9 @@ def tune(
         list[float] | None,
         typer.Option(help="Speed (km/h); repeatable; 200 to 350 in steps of 25 by default."),
     ] = None,
-    seeds: Annotated[int | None, typer.Option(min=1, help="Number of training seeds.")] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Number of training seeds.")] = None,
     passes: Annotated[
-        int | None, typer.Option(min=1, help="Simulated passes at each speed, at most.")
+        int | None, typer.Option(min=1, max=1_000_000, help="Simulated passes at each speed, at most.")
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     ray: RayAddress = None,

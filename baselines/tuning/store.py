@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -48,13 +49,13 @@ def make_tuning(
 def check_gain_file(path: Path, policy: str) -> None:
     """Raise InputError unless a policy's gains can be put into a file: asked before any work begins."""
     check_output(path, (".toml",))
-    if path.is_file() and load_gains(path).policy != policy:
+    if os.path.isfile(path) and load_gains(path).policy != policy:
         raise InputError(f"{path} holds gains of '{load_gains(path).policy}'; give another --output.")
 
 
 def store(path: Path, policy: str, tuning: Tuning) -> None:
     """Put a tuning into a file of gains, in the place of one for the same line, pantograph and place."""
-    old = load_gains(path).tunings if path.is_file() else ()
+    old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
     with write_whole(path) as temporary:
         temporary.write_text(as_toml(GainFile(policy=policy, tunings=(*kept, tuning))), encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import types
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -19,6 +20,9 @@ RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 """Options in another unit than the setting: that unit, the option's unit, and the factor between."""
 SIMPLE = (bool, int, float, str)
+
+SPAN = re.compile("[0-9]{1,9}")
+"""Number of a span; to Python other alphabets' digits are some, too."""
 
 Spans = Annotated[
     str | None,
@@ -73,7 +77,7 @@ def parse_spans(text: str | None) -> SpanChoice:
     if text == "all":
         return "all"
     first, dash, last = (part.strip() for part in text.partition("-"))
-    if not (dash and first.isdecimal() and last.isdecimal()):
+    if not (dash and SPAN.fullmatch(first) and SPAN.fullmatch(last)):
         raise InputError(f"--spans must read first-last, as 5-6, or all, not '{text}'.")
     spans = int(first), int(last)
     check_spans(spans)

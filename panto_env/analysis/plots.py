@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,22 @@ SUPPORTS = "position (m); grey lines: supports"
 def save(figure: Figure, path: str | Path) -> None:
     """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
     check_output(path, PICTURES)
+    _leave_odd_names(figure)
     with write_whole(path) as temporary:
         figure.savefig(temporary, dpi=120)
+
+
+def _leave_odd_names(figure: Figure) -> None:
+    """Let what stands between two "$" and is no mathematics, as in a user's name, be drawn as it is."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    parser: MathTextParser[Any] = MathTextParser("path")
+    for text in figure.findobj(Text):
+        try:
+            parser.parse(text.get_text())
+        except ValueError:
+            text.set_parse_math(False)
 
 
 def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:

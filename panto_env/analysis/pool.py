@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from ..base.errors import InputError
 from ..base.machine import cores
+from .worker import end_with_parent
 
 T = TypeVar("T")
 Job = Callable[[], T]
@@ -37,11 +38,13 @@ def in_processes(
 
     A script must call this under ``if __name__ == "__main__":``, because each process imports it anew.
     Raises what a job raises, after cancelling those that have not begun, and InputError where a process
-    dies.
+    dies. The processes end with this one, whatever ends it, and at once where it is interrupted.
     """
     with _one_thread_of_linear_algebra():
         # Spawned, not forked: threads of Numba and torch do not survive a fork.
-        executor = ProcessPoolExecutor(workers_for(len(jobs), workers), mp_context=get_context("spawn"))
+        executor = ProcessPoolExecutor(
+            workers_for(len(jobs), workers), mp_context=get_context("spawn"), initializer=end_with_parent
+        )
         try:
             return _through(executor, jobs, progress)
         except BrokenProcessPool as error:
@@ -73,7 +76,12 @@ def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> l
 
 
 def workers_for(jobs: int, workers: int | None) -> int:
-    """How many workers so many jobs get, one per core unless told otherwise."""
+    """How many workers so many jobs get, one per core unless told otherwise.
+
+    Raises InputError where they are fewer than one.
+    """
+    if workers is not None and workers < 1:
+        raise InputError(f"workers must be 1 or more, not {workers}.")
     return max(1, min(cores() if workers is None else workers, jobs))
 
 
@@ -90,6 +98,11 @@ def _through(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | No
     """Submit all jobs, collect their results, and shut the executor down."""
     try:
         return collect([executor.submit(job) for job in jobs], progress)
+    except (KeyboardInterrupt, SystemExit):
+        if isinstance(executor, ProcessPoolExecutor):
+            for process in list((executor._processes or {}).values()):  # a job may take many minutes yet
+                process.terminate()
+        raise
     finally:
         executor.shutdown(cancel_futures=True)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import reprlib
 from collections.abc import Callable, Iterator
 from numbers import Integral
 from typing import Any
@@ -11,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.shown import shortly, shown
 from ..control import Task, passive_mean, trim_of_pass
+from ..control.action import numbers
 from ..control.arguments import check_arguments, parameters
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
@@ -53,7 +54,7 @@ def simulate(
     """
     check_arguments(settings, RunSettings, "simulate")
     if not (isinstance(seed, Integral) and seed >= 0):
-        raise InputError(f"seed must be a whole number from 0 up, not {seed!r}.")
+        raise InputError(f"seed must be a whole number from 0 up, not {shown(seed)}.")
     driver = None if policy is None else find_policy(policy)
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(driver) | settings
@@ -101,10 +102,10 @@ def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
         with errors_name(name, "act"):
             # A copy: a policy may keep what it was shown.
             returned = policy.act(results.observation[0].copy())
-            action = np.asarray(returned, dtype=float)
-            if action.shape != shape or not np.isfinite(action).all():
+            action = numbers(returned)
+            if action is None or action.shape != shape or not np.isfinite(action).all():
                 raise InputError(
-                    f"its action must be finite numbers of shape {shape}, not {reprlib.repr(returned)}."
+                    f"its action must be finite numbers of shape {shape}, not {shortly(returned)}."
                 )
         task.step(action[None])
         yield task.plant.of(0, Row.STEP) / task.end(0)

@@ -15,9 +15,9 @@ from typing import Any
 from ..base.errors import InputError
 from ..base.names import hint
 from ..base.settings import Settings
+from ..base.shown import shown
 from ..control import Task
 from ..control.arguments import check_arguments
-from ..control.memory import check_memory
 from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice, in_words
@@ -127,7 +127,7 @@ def _check(
         raise InputError("There is no policy to run; name at least one, or leave policies at its default.")
     for policy in policies:
         if not (policy is None or isinstance(policy, str | Path)):
-            raise InputError(f"A sweep takes policies by name or model file, not {policy!r}.")
+            raise InputError(f"A sweep takes policies by name or model file, not {shown(policy)}.")
     for name, values in parameters.items():
         _check_name(name, entries)
         if len(values) == 0:
@@ -149,9 +149,9 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
     longest = max(passes, key=_seconds)
     given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
     with _named(longest):
-        needed = Task(run_settings(given)).memory
+        cost = Task(run_settings(given)).cost
     at_once = workers_for(len(passes), workers)
-    check_memory(at_once * needed, f"{at_once} passes at once", ", or fewer workers")
+    cost._replace(memory=at_once * cost.memory).check(f"{at_once} passes at once", ", or fewer workers")
 
 
 def _seconds(one_pass: _Pass) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterator
 from typing import Any, NamedTuple, get_args
 
@@ -12,6 +11,7 @@ from pydantic_core import ErrorDetails
 
 from .errors import InputError
 from .names import nearest
+from .shown import shortly
 
 WORDS = {
     "float_parsing": "must be a number",
@@ -58,7 +58,7 @@ def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]
     """One complaint per key; alternatives of a union, which complain one by one, are joined."""
     found: dict[str, Complaint] = {}
     for problem in error.errors():
-        if problem["type"] == "too_short" and problem["input"] and len(error.errors()) > 1:
+        if problem["type"] == "too_short" and len(problem["input"]) and len(error.errors()) > 1:
             continue  # entries that are wrong are not counted; what is wrong with them is told
         one = _complaint(problem, kind)
         before = found.get(one.key)
@@ -70,7 +70,7 @@ def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]
 
 def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
     place, fields = _place(problem, kind)
-    key, given = ".".join(map(str, place)), reprlib.repr(problem["input"])
+    key, given = ".".join(map(str, place)), shortly(problem["input"])
     match problem["type"]:
         case "missing":
             field = fields.get(str(place[-1]))  # none where a list is too short

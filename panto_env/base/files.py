@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+from .paths import check_path
 
 
 @contextmanager
@@ -20,6 +21,7 @@ def write_whole(path: str | Path) -> Iterator[Path]:
 
     If the body raises, ``path`` is as it was. Raises InputError where it can't be written.
     """
+    check_path(path)
     target = Path(path)
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
@@ -50,6 +52,7 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
 
     suffixes: one of which, in any case, says how it is written. Its folder must exist: none is made for it.
     """
+    check_path(path)
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         which = f"one of {', '.join(suffixes)}" if len(suffixes) > 1 else suffixes[0]
@@ -66,6 +69,7 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
 
 def make_folder(path: str | Path) -> None:
     """Make a folder that is itself what was asked for, and those above it. InputError where it can't be."""
+    check_path(path)
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -91,6 +95,7 @@ def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The table of a TOML file. Raises InputError, naming the file, where it can't be read."""
+    check_path(path)
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
@@ -99,7 +104,9 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} could not be read: it is not text in UTF-8.") from error
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError as error:
+        raise InputError(f"{path} is not valid TOML: it is nested too deeply; mend the file.") from error
+    except ValueError as error:  # TOML's own, and of whole numbers with thousands of digits
         raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
 
 

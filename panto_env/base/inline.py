@@ -27,7 +27,7 @@ def parse_inline(text: str) -> dict[str, Any]:
             raise InputError(f"'{name}' is given twice.")
         try:
             values[name] = ast.literal_eval(value.strip())
-        except (ValueError, SyntaxError):
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):  # whatever is no literal
             values[name] = value.strip()
     return values
 

@@ -13,6 +13,7 @@ from .errors import InputError
 from .explanation import explain
 from .inline import parse_inline
 from .names import suggest
+from .shown import shown
 
 
 def _number(value: Any) -> Any:
@@ -57,7 +58,7 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
     if presets:
         options[-1] += f" (with values, as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
-    raise InputError(f"{name} must be {' or '.join(options)}, not {value!r}.")
+    raise InputError(f"{name} must be {' or '.join(options)}, not {shown(value)}.")
 
 
 def _changed(preset: S, changes: str, name: str) -> S:
@@ -84,9 +85,9 @@ def parse_kind(
     if isinstance(value, family):
         return value
     chosen = value.get("kind", next(iter(kinds))) if isinstance(value, Mapping) else next(iter(kinds))
-    if chosen not in kinds:
+    if not (isinstance(chosen, str) and chosen in kinds):
         raise InputError(
-            f"{name} is not valid: unknown kind {chosen!r}, {suggest(str(chosen), list(kinds))}."
+            f"{name} is not valid: unknown kind {shown(chosen)}, {suggest(shown(chosen), list(kinds))}."
         )
     return parse(kinds[chosen], value, name, presets)
 

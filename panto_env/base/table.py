@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 
+class Alarm(str):
+    """A cell that says that something is wrong: a terminal shows it in red."""
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of text or numbers under headings that name units. Numbers are shown to four digits."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from ..base.explanation import explain
 from ..base.files import read_toml
 from ..base.names import nearest, suggest
 from ..base.settings import Settings
+from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.pantograph.schema import PantographData
 
@@ -77,7 +79,7 @@ def _find(family: str, source: str | Path) -> Path:
         return FOLDERS[family] / f"{text}.toml"
     if text.endswith(".toml"):
         path = Path(text)
-        if path.is_file():
+        if os.path.isfile(path):  # which no name is too odd for
             return path
         raise InputError(f"The {family} file {text} does not exist; give the path of a TOML file.")
     near = nearest(text, available(family))
@@ -112,7 +114,7 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
     if not isinstance(table["kind"], str) or table["kind"] not in schemas:
-        raise _TableError(f"key 'kind' must be {kinds} (given: {table['kind']!r})")
+        raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
     return schemas[table["kind"]]
 
 

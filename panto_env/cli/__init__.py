@@ -2,25 +2,66 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import warnings
-from typing import Annotated, TextIO
+from types import FrameType
+from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
+from typer import Abort
 
 from ..base import plugins
 from ..base.errors import AccuracyWarning, InputError
 from ..base.version import __version__
+from ..terminal import one_line
+
+UsageError: Any = typer.BadParameter.__base__
+"""Of Click, which older releases of Typer import and newer ones bring along."""
 
 
 def main() -> None:
-    """Run the command. Bad input ends it with one line on standard error and exit status 2."""
+    """Run the command. Bad input ends it with one line on standard error and exit status 2.
+
+    SIGTERM ends it as an interrupt from the keyboard does: what it has begun is put in order.
+    """
     warnings.showwarning = _show_warning
+    stopped = _stop_on_sigterm()
     try:
-        make_app()()
+        status = make_app()(standalone_mode=False)  # else Typer draws a box around what it refuses
     except InputError as error:
-        print(f"panto: {error}", file=sys.stderr)
-        sys.exit(2)
+        _refuse(str(error))
+    except UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # no error: what it says is the help
+            error.show()
+            sys.exit(error.exit_code)
+        context = error.ctx
+        command = "panto" if context is None else context.command_path
+        _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
+    except Abort:
+        status = 1
+    if stopped:
+        print("panto: Stopped by SIGTERM before it was done.", file=sys.stderr)
+        status = 128 + signal.SIGTERM
+    sys.exit(status)
+
+
+def _stop_on_sigterm() -> list[int]:
+    """Make an interrupt of the first SIGTERM, and return a list that will hold it; a second one kills."""
+    stopped: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
+    return stopped
+
+
+def _refuse(sentence: str) -> NoReturn:
+    print(f"panto: {one_line(sentence)}", file=sys.stderr)
+    sys.exit(2)
 
 
 def _show_warning(

@@ -6,7 +6,6 @@ import sys
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 from rich.table import Table
 
 from ..base.errors import InputError
@@ -52,12 +51,12 @@ def list_entries(
     for family in LOADERS:
         table = _table(family, "name", "kind", "description")
         for each in families[family]:
-            table.add_row(each.name, each.data["kind"], escape(each.text))
+            table.add_row(each.name, each.data["kind"], each.text)
         console.print(table)
     table = _table(POLICY, "name", "parameters", "description")
     for each in families[POLICY]:
         given = "\n".join(f"{parameter}={default}" for parameter, default in each.rows)
-        table.add_row(each.name, escape(given), escape(each.text.partition("\n\n")[0].replace("\n", " ")))
+        table.add_row(each.name, given, each.text.partition("\n\n")[0].replace("\n", " "))
     console.print(table)
     for family in PRESETS:
         table = _table(family, "name", "values")
@@ -66,7 +65,7 @@ def list_entries(
             kind = each.data.get("kind")
             if kind != families[family][0].data.get("kind"):
                 changed.insert(0, f"kind={kind}")
-            table.add_row(each.name, escape(", ".join(changed)) or "none")
+            table.add_row(each.name, ", ".join(changed) or "none")
         console.print(table)
     console.print("All of one: panto list NAME. With values of your own: NAME:key=value,...", markup=False)
 
@@ -77,7 +76,7 @@ def _print(each: Description) -> None:
     if each.rows:
         table = Table(*each.headings)
         for row in each.rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*row)
         console.print(table)
 
 

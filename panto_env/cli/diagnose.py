@@ -9,7 +9,7 @@ import typer
 
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console
 
 MOST_FALSE_ALARMS = 20.0
 """Per km, about one in a span: beyond, a threshold means nothing."""
@@ -89,4 +89,4 @@ def diagnose(
     if found.findings:
         print_table(findings_table(found))
     for note in found.notes:
-        console.print(f"[bold red]Degraded:[/] {note}", soft_wrap=True)
+        alert("Degraded:", note)

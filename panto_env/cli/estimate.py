@@ -10,8 +10,8 @@ import typer
 
 from ..base.errors import InputError
 from ..base.files import TABLES, write_rows
-from ..base.table import Table
-from ..terminal import Json, Plot, console, number, print_json, print_table, progress_console, writable
+from ..base.table import Alarm, Table
+from ..terminal import Json, Plot, alert, number, print_json, print_table, progress_console, writable
 from .identify import pairs
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def estimate(
             "another that is as faulty."
         )
         for name in tuned.at_bounds:
-            progress_console.print(f"[bold red]Warning:[/] the record does not tell {name}.")
+            alert("Warning:", f"the record does not tell {name}.", progress_console)
     found = run(motion, known, settings)
     scores = _scores(motion, found)
     if output is not None:
@@ -186,7 +186,7 @@ def _scores(motion: Motion, found: Estimate) -> list[Score]:
         try:
             scores.append(score(motion.contact_force[kept], found.force[kept], motion.time_step, band))
         except InputError as error:
-            progress_console.print(f"[bold red]Warning:[/] no comparison in 0 to {band:g} Hz: {error}")
+            alert("Warning:", f"no comparison in 0 to {band:g} Hz: {error}", progress_console)
     return scores
 
 
@@ -225,12 +225,12 @@ def _print(
             f"their autocorrelation (0; a true model's to {tested.whiteness.bound:.3f})",
             f"{tested.whiteness.largest:+.3f}",
         ),
-        ("to be believed", "yes" if found.verdict.believe else "[bold red]no[/]"),
+        ("to be believed", "yes" if found.verdict.believe else Alarm("no")),
     ]
     model = f"{settings.observation}, {settings.force_model.kind}"
     print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", ""), rows))
     for reason in found.verdict.reasons:
-        console.print(f"[bold red]Warning:[/] {reason}.")
+        alert("Warning:", f"{reason}.")
     if scores:
         print_table(_scores_table(scores))
 

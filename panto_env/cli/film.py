@@ -28,7 +28,7 @@ def film(
     output: Annotated[
         str, typer.Option(help=f"Film to write ({', '.join(FILMS)}).", callback=writable(FILMS))
     ],
-    first_span: Annotated[int, typer.Option(min=1, help="Span in which the film begins.")] = 10,
+    first_span: Annotated[int, typer.Option(min=1, max=1000, help="Span in which the film begins.")] = 10,
     seconds: Annotated[
         float, typer.Option(min=0.1, max=600, help="Time of the run that is shown (s).")
     ] = 3.0,

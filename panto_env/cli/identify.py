@@ -12,7 +12,7 @@ import typer
 
 from ..base.errors import InputError
 from ..identification.pantograph_file import SUFFIXES, check_possible
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console, writable
+from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable
 
 if TYPE_CHECKING:
     from ..base.arrays import Array
@@ -171,15 +171,16 @@ def _print(identified: Identification, matches: list[Match], method: str) -> Non
     print_table(parameters_table(_by_short_name(identified.fits), identified.band))
     for fit in identified.fits.values():
         if fit.undetermined:
-            console.print(
-                f"[bold red]Warning:[/] {fit.method}: {', '.join(fit.undetermined)} not determined, the "
+            alert(
+                "Warning:",
+                f"{fit.method}: {', '.join(fit.undetermined)} not determined, the "
                 f"95 % interval holds 0 (condition number {fit.condition:.4g}); excite more frequencies, "
-                "or record longer."
+                "or record longer.",
             )
         if fit.impossible:
             shown = ", ".join(f"{name} = {fit.parameters[name]:.4g}" for name in fit.impossible)
-            console.print(f"[bold red]Warning:[/] {fit.method}: {shown}: no pantograph has that.")
+            alert("Warning:", f"{fit.method}: {shown}: no pantograph has that.")
     for name, reason in identified.failures.items():
-        console.print(f"[bold red]Warning:[/] {name}: {reason}")
+        alert("Warning:", f"{name}: {reason}")
     if matches:
         print_table(matches_table(matches, method))

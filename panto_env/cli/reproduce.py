@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress
 from rich.table import Table
+from rich.text import Text
 
 from .. import studies
 from ..base.files import make_folder
-from ..terminal import Json, console, number, print_json, print_table, progress_console
+from ..terminal import ALARM, Json, console, number, print_json, print_table, progress_console
 
 
 def reproduce(
@@ -60,7 +61,7 @@ def _comparisons(outcome: studies.Outcome) -> Table:
         table.add_row(
             comparison.quantity,
             comparison.unit,
-            ours if comparison.agrees else f"[bold red]{ours} differs[/]",
+            ours if comparison.agrees else Text(f"{ours} differs", ALARM),
             comparison.paper if isinstance(comparison.paper, str) else f"{comparison.paper:.4g}",
             f"{number(comparison.low, 3)} to {number(comparison.high, 3)}",
             comparison.note,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..terminal import Json, Plot, console, print_json, print_table, progress_console
@@ -57,7 +58,7 @@ def rig(
     loaded = [load_rig(name) for name in rigs or RIGS]
     with progress_console.status("running") as status:
         for data in loaded:
-            status.update(f"running {data.name}")
+            status.update(f"running {escape(data.name)}")
             own = data.line if data.line.kind == "flexible" else REFERENCE
             line = load_catenary(own if reference is None else reference)
             pair = compare(data, line, pantograph, speed_kmh, chosen, policy=policy, seed=seed, **settings)
@@ -65,12 +66,12 @@ def rig(
             facts.append(report.pair_facts(pair))
             tables.append(report.pair_table(pair))
             if stability:
-                status.update(f"stability of {data.name}")
+                status.update(f"stability of {escape(data.name)}")
                 found = report.stability(data, pantograph, speed_kmh)
                 facts[-1]["stability"] = report.stability_facts(found)
                 tables.append(report.stability_table(data, found))
             if clock:
-                status.update(f"{data.name} against the clock")
+                status.update(f"{escape(data.name)} against the clock")
                 timing = report.clocked(data, pantograph, speed_kmh, clock)
                 facts[-1]["clock"] = report.timing_facts(timing)
                 tables.append(report.timing_table(data.name, timing))

@@ -17,7 +17,7 @@ from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
 from ..metrics.trajectory import SUFFIXES, Trajectory
-from ..terminal import Json, Plot, console, number, print_json, progress_console, writable
+from ..terminal import Json, Plot, alert, console, number, print_json, progress_console, writable
 
 
 @with_settings(left_out=("observation",))
@@ -57,7 +57,7 @@ def simulate(
         if json:
             print_json(_facts(trajectory) | {"spans": None, "figures": None, "compliance": None})
         else:
-            console.print(f"[bold red]{trajectory.ending}[/] It has no figures.", soft_wrap=True)
+            alert(trajectory.ending, "It has no figures.")
         raise typer.Exit(1)
     figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
     criteria = trajectory.compliance(chosen)

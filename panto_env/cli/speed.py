@@ -19,7 +19,7 @@ def speed(
         list[Path] | None,
         typer.Argument(help="Results stored with --json, to print side by side instead of measuring."),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, help="Repeats to take the median of.")] = 9,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats to take the median of.")] = 9,
     plot: Plot = None,
     json: Json = False,
     markdown: Annotated[

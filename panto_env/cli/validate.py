@@ -8,7 +8,7 @@ import typer
 
 from ..analysis.requirements import print_criteria
 from ..studies.en50318 import study
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console
 
 
 def validate(
@@ -59,6 +59,9 @@ def validate(
             print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
         for table in others:
             print_table(table)
-        console.print("All figures inside." if validation.passed else "[bold red]Not all figures are inside.")
+        if validation.passed:
+            console.print("All figures inside.")
+        else:
+            alert("Not all figures are inside.")
     if not validation.passed:
         raise typer.Exit(1)

@@ -13,6 +13,7 @@ from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, collect
 from ..backend.cache import source_hash
 from ..base.errors import InputError
 from ..base.machine import cores
+from ..base.shown import shown
 
 T = TypeVar("T")
 LOCAL = "local"
@@ -110,7 +111,7 @@ def _connected(ray: Any, address: str) -> Iterator[None]:
         ray.init(address=address, **settings)
     except (ImportError, OSError, RuntimeError, ValueError) as error:  # a ConnectionError is an OSError
         raise InputError(
-            f"No Ray cluster could be joined at {address!r} ({_reason(error)}); start one by "
+            f"No Ray cluster could be joined at {shown(address)} ({_reason(error)}); start one by "
             f"`ray start --head`, or give {LOCAL!r}."
         ) from error
     try:

@@ -18,6 +18,7 @@ from ..base.explanation import sentence
 from ..base.names import suggest
 from ..base.ranges import Between
 from ..base.settings import parse, plain
+from ..base.shown import shown
 from ..catalog import load_catenary, load_pantograph
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import CLEAR, LAST_USUAL
@@ -32,6 +33,8 @@ from .observation import OBSERVATIONS
 from .reward import REWARDS, Reward
 
 R = TypeVar("R", bound="RunSettings")
+FARTHEST = 1e9
+"""Distance (m) beyond which no line goes, whatever it is made of."""
 _Speed = Annotated[float, Field(allow_inf_nan=True)]  # a line says itself which speeds it bears
 
 
@@ -48,7 +51,7 @@ def _weights(value: Any) -> Reward:
 
 def _observation(value: Any) -> str:
     if value not in OBSERVATIONS:
-        raise InputError(f"observation must be one of {', '.join(OBSERVATIONS)}, not {value!r}.")
+        raise InputError(f"observation must be one of {', '.join(OBSERVATIONS)}, not {shown(value)}.")
     return str(value)
 
 
@@ -65,14 +68,14 @@ def _spans(value: Any) -> int | None:
 
 
 def _distance(value: Any) -> float | None:
-    if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-        raise InputError(f"distance must be a positive number (m), not {value!r}.")
+    if value is not None and not (isinstance(value, int | float) and 0 < value <= FARTHEST):
+        raise InputError(f"distance must be a positive number (m), not {shown(value)}.")
     return value
 
 
 def _scatter(value: Any) -> float:
     if not (isinstance(value, int | float) and 0 <= value <= 0.3):
-        raise InputError(f"pantograph_scatter must lie in 0 to 0.3, not {value!r}.")
+        raise InputError(f"pantograph_scatter must lie in 0 to 0.3, not {shown(value)}.")
     return value
 
 
@@ -83,10 +86,10 @@ def _mean_force(value: Any) -> float | str | None:
         return "en50367"
     try:
         force = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         force = math.nan
     if isinstance(value, bool) or not (math.isfinite(force) and force > 0):
-        raise InputError(f"mean_force must be a positive number (N) or 'en50367', not {value!r}.")
+        raise InputError(f"mean_force must be a positive number (N) or 'en50367', not {shown(value)}.")
     return force
 
 
@@ -97,10 +100,12 @@ def speed_range(speed_kmh: Any, name: str = "speed_kmh") -> tuple[float, float]:
         if any(isinstance(value, str | bool) for value in values):  # float would take them
             raise TypeError
         low, high = (float(value) for value in values)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be a number or a range of two (km/h), not {speed_kmh!r}.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{name} must be a number or a range of two (km/h), not {shown(speed_kmh)}."
+        ) from error
     if low > high:
-        raise InputError(f"The range {name} must not fall, as {speed_kmh!r} does.")
+        raise InputError(f"The range {name} must not fall, as {shown(speed_kmh)} does.")
     return low, high
 
 

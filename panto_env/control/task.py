@@ -22,6 +22,7 @@ from ..backend import (
 )
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import shown
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
@@ -30,11 +31,11 @@ from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
+from .cost import FEW_LANES, arrays_of, check_lanes, run_cost
 from .entries import ESTIMATED, Asked
 from .episode import Flags, Results, new_episode, new_results
 from .extent import runs, spans, whole_steps
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
-from .memory import check_memory, record_size
 from .normalise import normalised
 from .observation import layout
 from .passive_run import LOW_PASSED, PassiveRun, passive_run
@@ -64,21 +65,21 @@ class Task:
         record_droppers: bool = False,
         trim: Trim | None = None,
     ) -> None:
-        """Build the plant and the arrays of an episode; ``memory`` says what its record takes (bytes).
+        """Build the plant and the arrays of an episode; ``cost`` says what the longest one takes.
 
         keep_samples: keep those of a whole episode, for ``trajectory``; record_droppers: with the tension
         of every dropper. trim: static force, where a mean force is to be met; by default that of the line and
         the pantograph as designed. Raises InputError for what is not valid together.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
-            raise InputError(f"The number of lanes must be a whole number from 1 up, not {lanes!r}.")
+            raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.catenary.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or take another line.")
         self.settings, self.lanes, self.actuator = settings, lanes, settings.actuator
-        self.plant = plant = Plant(
+        make_plant = partial(
+            Plant,
             settings.catenary,
             settings.pantograph,
-            lanes=lanes,
             spans=spans(settings),
             numerics=settings.numerics,
             actuator=settings.actuator,
@@ -87,6 +88,9 @@ class Task:
             varied=settings.pantograph_scatter > 0,
             drifting=settings.speed_drift > 0,
         )
+        if lanes > FEW_LANES:
+            check_lanes(lanes, FEW_LANES, make_plant(lanes=FEW_LANES).arrays)
+        self.plant = plant = make_plant(lanes=lanes)
         self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
         if self.distance > plant.model.length:
             raise InputError(
@@ -102,6 +106,8 @@ class Task:
                 f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
                 f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
             )
+        self.record_droppers, self.keep_samples = record_droppers, keep_samples
+        rows = self._rows()
         asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
         self.layout = layout(settings.observation, asked)
         self.known_pantograph = settings.known_pantograph or settings.pantograph
@@ -121,18 +127,26 @@ class Task:
         self.results = self.new_results()
         self.sensors, rms = self._sensors()
         self.noise = None if rms is None else Noise(rms, lanes)
-        self.record_droppers, self.keep_samples = record_droppers, keep_samples
-        # The slowest run sets how many samples an episode may have; row 0 is the start.
-        slow = self.speed_range[0]
-        longest = math.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
-        rows = int(self.plant_steps(slow, longest)) + self._late + 1 if keep_samples else 1
-        supports, droppers = len(plant.model.supports), len(plant.model.droppers) if record_droppers else 0
-        self.memory = record_size(lanes, rows - 1, supports, droppers)
-        check_memory(self.memory, f"{rows - 1:,} time steps with {supports} supports")
         self.samples = plant.samples(rows, tension=record_droppers)
         self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
         copy_whole(*self._arrays)
         self._bind()
+
+    def _rows(self) -> int:
+        """Samples that an episode may have at most, of which row 0 is the start; and its ``cost``.
+
+        Raises InputError where it takes more memory than the machine has, or more time than anyone has.
+        """
+        plant, settings = self.plant, self.settings
+        slow = self.speed_range[0]  # the slowest run sets how many
+        longest = np.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
+        steps = float(self.plant_steps(slow, longest)) + self._late
+        supports = len(plant.model.supports)
+        droppers = len(plant.model.droppers) if self.record_droppers else 0
+        moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
+        self.cost = run_cost(self.lanes, steps, supports, droppers, moving, self.keep_samples)
+        self.cost.check(f"{steps:,.0f} time steps with {supports} supports")
+        return int(steps) + 1 if self.keep_samples else 1
 
     def _sensors(self) -> tuple[Any, tuple[float, ...] | None]:
         """Sensors of all lanes, and the rms of their noise."""
@@ -330,8 +344,9 @@ class Task:
             self._over |= ended if skip is None else ended & ~skip
             self._any_over = bool(self._over.any())
         if answer < 0:
-            wrong = self._action[~np.isfinite(self._action).all(axis=1)][0]
-            raise InputError(f"The action must be finite, not {wrong}; check the policy.")
+            lane = int(np.flatnonzero(~np.isfinite(self._action).all(axis=1))[0])
+            whose = f" of lane {lane}" if self.lanes > 1 else ""
+            raise InputError(f"The action{whose} must be finite, not {self._action[lane]}; check the policy.")
         return answer > 0
 
     @property

@@ -9,8 +9,11 @@ from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError
 from ..base.ranges import Between
+from ..base.shown import shown
 from ..control.settings import RunSettings
 
+MOST_LANES = 10_000_000
+"""As many as a large machine's memory holds where the wire has no mass; fewer where it has."""
 Pixels = Annotated[int, Between(64, 4096)]
 SlowMotion = Field(
     1.0, description="how many times slower than in life a film of the frames is, as `render_fps` tells (-)"
@@ -31,20 +34,22 @@ class EnvironmentSettings(RunSettings):
     @classmethod
     def _known(cls, value: object) -> object:
         if value not in (None, "human", "rgb_array"):
-            raise InputError(f"render_mode must be None, 'human' or 'rgb_array', not {value!r}.")
+            raise InputError(f"render_mode must be None, 'human' or 'rgb_array', not {shown(value)}.")
         return value
 
 
 class VectorSettings(RunSettings):
     """Arguments of ``PantographVectorEnv``."""
 
-    num_envs: int = Field(1, description="lanes: environments side by side")
+    num_envs: Annotated[int, Between(1, MOST_LANES)] = Field(
+        1, description="lanes: environments side by side"
+    )
     autoreset_mode: AutoresetMode = Field(
         AutoresetMode.NEXT_STEP,
         description='when a lane whose episode has ended begins anew: "NextStep", "SameStep" or "Disabled"',
     )
-    max_episode_steps: int | None = Field(
-        None, ge=1, description="steps after which an episode is truncated; by default the line's end"
+    max_episode_steps: Annotated[int, Between(1, 10**12)] | None = Field(
+        None, description="steps after which an episode is truncated; by default the line's end"
     )
     render_mode: Literal["rgb_array"] | None = Field(
         None, description='None, or "rgb_array" for frames from `render()`, one per lane that is drawn'
@@ -62,14 +67,14 @@ class VectorSettings(RunSettings):
             return AutoresetMode(value)
         except ValueError as error:
             names = ", ".join(mode.value for mode in AutoresetMode)
-            raise InputError(f"autoreset_mode must be one of {names}, not {value!r}.") from error
+            raise InputError(f"autoreset_mode must be one of {names}, not {shown(value)}.") from error
 
     @field_validator("render_mode", mode="before")
     @classmethod
     def _pictures(cls, value: object) -> object:
         if value not in (None, "rgb_array"):
             raise InputError(
-                f"render_mode of the vector environment must be None or 'rgb_array', not {value!r}."
+                f"render_mode of the vector environment must be None or 'rgb_array', not {shown(value)}."
             )
         return value
 

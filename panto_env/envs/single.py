@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
 from ..base.errors import InputError
 from ..catalog import load_pantograph
 from ..control import Context, Task
+from ..control.action import checked
 from ..control.arguments import table, takes
 from ..control.entries import CENTRED, Asked
 from ..control.observation import BOUND, layout
@@ -27,8 +27,6 @@ from .settings import EnvironmentSettings, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
-
-SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 
 SEEN = ("_shape", "_observation", "_values", "_flags")
 """Attributes that ``PantographEnv._watch`` takes from the task."""
@@ -246,21 +244,6 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _title(self) -> str:
         plant = self.task.plant
         return f"pantograph {plant.pantograph.name}, line {plant.catenary.name}"
-
-
-def checked(action: Any, shape: tuple[int, ...]) -> Array:
-    """Action as an array of this shape. Raises InputError where it is of another."""
-    force: Array = action
-    if not (isinstance(action, np.ndarray) and (action.dtype is SINGLE or action.dtype is DOUBLE)):
-        try:
-            force = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InputError(
-                f"The action must be numbers in -1..1 of shape {shape}, not {action!r}."
-            ) from error
-    if force.shape != shape:
-        raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
-    return force
 
 
 def _observation_table(kind: str) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..control import Task
+from ..control.action import checked
 from ..control.arguments import takes
 from ..control.episode import Flags
 from ..control.observation import BOUND
@@ -25,7 +26,6 @@ from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer, Lanes
 from .one_thread import InUse, one_at_a_time
 from .settings import VectorSettings, render_metadata
-from .single import checked
 from .stable_baselines import NamedToStableBaselines
 
 if TYPE_CHECKING:

@@ -45,6 +45,12 @@ def low_pass(record: Record, band: float) -> tuple[Record, int]:
             f"A band to {band:.4g} Hz does not fit a record sampled at {rate:.4g} Hz; it must lie above 0 "
             "and below a quarter of the sampling rate (is the record mostly noise?)."
         )
+    duration = len(record.plate) * record.time_step
+    if band * duration < 1:
+        raise InputError(
+            f"The record of {duration:.4g} s is too short for motion up to {band:.4g} Hz; record "
+            f"{1 / band:.3g} s or longer."
+        )
     taps, shape = kaiserord(ATTENUATION, band / (rate / 2))
     taps |= 1  # odd: the delay is whole samples
     stride = max(1, int(rate / (3 * band)))  # noise is left to 1.5 of the band

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..base.table import Table
+from ..base.table import Alarm, Table
 from ..terminal import number
 from .fit import Fit
 from .model import UNITS
@@ -23,8 +23,8 @@ def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
         for fit in fits.values():
             low, high = fit.interval[k]
             half = (high - low) / 2
-            mark = "[bold red]impossible:[/] " if name in fit.impossible else ""
-            cells.append(f"{mark}{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %")
+            found = f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %"
+            cells.append(Alarm(f"impossible: {found}") if name in fit.impossible else found)
         rows.append((f"{name} ({UNITS[name]})", *cells))
     rows.append(("condition number", *(f"{fit.condition:.5g}" for fit in fits.values())))
     title = f"Identified, ± 95 %, relative standard deviation; excitation up to {band:.4g} Hz"

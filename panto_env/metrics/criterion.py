@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.table import Table
+from ..base.table import Alarm, Table
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def worst(runs: Sequence[Sequence[Criterion]]) -> list[Criterion]:
 
 def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
     """For people, of the criteria that have limits: value, limit, margin, verdict and source."""
-    verdicts = {True: "kept", False: "[bold red]broken[/]"}
+    verdicts = {True: "kept", False: Alarm("broken")}
     rows = [
         (
             criterion.heading,

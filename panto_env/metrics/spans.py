@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import shortly
+from ..plant.catenary.schema import MOST_SPANS
 
 Spans: TypeAlias = tuple[int, int]
 """The first and the last span."""
@@ -33,8 +35,12 @@ anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points
 def check_spans(spans: Any) -> None:
     """Raise InputError unless spans are two whole numbers from 1 up that do not fall."""
     pair = tuple(spans) if isinstance(spans, list | tuple) else ()
-    if not (len(pair) == 2 and all(isinstance(each, int) for each in pair) and 1 <= pair[0] <= pair[1]):
-        raise InputError(f"spans must be two whole numbers, first and last, counted from 1, not {spans!r}.")
+    whole = len(pair) == 2 and all(isinstance(each, int) for each in pair)
+    if not (whole and 1 <= pair[0] <= pair[1] <= MOST_SPANS):
+        raise InputError(
+            f"spans must be two whole numbers, first and last, counted from 1 to {MOST_SPANS}, not "
+            f"{shortly(spans)}."
+        )
 
 
 def in_words(spans: Spans | None) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, field_validator
 
 from ..base.errors import InputError
-from ..base.settings import Positive, Settings
+from ..base.ranges import Between
+from ..base.settings import Settings
 from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
@@ -26,15 +27,15 @@ class Numerics(Settings):
         description='"full": grid and time step for which figures of a flexible line are within 1 % of '
         'converged ones at the speeds asked for; "fast": coarser ones, three to twenty times as fast',
     )
-    time_step: Positive | None = Field(
+    time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one that the accuracy asks for"
     )
-    spacing: Positive | None = Field(
+    spacing: Annotated[float, Between(1e-3, 1000, "m")] | None = Field(
         None,
         description="grid of the flexible catenary (m), instead of the one that the accuracy asks for; "
         "the next finer one that has a multiple of 8 nodes per span is taken",
     )
-    window: int | None = Field(
+    window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, of an even number one more "
         f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '

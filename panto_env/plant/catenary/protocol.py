@@ -23,6 +23,9 @@ from ..numerics import Numerics, Runs
 from .schema import CatenaryData
 from .view import LineView
 
+SLOWEST = 1e-9
+"""Speed (m/s) below which a train is as good as at rest."""
+
 
 class StartPoint(NamedTuple):
     """The line where a run starts, at rest."""
@@ -85,7 +88,7 @@ class CatenaryKind(NamedTuple):
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
     """Raise InputError unless trains at these speeds (m/s) are slower than the waves of a line (m/s)."""
     for speed in speeds:
-        if not (math.isfinite(speed) and 0 < speed < wave_speed):
+        if not (math.isfinite(speed) and SLOWEST <= speed < wave_speed):
             bound = (
                 ""
                 if math.isinf(wave_speed)

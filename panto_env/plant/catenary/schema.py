@@ -10,6 +10,7 @@ from pydantic import Field
 from ...base.errors import InputError
 from ...base.ranges import Between
 from ...base.settings import Settings
+from ...base.shown import shown
 from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
@@ -21,7 +22,7 @@ def check_span_count(spans: Any) -> int:
     """Number of spans of a line. Raises InputError where it is none."""
     if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
         raise InputError(
-            f"A line's spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {spans!r}."
+            f"A line's spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {shown(spans)}."
         )
     return spans
 

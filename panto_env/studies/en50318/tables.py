@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...base.table import Table
+from ...base.table import Alarm, Table
 from ...metrics.labels import LABELS
 from ...terminal import number
 from . import convergence, lines, reference, start, wear, window
@@ -25,7 +25,7 @@ def checks_table(checks: Sequence[reference.Check]) -> Table:
             value = number(check.value, 2)
             low, high = number(check.lowest, 0), number(check.highest, 0)
             cells += [
-                value if check.inside else f"[bold red]{value} outside[/]",
+                value if check.inside else Alarm(f"{value} outside"),
                 low if low == high else f"{low} to {high}",
             ]
         rows.append(tuple(cells))

@@ -50,7 +50,7 @@ def read(path: Path) -> dict[str, Any]:
     """What ``run`` found on some machine, as it was stored. Raises InputError where a file holds none."""
     try:
         result = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is no result of 'panto speed --json': {error}.") from error
     parts = {"machine", "repeats", "plants", "roofline", "scaling", "environments"}
     if not (isinstance(result, dict) and parts <= set(result)):

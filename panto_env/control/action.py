@@ -1,0 +1,37 @@
+"""What a controller asks for, as numbers: anything else is refused, and nothing is read into it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.shown import shortly
+
+SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
+NUMBERS = "fiub"
+"""Kinds of NumPy's types that are real numbers; text and complex ones would be cast to some."""
+
+
+def checked(action: Any, shape: tuple[int, ...]) -> Array:
+    """Action as an array of real numbers of this shape. Raises InputError where it is none."""
+    plain = type(action) is np.ndarray and (action.dtype is SINGLE or action.dtype is DOUBLE)
+    force: Array | None = action if plain else numbers(action)
+    if force is None:
+        raise InputError(f"The action must be numbers in -1..1 of shape {shape}, not {shortly(action)}.")
+    if force.shape != shape:
+        raise InputError(f"The action must have the shape {shape}, not {force.shape}.")
+    return force
+
+
+def numbers(action: Any) -> Array | None:
+    """Action as an array of floats, or None where it is not made of real numbers, or some are masked."""
+    if isinstance(action, np.ma.MaskedArray):
+        return None
+    try:
+        given = np.asarray(action)
+        return given.astype(np.float64) if given.dtype.kind in NUMBERS else None
+    except Exception:  # of lists of lists of several lengths, or of an object that only looks like an array
+        return None

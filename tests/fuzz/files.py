@@ -1,0 +1,138 @@
+"""Files, good and bad, that command lines of the table name: made once, and copied for each of them."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+from panto_env import simulate
+from panto_env.catalog import load_pantograph
+from panto_env.catalog.loader import text_of
+from panto_env.estimation.motion import measure
+from panto_env.estimation.motion_file import write_motion
+from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
+
+TRAINING = """
+algorithm = "ppo"
+total_steps = {steps}
+checkpoint_steps = 128
+lanes = 2
+environment = {{ id = "PantographStiffness-v0", distance = 80 }}
+evaluation = {{ interval_steps = 128 }}
+hyperparameters = {{ n_steps = 64, batch_size = 64, n_epochs = 1, net_arch = [{widths}] }}
+"""
+ABLATION = """
+training = "training.toml"
+seeds = [2000]
+total_steps = 128
+[variants."no history".environment]
+history = 0
+"""
+EPISODES = """
+title = "some"
+[[places]]
+catenary = "periodic-stiffness"
+pantograph = "three-mass"
+speed_kmh = [250, 300]
+[[sets]]
+name = "own"
+policies = ["passive"]
+episodes = 1
+"""
+DESIGNS = """
+title = "some"
+catenary = "periodic-stiffness"
+pantograph = "three-mass"
+count = 2
+[ranges]
+speed_kmh = [250, 300]
+"""
+LISTS = """
+title = [1]
+algorithm = ["ppo"]
+lines = "all"
+sets = 1
+ranges = []
+kind = ["flexible"]
+"""
+STRINGS = """
+algorithm = "ppo"
+lines = ["one"]
+policies = "pd"
+seeds = "5"
+total_steps = "many"
+"""
+POLICIES = """
+import numpy as np
+
+class Nothing:
+    action = None
+    def reset(self, context):
+        pass
+    def act(self, observation):
+        return self.action
+
+class Huge(Nothing):
+    action = [1e400]
+
+class Complex(Nothing):
+    action = [1j]
+
+class Words(Nothing):
+    action = "up"
+
+class Marked(Nothing):
+    action = ["[/bold]"]
+
+class Masked(Nothing):
+    action = np.ma.masked_array([0.5], mask=[True])
+
+class Endless(Nothing):
+    def __init__(self, depth):
+        self.__init__(depth)
+"""
+
+
+def write_files(folder: Path) -> None:
+    """Write all of them into a folder."""
+    stiffness = text_of("periodic-stiffness")
+    texts = {
+        "training.toml": TRAINING.format(steps=128, widths=8),
+        "million.toml": TRAINING.format(steps=128, widths=1_000_000),
+        "ablation.toml": ABLATION,
+        "episodes.toml": EPISODES,
+        "designs.toml": DESIGNS,
+        "policies.py": POLICIES,
+        "bad.toml": "kind = [",
+        "bad.json": "{",
+        "deep.toml": "a = " + "[" * 20_000,
+        "deep.json": "[" * 200_000,
+        "huge.toml": "seed = 1" + "0" * 5000,
+        "lists.toml": LISTS,
+        "strings.toml": STRINGS,
+        "nul.toml": 'catenary = "\\u0000"\nkind = "\\u0000"\nalgorithm = "\\u0000"\n',
+        "markup.toml": marked(stiffness, "a [bold]line[/] of [/] its own", "[/]line[bold]"),
+        "marked.toml": marked(text_of("three-mass"), "[red", "[/b]"),
+        "heavy.toml": text_of("en50318-2002").replace("[droppers]", "[droppers]\nmass = 30.0"),
+        "empty.csv": "",
+        "wide.csv": "time (s)" + " " * 20_000 + ",head (mm),frame (mm)\n" + "0,0,0\n" * 30,
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    (folder / "binary.toml").write_bytes(bytes(range(256)))
+    (folder / "bad.parquet").write_bytes(b"PAR1half")
+    truth = parameters_of(load_pantograph("identified-2dof"))
+    write_record(clean_record(FREQUENCY_SWEEP, truth), folder / "rig.csv")
+    with warnings.catch_warnings(action="ignore"):
+        run = simulate("periodic-stiffness", "three-mass", distance=100.0)
+        run.save(folder / "run.parquet")
+        moved = simulate("periodic-stiffness", "dsa350", distance=300.0)
+    write_motion(measure(moved), folder / "motion.csv")
+
+
+def marked(text: str, description: str, name: str) -> str:
+    """The TOML file of an entry with another description, and with a name of its own."""
+    first, _, rest = text.partition("description = ")
+    quote = '"""' if rest.startswith('"""') else '"'
+    _, _, after = rest.removeprefix(quote).partition(quote)
+    return f'{first}name = "{name}"\ndescription = "{description}"{after}'
