@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense oldest pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense bounds fuzz oldest pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -91,6 +91,18 @@ mutants: $(READY)
 NONSENSE := 3000
 nonsense: $(READY)
 	NONSENSE=$(NONSENSE) $(BIN)/pytest -s -m slow tests/test_nonsense.py
+
+# Every index of whole episodes and random lines checked against its array.
+bounds: $(READY)
+	$(BIN)/pytest tests/test_bounds_checked.py
+
+# Bad command lines, random environments and very many steps: each ends well, and is counted.
+CASES := 2000
+STEPS := 1e8
+fuzz: $(READY)
+	$(BIN)/python -m tests.fuzz.command_lines
+	$(BIN)/python -m tests.fuzz.environments --count $(CASES)
+	$(BIN)/python -m tests.fuzz.steps --count $(STEPS)
 
 # The oldest Gymnasium and Numba that are supported, without the extra 'agents'. The newest are in constraints.txt.
 OLDEST := .venv-oldest

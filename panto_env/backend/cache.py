@@ -52,8 +52,14 @@ def cache_folder() -> Path | None:
         alone = Path(tempfile.mkdtemp(prefix="panto_env-"))
     except OSError:
         return None
-    atexit.register(shutil.rmtree, alone, ignore_errors=True)
+    atexit.register(_remove, alone, os.getpid())
     return alone
+
+
+def _remove(folder: Path, process: int) -> None:
+    """Remove the folder of a process, at its end: not at that of one that it was forked into."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _own_folder(parent: Path) -> Path | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import threading
+import weakref
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar
@@ -16,6 +18,11 @@ class InUse:
     """Whether a thread is using an environment just now; the copy of one is not in use."""
 
     def __init__(self) -> None:
+        self.renew()
+        _ALL.add(self)
+
+    def renew(self) -> None:
+        """Nobody uses it."""
         lock = threading.Lock()
         self.begin, self.end = lock.acquire, lock.release
 
@@ -42,3 +49,16 @@ def one_at_a_time(method: F) -> F:
             in_use.end()
 
     return alone  # type: ignore[return-value]
+
+
+_ALL: weakref.WeakSet[InUse] = weakref.WeakSet()
+
+
+def _renew_all() -> None:
+    """In a forked process none of the threads runs that were using an environment."""
+    for each in list(_ALL):
+        each.renew()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew_all)
