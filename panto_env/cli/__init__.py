@@ -9,12 +9,14 @@ from typing import Annotated, TextIO
 import typer
 
 from ..base import plugins
-from ..base.errors import AccuracyWarning, InputError
+from ..base.errors import AccuracyWarning, InputError, UncheckedWarning
+from ..base.plain_characters import show_always
 from ..base.version import __version__
 
 
 def main() -> None:
     """Run the command. Bad input ends it with one line on standard error and exit status 2."""
+    show_always()
     warnings.showwarning = _show_warning
     try:
         make_app()()
@@ -32,7 +34,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which tells the user nothing."""
-    if issubclass(category, AccuracyWarning):
+    if issubclass(category, AccuracyWarning | UncheckedWarning):
         print(f"panto: warning: {message}", file=sys.stderr)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
