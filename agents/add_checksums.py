@@ -1,6 +1,6 @@
 """Checksums for files of older versions: ``python -m panto_agents.add_checksums FILE...``.
 
-What the files say is as before: of results in JSON, model files (.zip) and saved runs (.parquet). Whether they
+What results in JSON, model files (.zip) and saved runs (.parquet) say is as before. Whether they
 are as they were written is for their owner to know: from then on they are checked.
 """
 

@@ -97,7 +97,7 @@ class RunFolder:
             table = json.loads(self.settings.read_text(encoding="utf-8"))
             if not isinstance(table, dict):
                 raise ValueError("it holds no table")
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise InputError(
                 f"{self.settings} could not be read ({error}); train into another --output."
             ) from error
@@ -162,7 +162,10 @@ class RunFolder:
         rows: list[dict[str, str]] = []
         try:
             with self.evaluations.open(newline="", encoding="utf-8") as file:
-                for cells in csv.DictReader(file, strict=True):
+                table = csv.DictReader(file, strict=True)
+                if "steps" not in (table.fieldnames or ()):
+                    raise ValueError("it has no header")
+                for cells in table:
                     int(cells["steps"])
                     if None in cells or None in cells.values():
                         raise ValueError("it has another number of cells than the header")
