@@ -6,11 +6,13 @@ import os
 import subprocess
 import sys
 import unicodedata
+import warnings
 
 import pytest
 
 from panto_env.base import plain_characters
 from panto_env.base.plain_characters import plain
+from panto_env.cli import main
 from panto_env.terminal import print_json
 
 from .documents import ROOT
@@ -18,8 +20,6 @@ from .documents import ROOT
 ENCODINGS = {
     "Latin-1": {"PYTHONIOENCODING": "latin-1"},
     "cp1252": {"PYTHONIOENCODING": "cp1252"},
-    "cp437": {"PYTHONIOENCODING": "cp437"},
-    "ASCII": {"PYTHONIOENCODING": "ascii"},
     "the C locale": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
 }
 SHORT = [
@@ -52,27 +52,58 @@ def environment(**changes):
 
 
 def panto(*arguments, **changes):
+    """The command in a process of its own."""
     command = [sys.executable, "-c", "from panto_env.cli import main; main()", *arguments]
     return subprocess.run(command, capture_output=True, env=environment(**changes))
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_command_says_the_same_in_every_encoding(encoding, name):
+def command(*arguments, encoding, monkeypatch):
+    """The same here: exit status, standard output and error, as bytes."""
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding=encoding) for name in ("stdout", "stderr")}
+    for name, stream in streams.items():
+        monkeypatch.setattr(sys, name, stream)
+    monkeypatch.setattr(sys, "argv", ["panto", *arguments])
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = []
+    for stream in streams.values():
+        stream.flush()
+        told.append(stream.buffer.getvalue())
+    return ended.value.code, *told
+
+
+def check(name, status, out, error):
     expected = 2 if name == "bad input" else 0
-    done = panto(*COMMANDS[name], **ENCODINGS[encoding])
-    assert done.returncode == expected, done.stderr[-2000:]
-    assert b"Traceback" not in done.stderr
-    told = done.stderr if expected else done.stdout
+    assert status == expected, error[-2000:]
+    assert b"Traceback" not in error
+    told = error if expected else out
     assert told
     assert told.count(b"?") < 10  # questions of the texts
-    if encoding in ("ASCII", "the C locale"):
-        assert told.isascii()
+    return told
 
 
-def test_figures_are_those_of_an_output_that_shows_all():
-    whole = panto(*SHORT, PYTHONIOENCODING="utf-8").stdout.decode()
-    latin = panto(*SHORT, PYTHONIOENCODING="latin-1").stdout.decode("latin-1")
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "cp437", "ascii", "utf-8"])
+def test_a_command_says_the_same_in_every_encoding(encoding, name, monkeypatch):
+    told = check(name, *command(*COMMANDS[name], encoding=encoding, monkeypatch=monkeypatch))
+    assert encoding != "ascii" or told.isascii()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name"),
+    [("Latin-1", "a run"), ("cp1252", "help"), ("the C locale", "a table with Greek letters")],
+)
+def test_so_does_a_process_of_its_own(encoding, name):
+    done = panto(*COMMANDS[name], **ENCODINGS[encoding])
+    told = check(name, done.returncode, done.stdout, done.stderr)
+    assert encoding != "the C locale" or told.isascii()
+
+
+def test_figures_are_those_of_an_output_that_shows_all(monkeypatch):
+    _, whole, _ = command(*SHORT, encoding="utf-8", monkeypatch=monkeypatch)
+    _, latin, _ = command(*SHORT, encoding="latin-1", monkeypatch=monkeypatch)
+    whole, latin = whole.decode(), latin.decode("latin-1")
     words = [word for word in whole.split() if word.isascii() and any(map(str.isalnum, word))]
     assert len(words) > 50
     assert set(words) <= set(latin.split())

@@ -24,13 +24,22 @@ LINE = [
     "1-2",
 ]
 LIMITED = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
+import resource
+import panto_env.analysis.simulation as simulation
 from panto_env.cli import main
+
+simulate = simulation.simulate
+
+def then_full(**settings):
+    run = simulate(**settings)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
+    return run
+
+simulation.simulate = then_full
 main()
 """
 LIMIT = 8192
-"""Bytes that a file may have: the trial before the work passes, and a result does not."""
+"""Bytes that a file may have once the run is over: a result has more."""
 COMMANDS = {
     "simulate": (["simulate", *LINE, "--output", "run.parquet"], "run.parquet"),
     "simulate --json": (["simulate", *LINE, "--json", "--output", "run.parquet"], "run.parquet"),
@@ -119,10 +128,8 @@ def test_one_file_that_fails_does_not_keep_the_others_from_being_written(tmp_pat
 
 @pytest.mark.parametrize("json_wanted", [False, True])
 def test_studies_are_printed_and_the_others_go_on(json_wanted, full, tmp_path, monkeypatch, capsys):
-    made = SimpleNamespace(
-        run=lambda report: studies.Outcome("a study", (studies.Comparison("m", "kg", 1.25, 1, 1, 2),))
-    )
-    monkeypatch.setattr(reproduce.studies, "find_study", lambda name: made.run)
+    made = studies.Outcome("a study", (studies.Comparison("m", "kg", 1.25, 1, 1, 2),))
+    monkeypatch.setattr(reproduce.studies, "find_study", lambda name: lambda report: made)
     with pytest.raises(InputError, match="cannot be written: No space left on device"):
         reproduce.reproduce("all", output=tmp_path / "new", json=json_wanted)
     told = capsys.readouterr().out
