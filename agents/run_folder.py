@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,7 +41,7 @@ class RunFolder:
 
     def check_new(self) -> None:
         """Raise InputError where the folder holds something already."""
-        if self.path.exists() and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
+        if os.path.exists(self.path) and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
             raise InputError(
                 f"{self.path} exists already; go on with it by --resume, or give another --output."
             )

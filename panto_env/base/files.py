@@ -74,7 +74,9 @@ def _beside(target: Path, suffix: str) -> Path:
 
 
 def _reason(error: OSError | ValueError) -> str:
-    return getattr(error, "strerror", None) or str(error).rstrip(".")
+    """What the system says, in its own words."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else str(error).rstrip(".")
 
 
 TABLES = (".csv", ".parquet")
