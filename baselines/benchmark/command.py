@@ -74,8 +74,6 @@ def benchmark(
     from .plot import plot as draw
     from .report import WIDTH, tables
 
-    if output is not None:
-        refuse_overwriting(output, force)
     line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
         config,
@@ -84,6 +82,8 @@ def benchmark(
         seeds=seeds,
         **given,
     )
+    if output is not None:
+        refuse_overwriting(output, force)
     with counting("passes") as progress:
         outcome = run(settings, workers, progress, ray)
     with written_last() as later:
