@@ -32,7 +32,7 @@ RESULTS := docs/benchmark
 benchmark: $(READY)
 	mkdir -p $(RESULTS)
 	for track in $(TRACKS); do \
-	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json || exit 1; done
+	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json --force || exit 1; done
 	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json) --output $(RESULTS)/index.html
 
 lint: $(READY)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from panto_env.base.files import make_folder
 from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, counting, print_json, print_table, this_command
 
@@ -30,8 +31,9 @@ def ablation(
     from .ablation_table import table, variants
 
     settings = load_ablation(config)
+    folder, command = output or Path("runs") / config.stem, this_command()
+    make_folder(folder)  # now, and not in each worker
     with counting("trainings") as progress:
-        folder, command = output or Path("runs") / config.stem, this_command()
         models, outcome = run(settings, folder, workers, ray, progress, command)
     found = variants(models, outcome)
     if json:

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from panto_env.analysis.options import with_settings
 from panto_env.analysis.requirements import print_criteria
+from panto_env.base.files import make_folder
 from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
@@ -23,6 +24,7 @@ from panto_env.terminal import (
     progress_console,
     this_command,
     writable,
+    written_last,
 )
 
 from .packages import check_packages
@@ -62,11 +64,17 @@ def train(
 ) -> None:
     """Train a model; the benchmark takes its file as a policy."""
     check_packages()
+    from .run_folder import RunFolder
     from .settings import load_training
     from .trainings import run_name
 
     training = load_training(config, seed=seed, total_steps=steps)
     folder = output or Path("runs") / run_name(config, training)
+    if resume:
+        RunFolder(folder).check_resumable(training)
+    else:
+        RunFolder(folder).check_new()
+    make_folder(folder)  # now: torch takes its time to load
     with progress_console.status("loading torch"):
         from .model_file import read_model
         from .train import train as run
@@ -138,26 +146,27 @@ def evaluate(
     comparison = Comparison(arguments(environment), chosen, judged_on, settings.get("distance"))
     with progress_console.status("running"):
         pairs = comparison.run(driver)
-    if plot is not None:
-        from panto_env.analysis import plots
+    with written_last() as later:
+        if plot is not None:
+            from panto_env.analysis import plots
 
-        runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
-        title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
-        picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
-        plots.save(picture, plot)
-    if json:
-        ratio, qualified = verdict(pairs)
-        run = {"policy": policy, "environment": environment, "settings": comparison.settings}
-        found = {"ratio": ratio, "qualified": qualified}
-        print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
-        return
-    _print_pairs(pairs)
-    for speed_kmh in sorted({pair.speed_kmh for pair in pairs}):
-        seeds_here = [pair.policy_compliance for pair in pairs if pair.speed_kmh == speed_kmh]
-        if all(seeds_here):
-            title = f"Requirements at {speed_kmh:g} km/h under {policy}; of several seeds the worst"
-            print_criteria(worst(seeds_here), title)
-    console.print(f"mean of all: {in_words(pairs)}")
+            runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
+            title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
+            picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
+            later(plots.save, picture, plot)
+        if json:
+            ratio, qualified = verdict(pairs)
+            run = {"policy": policy, "environment": environment, "settings": comparison.settings}
+            found = {"ratio": ratio, "qualified": qualified}
+            print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
+            return
+        _print_pairs(pairs)
+        for speed_kmh in sorted({pair.speed_kmh for pair in pairs}):
+            seeds_here = [pair.policy_compliance for pair in pairs if pair.speed_kmh == speed_kmh]
+            if all(seeds_here):
+                title = f"Requirements at {speed_kmh:g} km/h under {policy}; of several seeds the worst"
+                print_criteria(worst(seeds_here), title)
+        console.print(f"mean of all: {in_words(pairs)}")
 
 
 def _print_pairs(pairs: list[Pair]) -> None:

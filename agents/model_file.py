@@ -1,23 +1,24 @@
 """The model file: a Stable-Baselines3 zip with what a policy and a resumed training need in addition.
 
 ``panto.json`` holds the facts below, ``actor.npz`` the deterministic policy, and ``replay.npz``, in a
-checkpoint of SAC, the replay buffer. A policy is read from the first two alone, so that running a
-model file needs no torch and unpickles nothing.
+checkpoint of SAC, the replay buffer; ``sha256.json`` the checksums of all other parts. A policy is read from
+the first two alone, so that running a model file needs no torch and unpickles nothing.
 """
 
 from __future__ import annotations
 
-import io
 import json
+import os
 import zipfile
-import zlib
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import ValidationError, field_validator
 
 from panto_baselines.policies.washout import WashoutSettings
+from panto_env.base.checked_json import warn_unchecked
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_whole
 from panto_env.base.settings import Settings
@@ -26,11 +27,23 @@ from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
+from .model_parts import (
+    READ_ERRORS,
+    check_checksums,
+    check_sizes,
+    layers_of,
+    read_arrays,
+    read_part,
+    write_arrays,
+    write_checksums,
+)
 
 FACTS, ACTOR, REPLAY = "panto.json", "actor.npz", "replay.npz"
+MOST_FACTS, MOST_ACTOR = 2**20, 2**28
+"""Bytes that facts and network may unpack to."""
+DRIVEN = ((0,), (1,), (0, 1))
+"""What the actions of a policy can drive: frame, head, or both."""
 REPLAY_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-READ_ERRORS = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, ValueError)
-"""What reading a damaged zip, JSON or array can raise (errors of pydantic and JSON are ValueErrors)."""
 
 
 class Needs(Settings):
@@ -44,6 +57,13 @@ class Needs(Settings):
     channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
     force_limit: float  # N
     control_interval: float  # s
+
+    @field_validator("channels")
+    @classmethod
+    def _driven(cls, channels: tuple[int, ...]) -> tuple[int, ...]:
+        if channels not in DRIVEN:
+            raise ValueError("no actuator drives that")
+        return channels
 
     @classmethod
     def of(cls, context: Context) -> Needs:
@@ -89,18 +109,25 @@ class Facts(Settings):
 
 
 def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
-    """Write a model file, whole or not at all. replay: with the replay buffer."""
+    """Write a model file, whole or not at all. replay: with the replay buffer.
+
+    Raises InputError where it can't be written.
+    """
     with write_whole(path) as temporary:
-        model.save(temporary)
+        try:
+            model.save(temporary)
+        except RuntimeError as error:  # torch's, where the disk is full
+            raise InputError(f"{path} cannot be written: {str(error).splitlines()[0]}") from error
         with zipfile.ZipFile(temporary, "a") as archive:
             archive.writestr(FACTS, facts.model_dump_json(indent=1))
-            _write_arrays(archive, ACTOR, _arrays_of(actor))
+            write_arrays(archive, ACTOR, _arrays_of(actor))
             if replay:
                 buffer = model.replay_buffer
                 filled = buffer.buffer_size if buffer.full else buffer.pos
                 arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY_ARRAYS}
                 arrays["position"] = np.array([buffer.pos, buffer.full])
-                _write_arrays(archive, REPLAY, arrays)
+                write_arrays(archive, REPLAY, arrays)
+            write_checksums(archive)
 
 
 def export_model(source: Path, target: Path) -> None:
@@ -111,41 +138,37 @@ def export_model(source: Path, target: Path) -> None:
     facts, actor = read_model(source)
     with write_whole(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(FACTS, facts.model_dump_json(indent=1))
-        _write_arrays(archive, ACTOR, _arrays_of(actor))
+        write_arrays(archive, ACTOR, _arrays_of(actor))
+        write_checksums(archive)
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:
     """The parts of a model file that a policy needs.
 
-    Raises InputError, naming the file, where it is damaged or `panto train` did not write it.
+    UncheckedWarning where it is of an older version, without checksums. Raises InputError, naming the file,
+    where it is damaged, would unpack to far more than it is, or `panto train` did not write it.
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            damaged = archive.testzip()
-            if damaged is not None:
-                raise ValueError(f"its part {damaged} is damaged")
+            check_sizes(archive, os.path.getsize(path))
+            checked = check_checksums(archive)
             if FACTS not in archive.namelist():
                 raise ValueError(f"it holds no {FACTS}, so `panto train` has not written it")
-            facts = Facts.model_validate(json.loads(archive.read(FACTS)))
-            arrays = _read_arrays(archive, ACTOR)
-        layers = range(len(arrays) // 2)
-        shape = (len(facts.needs.channels), len(facts.needs.entries))
-        if (arrays[f"bias_{layers[-1]}"].shape[0], arrays["weight_0"].shape[1]) != shape:
-            raise ValueError("its network has another shape than it says")
-        actor = Actor(
-            weights=tuple(arrays[f"weight_{k}"] for k in layers),
-            biases=tuple(arrays[f"bias_{k}"] for k in layers),
-            activation=facts.activation,
-            squashed=facts.squashed,
-        )
+            facts = Facts.model_validate(json.loads(read_part(archive, FACTS, MOST_FACTS)))
+            arrays = read_arrays(archive, ACTOR, MOST_ACTOR)
+        weights, biases = layers_of(arrays, len(facts.needs.entries), len(facts.needs.channels))
+        actor = Actor(weights, biases, facts.activation, facts.squashed)
     except FileNotFoundError as error:
         raise InputError(f"The model file {path} does not exist; check the path.") from error
     except READ_ERRORS as error:
         reason = f"its {FACTS} is not valid" if isinstance(error, ValidationError) else str(error)
+        reason = reason.partition("\n")[0].rstrip(".") or type(error).__name__
         raise InputError(
             f"{path} is not a whole model file ({reason}); take another, such as an earlier "
             "checkpoint, or train anew with `panto train`."
         ) from error
+    if not checked:
+        warn_unchecked(path)
     return facts, actor
 
 
@@ -157,34 +180,27 @@ def restore(path: Path, model: Any) -> Facts:
     from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
 
     facts, _ = read_model(path)
-    _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
     try:
+        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
         model.set_parameters(parameters)
-    except (ValueError, RuntimeError) as error:
-        raise InputError(f"{path} does not fit the training's settings: {error}") from error
-    for name, value in (variables or {}).items():
-        recursive_setattr(model, f"{name}.data", value.data)
-    model.num_timesteps, model._n_updates = facts.steps, facts.updates
-    with zipfile.ZipFile(path) as archive:
-        if REPLAY in archive.namelist():
-            arrays = _read_arrays(archive, REPLAY)
-            buffer = model.replay_buffer
-            for name in REPLAY_ARRAYS:
-                getattr(buffer, name)[: len(arrays[name])] = arrays[name]
-            buffer.pos, buffer.full = int(arrays["position"][0]), bool(arrays["position"][1])
+        for name, value in (variables or {}).items():
+            recursive_setattr(model, f"{name}.data", value.data)
+        model.num_timesteps, model._n_updates = facts.steps, facts.updates
+        with zipfile.ZipFile(path) as archive:
+            if REPLAY in archive.namelist():
+                buffer = model.replay_buffer
+                stores = {name: getattr(buffer, name) for name in REPLAY_ARRAYS}
+                most = sum(store.nbytes for store in stores.values()) + MOST_FACTS
+                arrays = read_arrays(archive, REPLAY, most)
+                for name, store in stores.items():
+                    store[: len(arrays[name])] = arrays[name]
+                buffer.pos, buffer.full = int(arrays["position"][0]), bool(arrays["position"][1])
+    except (*READ_ERRORS, UnpicklingError) as error:
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise InputError(f"{path} does not fit the training's settings: {reason}.") from error
     return facts
 
 
 def _arrays_of(actor: Actor) -> dict[str, Any]:
     weights = {f"weight_{k}": weight for k, weight in enumerate(actor.weights)}
     return weights | {f"bias_{k}": bias for k, bias in enumerate(actor.biases)}
-
-
-def _write_arrays(archive: zipfile.ZipFile, name: str, arrays: dict[str, Any]) -> None:
-    with archive.open(name, "w", force_zip64=True) as member:
-        np.savez(member, **arrays)
-
-
-def _read_arrays(archive: zipfile.ZipFile, name: str) -> dict[str, Any]:
-    with np.load(io.BytesIO(archive.read(name)), allow_pickle=False) as arrays:
-        return dict(arrays)

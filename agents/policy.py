@@ -56,7 +56,14 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 def load(path: str | Path) -> TrainedPolicy:
     """Policy of a model file. Raises InputError, naming the file, where it is not a whole one."""
-    return TrainedPolicy(Path(path), *read_model(Path(path)))
+    facts, actor = read_model(Path(path))
+    try:
+        return TrainedPolicy(Path(path), facts, actor)
+    except RecursionError as error:
+        raise InputError(
+            f"The model file {path} says that it is added to a policy which is, in the end, itself; take "
+            "another."
+        ) from error
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:

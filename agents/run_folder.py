@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,7 +42,7 @@ class RunFolder:
 
     def check_new(self) -> None:
         """Raise InputError where the folder holds something already."""
-        if self.path.exists() and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
+        if os.path.exists(self.path) and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
             raise InputError(
                 f"{self.path} exists already; go on with it by --resume, or give another --output."
             )
@@ -64,6 +65,7 @@ class RunFolder:
                 f"The settings differ from those of the run in {self.path}: {'; '.join(differing)}. "
                 "Take the run's settings, or train into another --output."
             )
+        self._rows()  # which are gone on with, too
         if training.total_steps < before.total_steps:
             raise InputError(
                 f"The run in {self.path} has total_steps = {before.total_steps}; a resumed run may have "
@@ -156,10 +158,26 @@ class RunFolder:
             self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
 
     def _rows(self) -> list[dict[str, str]]:
+        """Rows of the table of evaluations. Raises InputError where it is damaged."""
         if not self.evaluations.is_file():
             return []
-        with self.evaluations.open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
+        rows: list[dict[str, str]] = []
+        try:
+            with self.evaluations.open(newline="", encoding="utf-8") as file:
+                table = csv.DictReader(file, strict=True)
+                if "steps" not in (table.fieldnames or ()):
+                    raise ValueError("it has no header")
+                for cells in table:
+                    int(cells["steps"])
+                    if None in cells or None in cells.values():
+                        raise ValueError("it has another number of cells than the header")
+                    rows.append(cells)
+        except (OSError, ValueError, LookupError, TypeError, csv.Error) as error:
+            raise InputError(
+                f"{self.evaluations} is damaged after {len(rows)} whole rows; mend or remove it, and resume "
+                "again."
+            ) from error
+        return rows
 
     def _write_rows(self, rows: list[dict[str, str]]) -> None:
         text = io.StringIO()

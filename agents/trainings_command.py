@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from panto_env.base.files import make_folder
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
 from panto_env.terminal import Json, counting, print_json, print_table, progress_console, this_command
@@ -46,6 +47,7 @@ def trainings(
     from .trainings import plan, train_all
 
     planned = plan(configs, seed or None, steps, output)
+    make_folder(output)  # now, and not in each worker
     try:
         with counting("trainings") as progress:
             command = this_command()

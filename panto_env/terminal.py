@@ -8,6 +8,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any
 
 import rich.progress
@@ -16,23 +17,45 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from .base.errors import InputError
 from .base.files import PICTURES, check_output, finite
+from .base.plain_characters import shows_all
 from .base.table import Alarm, Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 
 
-def writable(suffixes: Sequence[str]) -> Callable[[str | None], str | None]:
-    """What checks an option that names a file to write, before the command begins its work."""
+def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[str | None], str | None]:
+    """What checks an option that names a file to write, before the command begins its work.
+
+    announced: whether it is said there, too, that a file of this name will be overwritten.
+    """
 
     def check(path: str | None) -> str | None:
         if path is not None:
             check_output(path, suffixes)
+            if announced:
+                announce_overwriting(path)
         return path
 
     return check
 
 
+def announce_overwriting(path: str | Path) -> None:
+    """Say, in a line on standard error, that a file which is there will be overwritten."""
+    if Path(path).is_file():
+        print(f"panto: {path} exists already and will be overwritten.", file=sys.stderr)
+
+
+def refuse_overwriting(path: str | Path, force: bool) -> None:
+    """Raise InputError where a file is there that may have taken hours; with ``force`` only say so."""
+    if force:
+        announce_overwriting(path)
+    elif Path(path).is_file():
+        raise InputError(f"{path} exists already; give another --output, or --force to overwrite it.")
+
+
+Force = Annotated[bool, typer.Option("--force", help="Overwrite results of before in the output.")]
 Plot = Annotated[
     str | None,
     typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
@@ -53,7 +76,7 @@ def alert(words: str, rest: str = "", to: Console | None = None) -> None:
 
 def print_json(value: Any) -> None:
     """Print JSON to standard output; figures that are not numbers become null."""
-    json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=False)
+    json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=not shows_all(sys.stdout))
     sys.stdout.write("\n")
 
 
@@ -86,6 +109,32 @@ def print_table(table: Table) -> None:
 def number(value: float, digits: int = 1) -> str:
     """A figure for a table; a dash where there is none."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+@contextmanager
+def written_last() -> Iterator[Callable[..., None]]:
+    """Within the body: ``later(save, path)`` calls for a file that is written once the body has ended.
+
+    So what was computed is printed, whether it can be written or not, and written, whether it can be printed
+    or not. Where several files can't be written, the first one's InputError is raised.
+    """
+    errors: list[InputError] = []
+
+    def attempt(write: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            write(*arguments)
+        except InputError as error:
+            errors.append(error)
+
+    jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
+    try:
+        yield lambda write, *arguments: jobs.append((write, arguments))
+    finally:
+        for write, arguments in jobs:
+            attempt(write, *arguments)
+        if errors:
+            sys.stdout.flush()
+            raise errors[0]
 
 
 @contextmanager

@@ -21,6 +21,7 @@ from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_ben
 from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
+from panto_env.base.checked_json import read_checked
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
@@ -237,7 +238,7 @@ def test_json_holds_everything_and_the_settings_that_make_it_again(
     outcome: Benchmark, tmp_path: Path
 ) -> None:
     outcome.save(tmp_path / "out.json")
-    table = json.loads((tmp_path / "out.json").read_text())
+    table = read_checked(tmp_path / "out.json")
     assert table == outcome.as_dict()
     assert parse(BenchmarkSettings, table["settings"], "it") == outcome.settings
     assert len(table["rows"]) == 4
@@ -333,7 +334,7 @@ def test_command_raises_one_sentence_and_overwrites_nothing(
 ) -> None:
     kept = tmp_path / "out.json"
     kept.write_text("kept")
-    result = called("--output", str(kept), *arguments)
+    result = called("--output", str(kept), "--force", *arguments)
     assert isinstance(result.exception, InputError)
     assert words in str(result.exception)
     assert "\n" not in str(result.exception)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from panto_env import Trajectory
+from panto_env.base.checked_json import read_checked
 from panto_env.studies.en50318 import reference
 
 PANTO = Path(sys.executable).with_name("panto")
@@ -115,7 +116,7 @@ def test_reproduce_prints_what_it_writes_as_json(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(reproduce.studies, "find_study", lambda name: lambda report: found)
     reproduce.reproduce("paper2", tmp_path, json=True)
     told = json.loads(capsys.readouterr().out)
-    assert told["paper2"] == json.loads((tmp_path / "paper2" / "numbers.json").read_text())
+    assert told["paper2"] == read_checked(tmp_path / "paper2" / "numbers.json")
     assert told["paper2"]["comparisons"][0]["agrees"]
     assert told["paper2"]["comparisons"][0]["high"] is None
     reproduce.reproduce("paper2", tmp_path)

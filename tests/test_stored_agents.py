@@ -40,7 +40,7 @@ class TestAgent:
         path = FOLDER / f"{name}.zip"
         assert path.stat().st_size < 500_000
         with zipfile.ZipFile(path) as archive:
-            assert sorted(archive.namelist()) == ["actor.npz", "panto.json"]
+            assert sorted(archive.namelist()) == ["actor.npz", "panto.json", "sha256.json"]
 
     def test_says_what_made_it(self, name):
         facts, _ = read_model(FOLDER / f"{name}.zip")

@@ -66,7 +66,7 @@ def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
     path = tmp_path / "run.parquet"
     run.save(path)
     before = path.read_bytes()
-    monkeypatch.setattr(pq, "write_table", lambda *_: 1 / 0)
+    monkeypatch.setattr(pq, "write_table", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run.save(path)
     assert path.read_bytes() == before

@@ -110,7 +110,7 @@ def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, 
     result = CliRunner().invoke(make_app(), ["export", str(washed.best), str(target)])
     assert result.exit_code == 0, result.output
     with zipfile.ZipFile(target) as archive:
-        assert sorted(archive.namelist()) == ["actor.npz", "panto.json"]
+        assert sorted(archive.namelist()) == ["actor.npz", "panto.json", "sha256.json"]
     facts, actor = read_model(target)
     before, same = read_model(washed.best)
     assert facts == before

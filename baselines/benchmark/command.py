@@ -10,7 +10,16 @@ import typer
 from panto_env.analysis.options import with_settings
 from panto_env.base.files import PAGES
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, Plot, counting, print_json, writable
+from panto_env.terminal import (
+    Force,
+    Json,
+    Plot,
+    counting,
+    print_json,
+    refuse_overwriting,
+    writable,
+    written_last,
+)
 
 from .run import SUFFIXES, run
 
@@ -40,9 +49,10 @@ def benchmark(
         str | None,
         typer.Option(
             help="File to write: everything as .json, or the passes as .csv or .parquet.",
-            callback=writable(SUFFIXES),
+            callback=writable(SUFFIXES, announced=False),
         ),
     ] = None,
+    force: Force = False,
     plot: Plot = None,
     html: Annotated[
         str | None,
@@ -72,21 +82,24 @@ def benchmark(
         seeds=seeds,
         **given,
     )
+    if output is not None:
+        refuse_overwriting(output, force)
     with counting("passes") as progress:
         outcome = run(settings, workers, progress, ray)
-    if output is not None:
-        outcome.save(output)
-    if plot is not None:
-        save(draw(outcome), plot)
-    if html is not None:
-        save_page([parse_result(outcome.as_dict(), "the outcome")], html)
-    if json:
-        print_json(outcome.as_dict())
-        return
-    console = Console(markup=False)
-    if not console.is_terminal:
-        console = Console(markup=False, width=WIDTH)
-    console.print(tables(outcome))
+    with written_last() as later:
+        if output is not None:
+            later(outcome.save, output)
+        if plot is not None:
+            later(save, draw(outcome), plot)
+        if html is not None:
+            later(save_page, [parse_result(outcome.as_dict(), "the outcome")], html)
+        if json:
+            print_json(outcome.as_dict())
+            return
+        console = Console(markup=False)
+        if not console.is_terminal:
+            console = Console(markup=False, width=WIDTH)
+        console.print(tables(outcome))
 
 
 def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> BenchmarkSettings:

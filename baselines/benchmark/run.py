@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
+from panto_env.base.checked_json import with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
 from panto_env.base.machine import cores
@@ -65,7 +66,8 @@ class Benchmark:
             write_rows([row.as_dict() for row in self.rows], path)
             return
         with write_whole(path) as temporary:
-            temporary.write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
+            text = json.dumps(with_checksum(self.as_dict()), indent=1)
+            temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def run(

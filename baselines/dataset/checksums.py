@@ -32,7 +32,13 @@ def verify(path: Path) -> list[tuple[Path, int]]:
 
 def _verify(folder: Path) -> int:
     listed = {}
-    for line in (folder / LIST).read_text(encoding="utf-8").splitlines():
+    try:
+        lines = (folder / LIST).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{folder / LIST} could not be read, or is damaged; make or download the data set anew."
+        ) from error
+    for line in lines:
         checksum, _, name = line.partition("  ")
         listed[name] = checksum
     found = _files(folder)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from panto_env.base.files import make_folder
 from panto_env.base.settings import parse
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
@@ -116,6 +117,7 @@ def verify(
 
 def _going_on(output: Path, work: Callable[[Any], T]) -> T:
     """The result of work that shows its progress, and can be gone on with where it is interrupted."""
+    make_folder(output)
     try:
         with counting("parts") as progress:
             return work(progress)

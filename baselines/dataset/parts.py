@@ -43,7 +43,14 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
         with write_whole(path) as temporary:
             temporary.write_text(json.dumps(made_of, indent=1) + "\n", encoding="utf-8")
         return
-    difference = first_difference(json.loads(path.read_text(encoding="utf-8")), made_of)
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        difference = first_difference(before, made_of)
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError) as error:
+        raise InputError(
+            f"{path} is damaged, so it does not say what the parts beside it are of; remove the folder, or "
+            "take another --output."
+        ) from error
     if difference:
         raise InputError(
             f"{folder} holds parts of another data set ({difference}); finish that one, remove the folder, "

@@ -11,14 +11,17 @@ import typer
 from panto_env.analysis.options import parse_spans, with_settings
 from panto_env.base.errors import InputError
 from panto_env.terminal import (
+    Force,
     Json,
     Plot,
     console,
     print_json,
     print_table,
     progress_console,
+    refuse_overwriting,
     this_command,
     writable,
+    written_last,
 )
 
 if TYPE_CHECKING:
@@ -48,8 +51,12 @@ def oracle(
         int | None, typer.Option(min=0, help="Searches that follow from the best one so far, shaken.")
     ] = None,
     output: Annotated[
-        str | None, typer.Option(help="File to write: everything as .json.", callback=writable((".json",)))
+        str | None,
+        typer.Option(
+            help="File to write: everything as .json.", callback=writable((".json",), announced=False)
+        ),
     ] = None,
+    force: Force = False,
     known: Annotated[
         bool, typer.Option("--stored", help="Print the stored oracles, and search for none.")
     ] = False,
@@ -62,7 +69,7 @@ def oracle(
     what control can be asked for. It is a local optimum that is reached, not a proof that nothing is better.
     Seeds after the first start where the one before ended. The picture shows the first pass that was searched
     for. Cells that are in the output already, asked for in the same way, are kept: a list that was broken off
-    is gone on with.
+    is gone on with. An output with other cells, which would be lost, is refused without --force.
     """
     from panto_env.analysis.plots import save as save_plot
 
@@ -93,6 +100,8 @@ def oracle(
         next((each for each in before if each["asked"] == one), None) for one in wanted
     ]
     kept = len(done) - done.count(None)
+    if output is not None and len(before) > kept:
+        refuse_overwriting(output, force)
     if plot is not None and kept == len(done):
         raise InputError(f"{output} holds all of this already: no search is left to plot; leave it out.")
     found: list[Oracle] = []
@@ -110,16 +119,17 @@ def oracle(
         found += passes
         if output is not None:  # at once: a long list may be broken off, and is then gone on with
             save([each for each in done if each is not None], output, command)
-    if plot is not None:
-        save_plot(report.plot(found[0]), plot)
-    if json:
-        print_json(as_data([each for each in done if each is not None], command))
-        return
-    if kept:
-        console.print(f"{kept} of {len(done)} cells are those that were in {output} already.")
-    if found:
-        print_table(report.summary(found))
-    console.print(report.LEGEND, style="dim")
+    with written_last() as later:
+        if plot is not None:
+            later(save_plot, report.plot(found[0]), plot)
+        if json:
+            print_json(as_data([each for each in done if each is not None], command))
+            return
+        if kept:
+            console.print(f"{kept} of {len(done)} cells are those that were in {output} already.")
+        if found:
+            print_table(report.summary(found))
+        console.print(report.LEGEND, style="dim")
 
 
 def _tell(start: str, iteration: Iteration) -> None:

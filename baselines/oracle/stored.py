@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from panto_env.base.checked_json import read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
@@ -94,6 +95,12 @@ def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
     return {"version": __version__, "command": command, "cells": list(cells)}
 
 
+def as_text(data: Mapping[str, Any]) -> str:
+    """What a file holds: data of ``as_data`` with its checksum, a line for each cell and each pass."""
+    text = json.dumps(with_checksum(data), separators=(",", ":"))
+    return text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
+
+
 def _pass(oracle: Oracle) -> dict[str, Any]:
     problem = oracle.problem
     return {
@@ -112,23 +119,20 @@ def _pass(oracle: Oracle) -> dict[str, Any]:
 
 def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> None:
     """Write cells as JSON, whole or not at all."""
-    text = json.dumps(as_data(cells, command), separators=(",", ":"))
     with write_whole(path) as temporary:
-        temporary.write_text(
-            text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
-        )
+        temporary.write_text(as_text(as_data(cells, command)), encoding="utf-8")
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """What a file of ``save`` holds. Raises InputError for another file."""
+    """What a file of ``save`` holds. Raises InputError for another file, or one that is damaged."""
+    data = read_checked(path)
     try:
-        data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
         [one["fingerprint"] for one in (each["asked"] for each in data["cells"])]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
             f"{path} holds no oracles of this version; remove it, or name another file."
         ) from error
-    return data
+    return dict(data)
 
 
 @cache

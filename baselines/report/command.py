@@ -9,7 +9,7 @@ import typer
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import PAGES, check_output
-from panto_env.terminal import console
+from panto_env.terminal import announce_overwriting, console
 
 
 def report(
@@ -53,6 +53,7 @@ def report(
         return
     path = files[0].with_suffix(PAGES[0]) if output is None else output
     check_output(path, PAGES)
+    announce_overwriting(path)
     save([read_result(file) for file in files], path)
     console.print(f"The page is {path}.", markup=False, highlight=False, soft_wrap=True)
 
@@ -61,5 +62,7 @@ def _of_runs(files: list[Path], output: Path | None) -> None:
     from panto_env import report
 
     path = files[0].with_suffix(PAGES[0]) if output is None else output
+    check_output(path, PAGES)
+    announce_overwriting(path)
     report.save(files, path)
     console.print(f"The report is {path}.", markup=False, highlight=False, soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from math import isfinite, nan
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
@@ -18,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from panto_env.base.checked_json import read_checked
 from panto_env.base.errors import InputError
 
 Number = Annotated[
@@ -145,18 +145,8 @@ class Result(Part):
 
 
 def read_result(path: str | Path) -> Result:
-    """The result in a JSON file. Raises InputError, in one sentence, where it holds none."""
-    try:
-        table = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
-    except OSError as error:
-        raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
-    except (ValueError, RecursionError) as error:  # no UTF-8, no JSON, or nested without end
-        raise InputError(
-            f"{path} is not JSON; give what `panto benchmark --output RESULT.json` wrote."
-        ) from error
-    return parse_result(table, str(path))
+    """The result in a JSON file. Raises InputError, in one sentence, where it holds none or is damaged."""
+    return parse_result(read_checked(path), str(path))
 
 
 def parse_result(table: Any, name: str) -> Result:

@@ -9,7 +9,7 @@ import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, counting, print_json, print_table, this_command
+from panto_env.terminal import Force, Json, counting, print_json, print_table, this_command, written_last
 
 
 @with_settings(
@@ -44,13 +44,14 @@ def tune(
             help="TOML file to put the gains into; by default that in which the policy looks for them."
         ),
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Fit a policy's gains to a line, a pantograph, an actuator and sensors, speed by speed.
 
     Least squares of the contact force at a mean force like the passive one's, on training seeds; the table
     shows what the gains do on selection seeds. Actuator and sensors are "realistic", the line "fair", unless
-    told otherwise.
+    told otherwise. Gains of the same line, pantograph and place in the file are replaced only with --force.
     """
     from panto_env.control import Task
     from panto_env.control.settings import run_settings
@@ -66,7 +67,7 @@ def tune(
         {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
     )
     kind, path = tunable(policy), output or gain_file(policy)
-    check_gain_file(path, policy)
+    check_gain_file(path, policy, settings, force)
     names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS
     speeds = sorted(set(speed or SPEEDS_KMH))
@@ -74,8 +75,9 @@ def tune(
         tuned = run(policy, settings, speeds, count, passes or PASSES, workers, progress, ray)
     command = this_command()
     tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
-    store(path, policy, tuning)
-    if json:
-        print_json(tuning.model_dump(mode="json"))
-        return
-    print_table(table(policy, tuned))
+    with written_last() as later:
+        later(store, path, policy, tuning)
+        if json:
+            print_json(tuning.model_dump(mode="json"))
+            return
+        print_table(table(policy, tuned))

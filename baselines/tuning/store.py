@@ -46,11 +46,23 @@ def make_tuning(
     )
 
 
-def check_gain_file(path: Path, policy: str) -> None:
-    """Raise InputError unless a policy's gains can be put into a file: asked before any work begins."""
+def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool) -> None:
+    """Raise InputError unless a policy's gains can be put into a file: asked before any work begins.
+
+    force: also where the file has gains for the same line, pantograph and place, which are then replaced.
+    """
     check_output(path, (".toml",))
-    if os.path.isfile(path) and load_gains(path).policy != policy:
-        raise InputError(f"{path} holds gains of '{load_gains(path).policy}'; give another --output.")
+    if not os.path.isfile(path):
+        return
+    file = load_gains(path)
+    if file.policy != policy:
+        raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
+    case = settings.catenary.name, settings.pantograph.name, settings.actuator.place
+    if not force and case in map(_case, file.tunings):
+        raise InputError(
+            f"{path} holds gains for {settings.pantograph.name} on {settings.catenary.name}, actuator on "
+            f"'{settings.actuator.place}', already; give another --output, or --force to replace them."
+        )
 
 
 def store(path: Path, policy: str, tuning: Tuning) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +30,10 @@ def save(figure: Figure, path: str | Path) -> None:
     """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
     check_output(path, PICTURES)
     _leave_odd_names(figure)
+    picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
+    figure.savefig(picture, dpi=120, format=Path(path).suffix[1:].lower())
     with write_whole(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        temporary.write_bytes(picture.getvalue())
 
 
 def _leave_odd_names(figure: Figure) -> None:

@@ -4,39 +4,81 @@ from __future__ import annotations
 
 import math
 import os
+import stat
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from .errors import InputError
 from .paths import check_path
 
+TRIAL = 4096
+"""Bytes that are written for a test of whether a folder takes any: the least that a disk stores."""
+
 
 @contextmanager
 def write_whole(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` to write to; it takes the place of ``path`` at the end.
+    """A temporary path to write to; it takes the place of ``path`` at the end.
 
-    If the body raises, ``path`` is as it was. Raises InputError where it can't be written.
+    If the body raises, ``path`` is as it was. A symbolic link stays: what it leads to is replaced. Raises
+    InputError where it can't be written, the body's OSError included, and for what is no regular file.
     """
     check_path(path)
-    target = Path(path)
+    target = regular_file(path)
+    temporary = None
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written: {error.strerror or error}.") from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(target)
+        try:
+            temporary = _beside(target, Path(path).suffix)
+            yield temporary
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
+            temporary.replace(target)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def regular_file(path: str | Path) -> Path:
+    """Where a file of this name stands, or would stand: at the end of symbolic links.
+
+    Raises InputError where something else stands there: a folder, a device, a pipe or a socket.
+    """
+    try:
+        target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+        mode = os.lstat(target).st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return target
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path} cannot be written: it is a folder.")
+    if stat.S_ISLNK(mode):
+        raise InputError(f"{path} cannot be written: its symbolic links lead round in a circle.")
+    if not stat.S_ISREG(mode):
+        raise InputError(
+            f"{path} cannot be written: it is no regular file, but a device, a pipe or a socket."
+        )
+    return target
+
+
+def _beside(target: Path, suffix: str) -> Path:
+    """A new and empty file beside another one; suffix: what it is written as, by which a link may differ."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=suffix)
+    os.close(handle)
+    return Path(name)
+
+
+def _reason(error: OSError | ValueError) -> str:
+    """What the system says, in its own words."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else str(error).rstrip(".")
 
 
 TABLES = (".csv", ".parquet")
@@ -57,23 +99,41 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
     if target.suffix.lower() not in suffixes:
         which = f"one of {', '.join(suffixes)}" if len(suffixes) > 1 else suffixes[0]
         raise InputError(f"{path} must end in {which}.")
-    if not target.parent.exists():
+    target = regular_file(path)
+    if not os.path.exists(target.parent):
         raise InputError(f"{path} cannot be written: there is no folder {target.parent}, so make it first.")
     if not target.parent.is_dir():
         raise InputError(f"{path} cannot be written: {target.parent} is no folder.")
-    if target.is_dir():
-        raise InputError(f"{path} cannot be written: it is a folder.")
     if not os.access(target.parent, os.W_OK):
         raise InputError(f"{path} cannot be written: the folder {target.parent} does not allow it.")
+    _try(target, f"{path} cannot be written")
+
+
+def _try(target: Path, otherwise: str) -> None:
+    """Write a file beside another one, and remove it: a full disk, or one that takes nothing, is found so."""
+    trial = None
+    try:
+        try:
+            trial = _beside(target, target.suffix)
+            trial.write_bytes(bytes(TRIAL))
+        finally:
+            if trial is not None:
+                trial.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"{otherwise}: {_reason(error)}.") from error
 
 
 def make_folder(path: str | Path) -> None:
-    """Make a folder that is itself what was asked for, and those above it. InputError where it can't be."""
+    """Make a folder that is itself what was asked for, and those above it.
+
+    Raises InputError where it can't be made, or nothing can be written into it.
+    """
     check_path(path)
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"The folder {path} cannot be made: {error.strerror or error}.") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"The folder {path} cannot be made: {_reason(error)}.") from error
+    _try(Path(path) / "trial", f"Nothing can be written into the folder {path}")
 
 
 def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
@@ -90,7 +150,7 @@ def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
         else:
             from pyarrow.parquet import write_table
 
-            write_table(table, temporary)
+            write_table(table, temporary, write_page_checksum=True)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

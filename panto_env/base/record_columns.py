@@ -95,7 +95,19 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
         raise InputError(f"The record {path} is empty; give a CSV file with a header.")
     separator = max(",;\t", key=kept[0][1].count)
     cells = csv.reader((line for _, line in kept), delimiter=separator)
-    return [(number, row) for (number, _), row in zip(kept, cells, strict=True)]
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        for row in cells:
+            number = kept[len(rows)][0]
+            if cells.line_num > len(rows) + 1:  # it goes on in the next line
+                raise csv.Error
+            rows.append((number, row))
+    except csv.Error as error:  # also a cell that is longer than any number
+        raise InputError(
+            f"Line {kept[len(rows)][0]} of {path} has a quotation mark without its second one, or a cell "
+            "without end; mend or drop such lines."
+        ) from error
+    return rows
 
 
 def _places(

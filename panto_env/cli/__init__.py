@@ -12,7 +12,8 @@ import typer
 from typer import Abort
 
 from ..base import plugins
-from ..base.errors import AccuracyWarning, InputError
+from ..base.errors import AccuracyWarning, InputError, UncheckedWarning
+from ..base.plain_characters import show_always
 from ..base.version import __version__
 from ..terminal import one_line
 
@@ -25,6 +26,7 @@ def main() -> None:
 
     SIGTERM ends it as an interrupt from the keyboard does: what it has begun is put in order.
     """
+    show_always()
     warnings.showwarning = _show_warning
     stopped = _stop_on_sigterm()
     try:
@@ -73,7 +75,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which tells the user nothing."""
-    if issubclass(category, AccuracyWarning):
+    if issubclass(category, AccuracyWarning | UncheckedWarning):
         print(f"panto: warning: {message}", file=sys.stderr)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

@@ -9,7 +9,7 @@ import typer
 
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
-from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
 
 MOST_FALSE_ALARMS = 20.0
 """Per km, about one in a span: beyond, a threshold means nothing."""
@@ -66,27 +66,27 @@ def diagnose(
         runs = [Trajectory.load(path) for path in (run, *(again or []))]
         reference = [Trajectory.load(path) for path in (*healthy, *(more or []))]
         found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..diagnosis.plots import plot_diagnosis
+    with written_last() as later:
+        if plot is not None:
+            from ..analysis.plots import save
+            from ..diagnosis.plots import plot_diagnosis
 
-        title = (
-            f"{run.name}: {runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h, {len(reference)} healthy runs"
-        )
-        save(plot_diagnosis(found, title), plot)
-    if json:
-        findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
-        told = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
-        extra = {
-            "threshold": found.evidence.threshold,
-            "false_alarms": found.false_alarms,
-            "notes": found.notes,
-        }
-        print_json(told | extra | {"findings": findings})
-        return
-    for sentence in verdict(found):
-        console.print(sentence, soft_wrap=True)
-    if found.findings:
-        print_table(findings_table(found))
-    for note in found.notes:
-        alert("Degraded:", note)
+            judged = f"{runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h"
+            title = f"{run.name}: {judged}, {len(reference)} healthy runs"
+            later(save, plot_diagnosis(found, title), plot)
+        if json:
+            findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
+            told = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
+            extra = {
+                "threshold": found.evidence.threshold,
+                "false_alarms": found.false_alarms,
+                "notes": found.notes,
+            }
+            print_json(told | extra | {"findings": findings})
+            return
+        for sentence in verdict(found):
+            console.print(sentence, soft_wrap=True)
+        if found.findings:
+            print_table(findings_table(found))
+        for note in found.notes:
+            alert("Degraded:", note)

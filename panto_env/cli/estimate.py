@@ -11,7 +11,17 @@ import typer
 from ..base.errors import InputError
 from ..base.files import TABLES, write_rows
 from ..base.table import Alarm, Table
-from ..terminal import Json, Plot, alert, number, print_json, print_table, progress_console, writable
+from ..terminal import (
+    Json,
+    Plot,
+    alert,
+    number,
+    print_json,
+    print_table,
+    progress_console,
+    writable,
+    written_last,
+)
 from .identify import pairs
 
 if TYPE_CHECKING:
@@ -120,18 +130,19 @@ def estimate(
             alert("Warning:", f"the record does not tell {name}.", progress_console)
     found = run(motion, known, settings)
     scores = _scores(motion, found)
-    if output is not None:
-        write_rows(_rows(found), output)
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..estimation.plots import plot_estimate
+    with written_last() as later:
+        if output is not None:
+            later(write_rows, _rows(found), output)
+        if plot is not None:
+            from ..analysis.plots import save
+            from ..estimation.plots import plot_estimate
 
-        title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
-        save(plot_estimate(found, title, motion.contact_force), plot)
-    if json:
-        print_json(_plain(found, motion, settings, scores))
-        return
-    _print(found, motion, settings, scores, file.name)
+            title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
+            later(save, plot_estimate(found, title, motion.contact_force), plot)
+        if json:
+            print_json(_plain(found, motion, settings, scores))
+            return
+        _print(found, motion, settings, scores, file.name)
 
 
 def _lift(pantograph: PantographData, speed: float | None, lift: float | None, motion: Motion) -> float:

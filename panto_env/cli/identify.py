@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -12,7 +13,7 @@ import typer
 
 from ..base.errors import InputError
 from ..identification.pantograph_file import SUFFIXES, check_possible
-from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable
+from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable, written_last
 
 if TYPE_CHECKING:
     from ..base.arrays import Array
@@ -94,21 +95,27 @@ def identify(
             if plot is not None or output is not None:
                 raise
             identified.failures[f"the model by {chosen.method}"] = str(error)
-    if output is not None and chosen is not None:
-        force, source = _static_force(static_force, record.force, file)
-        identification.write_pantograph(
-            chosen, output, matches=matches, record=file.name, static_force=force, force_source=source
-        )
-    if plot is not None and chosen is not None:
-        from ..identification.plots import plot_matches
+    with written_last() as later:
+        if output is not None and chosen is not None:
+            force, source = _static_force(static_force, record.force, file)
+            write = partial(
+                identification.write_pantograph,
+                matches=matches,
+                record=file.name,
+                static_force=force,
+                force_source=source,
+            )
+            later(write, chosen, output)
+        if plot is not None and chosen is not None:
+            from ..identification.plots import plot_matches
 
-        title = f"{file.name}, model by {chosen.method}"
-        first, last = float(record.time[0]), float(record.time[-1])
-        save(plot_matches(record.time, matches, title, first, last), plot)
-    if json:
-        print_json(_plain(identified, matches, method))
-        return
-    _print(identified, matches, full_name)
+            title = f"{file.name}, model by {chosen.method}"
+            first, last = float(record.time[0]), float(record.time[-1])
+            later(save, plot_matches(record.time, matches, title, first, last), plot)
+        if json:
+            print_json(_plain(identified, matches, method))
+            return
+        _print(identified, matches, full_name)
 
 
 def pairs(texts: list[str]) -> dict[str, str]:

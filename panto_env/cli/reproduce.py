@@ -11,8 +11,18 @@ from rich.table import Table
 from rich.text import Text
 
 from .. import studies
+from ..base.errors import InputError
 from ..base.files import make_folder
-from ..terminal import ALARM, Json, console, number, print_json, print_table, progress_console
+from ..terminal import (
+    ALARM,
+    Json,
+    announce_overwriting,
+    console,
+    number,
+    print_json,
+    print_table,
+    progress_console,
+)
 
 
 def reproduce(
@@ -27,7 +37,10 @@ def reproduce(
     chosen = {name: studies.find_study(name) for name in names}
     for name in chosen:  # now: a study takes minutes
         make_folder(output / name)
+        studies.check_writable(output / name)
+        announce_overwriting(output / name / studies.NUMBERS)
     found: dict[str, Any] = {}
+    failed: list[InputError] = []
     with Progress(console=progress_console, transient=True) as progress:
         for study, run in chosen.items():
             bar = progress.add_task(study, total=1.0)
@@ -36,14 +49,21 @@ def reproduce(
                     bar, completed=share, description=f"{study}: {what}"
                 )
             )
-            files = studies.write(outcome, output / study)
             progress.remove_task(bar)
             found[study] = outcome.as_dict()
             if not json:
                 _print(outcome)
-                console.print(f"{len(files) - 1} figures and numbers.json are in {output / study}.\n")
+            try:
+                files = studies.write(outcome, output / study)
+            except InputError as error:  # what was computed is printed nevertheless, and the others go on
+                failed.append(error)
+                continue
+            if not json:
+                console.print(f"{len(files) - 1} figures and {studies.NUMBERS} are in {output / study}.\n")
     if json:
         print_json(found)
+    if failed:
+        raise failed[0]
 
 
 def _print(outcome: studies.Outcome) -> None:

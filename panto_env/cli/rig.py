@@ -8,7 +8,7 @@ import typer
 from rich.markup import escape
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console, written_last
 
 RIGS = ("rig", "rig-flexible")
 PANTOGRAPH, SPEED_KMH = "dsa350", 250.0
@@ -75,16 +75,17 @@ def rig(
                 timing = report.clocked(data, pantograph, speed_kmh, clock)
                 facts[-1]["clock"] = report.timing_facts(timing)
                 tables.append(report.timing_table(data.name, timing))
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..rig.plots import plot_pairs
+    with written_last() as later:
+        if plot is not None:
+            from ..analysis.plots import save
+            from ..rig.plots import plot_pairs
 
-        save(plot_pairs(pairs), plot)
-    if json:
-        print_json(facts)
-        return
-    console.print(f"{pantograph.name} at {speed_kmh:g} km/h, policy {policy or 'passive'}")
-    for table in tables:
-        print_table(table)
-    for pair in pairs:
-        console.print(report.followed_sentence(pair), soft_wrap=True)
+            later(save, plot_pairs(pairs), plot)
+        if json:
+            print_json(facts)
+            return
+        console.print(f"{pantograph.name} at {speed_kmh:g} km/h, policy {policy or 'passive'}")
+        for table in tables:
+            print_table(table)
+        for pair in pairs:
+            console.print(report.followed_sentence(pair), soft_wrap=True)

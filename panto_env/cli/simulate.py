@@ -15,9 +15,19 @@ from rich.table import Table
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.requirements import print_criteria
 from ..metrics.labels import LABELS
-from ..metrics.spans import in_words
+from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import SUFFIXES, Trajectory
-from ..terminal import Json, Plot, alert, console, number, print_json, progress_console, writable
+from ..terminal import (
+    Json,
+    Plot,
+    alert,
+    console,
+    number,
+    print_json,
+    progress_console,
+    writable,
+    written_last,
+)
 
 
 @with_settings(left_out=("observation",))
@@ -49,10 +59,15 @@ def simulate(
         trajectory = run(
             policy=policy, seed=seed, evaluated=chosen, progress=progress, watch=watch, **settings
         )
-    if output is not None:
-        trajectory.save(output)
-    if plot is not None:
-        save(plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
+    with written_last() as later:
+        if output is not None:
+            later(trajectory.save, output)
+        if plot is not None:
+            later(save, plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
+        _print(trajectory, chosen, json)
+
+
+def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     if trajectory.terminated:
         if json:
             print_json(_facts(trajectory) | {"spans": None, "figures": None, "compliance": None})

@@ -9,9 +9,11 @@ from typing import Annotated
 
 import typer
 
+from ..base.checked_json import with_checksum
 from ..base.errors import InputError
+from ..base.files import finite
 from ..base.table import Table
-from ..terminal import Json, Plot, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, console, print_json, print_table, progress_console, written_last
 
 
 def speed(
@@ -46,19 +48,20 @@ def speed(
         with progress_console.status("measuring") as status:
             found = [study.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
     result = found[0]
-    if plot is not None:
-        save(plot_speed(result), plot)
-    if json:
-        print_json(result)
-    elif markdown:
-        sys.stdout.write("\n".join(tables.markdown(found)))
-    else:
-        console.print("\n".join(tables.machines(found)))
-        for part in (tables.summary(found), *tables.details(result)):
-            if isinstance(part, str):
-                console.print(part)
-            else:
-                print_table(_plain(part))
+    with written_last() as later:
+        if plot is not None:
+            later(save, plot_speed(result), plot)
+        if json:
+            print_json(with_checksum(finite(result)))
+        elif markdown:
+            sys.stdout.write("\n".join(tables.markdown(found)))
+        else:
+            console.print("\n".join(tables.machines(found)))
+            for part in (tables.summary(found), *tables.details(result)):
+                if isinstance(part, str):
+                    console.print(part)
+                else:
+                    print_table(_plain(part))
 
 
 def _plain(table: Table) -> Table:

@@ -20,7 +20,7 @@ from ..base.version import __version__
 from ..control.identity import plain
 from ..control.settings import run_settings
 from ..metrics.labels import LABELS
-from ..terminal import Json, Plot, console, counting, number, print_json, writable
+from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -71,16 +71,17 @@ def sweep(
             progress=progress,
             **settings,
         )
-    if output is not None:
-        write_rows(rows, output)
-    if plot is not None:
-        save(plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
-    if json:
-        used = plain(run_settings(settings | {"spans": line_spans}))
-        told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
-        print_json(told | {"rows": rows})
-        return
-    _print(rows, list(values))
+    with written_last() as later:
+        if output is not None:
+            later(write_rows, rows, output)
+        if plot is not None:
+            later(save, plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
+        if json:
+            used = plain(run_settings(settings | {"spans": line_spans}))
+            told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
+            print_json(told | {"rows": rows})
+            return
+        _print(rows, list(values))
 
 
 def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:

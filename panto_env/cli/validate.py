@@ -8,7 +8,7 @@ import typer
 
 from ..analysis.requirements import print_criteria
 from ..studies.en50318 import study
-from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console
+from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
 
 
 def validate(
@@ -44,24 +44,25 @@ def validate(
             with_lines=lines,
             with_start=start,
         )
-    if plot is not None:
-        save(plot_reference(validation.runs), plot)
-    if json:
-        print_json(validation.as_dict())
-    else:
-        checks, *others = validation.tables
-        print_table(checks)
-        console.print(
-            "The catalogue entry en50318-2002 says which open values were chosen, and how: "
-            "`panto list en50318-2002`."
-        )
-        for run, criteria in zip(validation.runs, validation.compliance, strict=True):
-            print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
-        for table in others:
-            print_table(table)
-        if validation.passed:
-            console.print("All figures inside.")
+    with written_last() as later:
+        if plot is not None:
+            later(save, plot_reference(validation.runs), plot)
+        if json:
+            print_json(validation.as_dict())
         else:
-            alert("Not all figures are inside.")
+            checks, *others = validation.tables
+            print_table(checks)
+            console.print(
+                "The catalogue entry en50318-2002 says which open values were chosen, and how: "
+                "`panto list en50318-2002`."
+            )
+            for run, criteria in zip(validation.runs, validation.compliance, strict=True):
+                print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
+            for table in others:
+                print_table(table)
+            if validation.passed:
+                console.print("All figures inside.")
+            else:
+                alert("Not all figures are inside.")
     if not validation.passed:
         raise typer.Exit(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 import os
@@ -14,7 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import machine
 from ..base.arrays import Array
+from ..base.checked_json import NOT_AS_WRITTEN, warn_unchecked
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
 from .compliance import LineFacts, compliance
@@ -24,6 +27,21 @@ from .low_pass import low_pass
 from .spans import SpanChoice, Spans, chosen_spans, limits, within
 
 FORMAT = 2
+KEY, CHECKSUM = b"panto_env", b"panto_env.sha256"
+"""Of the file's own table of texts: the facts as JSON, and the checksum of them and all columns."""
+LARGEST = 0.5
+"""Share of the machine's memory that a file may unpack to."""
+DAMAGED = (
+    OSError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ValueError,
+    ArithmeticError,
+    RecursionError,
+    MemoryError,
+)
+"""What reading a file that is damaged or made up can raise, beside errors of Arrow's own."""
 SUFFIXES = (".parquet",)
 """Of the file that a run is saved to."""
 SERIES = (
@@ -181,21 +199,30 @@ class Trajectory:
             for name in _facts()
         }
         facts["line"] = vars(self.line)
-        table = pa.table(columns).replace_schema_metadata({"panto_env": json.dumps(facts)})
+        told, table = json.dumps(facts).encode(), pa.table(columns)
+        table = table.replace_schema_metadata({KEY: told, CHECKSUM: _checksum(table, told)})
         with write_whole(path) as temporary:
-            pq.write_table(table, temporary)
+            pq.write_table(table, temporary, write_page_checksum=True)
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
-        """Read what ``save`` wrote. Raises InputError where the file is not a whole trajectory."""
+        """Read what ``save`` wrote; UncheckedWarning where a file of an older version has no checksum.
+
+        Raises InputError where the file is not a whole trajectory, or is damaged.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         if not os.path.isfile(path):
             raise InputError(f"The trajectory file {path} does not exist; check the path.")
         try:
-            table = pq.read_table(path)
-            facts = json.loads(table.schema.metadata[b"panto_env"])
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                _check_size(file.metadata)
+                table = file.read()
+            told, checksum = table.schema.metadata[KEY], table.schema.metadata.get(CHECKSUM)
+            if checksum not in (None, _checksum(table, told)):
+                raise ValueError(f"it is damaged or was changed: {NOT_AS_WRITTEN}")
+            facts = json.loads(told)
             if facts.pop("format") != FORMAT:
                 raise ValueError("it has another format")
             for name in ("support_position", "dropper_position"):
@@ -211,12 +238,36 @@ class Trajectory:
                 series[name] = np.array(columns).T if columns else np.zeros((table.num_rows, 0))
                 if count and count != len(facts[places]):
                     raise ValueError(f"columns of {name} are missing")
-            return cls(**series, **facts)
-        except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+            run = cls(**series, **facts)
+        except (pa.ArrowException, *DAMAGED) as error:
+            reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
             raise InputError(
-                f"{path} is not a whole trajectory file ({error}); write it anew with "
+                f"{path} is not a whole trajectory file ({reason}); write it anew with "
                 "Trajectory.save or `panto simulate --output`."
             ) from error
+        if checksum is None:
+            warn_unchecked(path)
+        return run
+
+
+def _check_size(metadata: Any) -> None:
+    """Raise ValueError where a file's table would not fit into memory: a few bytes can say that it is huge.
+
+    metadata: of Parquet.
+    """
+    unpacked = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
+    size = max(unpacked, 8 * metadata.num_rows * metadata.num_columns)
+    if not 0 <= size <= LARGEST * machine.memory():
+        raise ValueError(f"it would take {size / 1e9:,.1f} GB of memory")
+
+
+def _checksum(table: Any, told: bytes) -> bytes:
+    """SHA-256 of a Parquet table's columns, by name, type and values, and of the facts, as bytes."""
+    check = hashlib.sha256(told)
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        check.update(f"{name} {column.type} {len(column)} ".encode())
+        check.update(np.ascontiguousarray(column.to_numpy()).tobytes())
+    return check.hexdigest().encode()
 
 
 def _facts() -> tuple[str, ...]:

@@ -7,9 +7,20 @@ from importlib import import_module
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..base.table import Table
-from .study import Comparison, Outcome, Report, Study, write
+from .study import NUMBERS, Comparison, Outcome, Report, Study, check_writable, write
 
-__all__ = ["STUDIES", "Comparison", "Outcome", "Report", "Study", "Table", "find_study", "write"]
+__all__ = [
+    "NUMBERS",
+    "STUDIES",
+    "Comparison",
+    "Outcome",
+    "Report",
+    "Study",
+    "Table",
+    "check_writable",
+    "find_study",
+    "write",
+]
 
 STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper2", "paper3-parameters")
 """Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""

@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..analysis.plots import save
-from ..base.files import finite, make_folder, write_whole
+from ..base.checked_json import with_checksum
+from ..base.files import check_output, finite, make_folder, write_whole
 from ..base.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NUMBERS = "numbers.json"
+"""File with every number of a study."""
 Report = Callable[[str, float], None]
 """Called with what is being done and the share of the study that is done, 0..1."""
 
@@ -69,13 +72,18 @@ class Study(Protocol):
         """Run it, on all cores where it takes long."""
 
 
+def check_writable(folder: Path) -> None:
+    """Raise InputError unless the numbers of a study can be written into a folder: asked before any work."""
+    check_output(folder / NUMBERS, (".json",))
+
+
 def write(outcome: Outcome, folder: str | Path) -> list[Path]:
     """Write the numbers as JSON and the plots as PNG into a folder; the files written."""
     folder = Path(folder)
     make_folder(folder)
-    files = [folder / "numbers.json"]
+    files = [folder / NUMBERS]
     with write_whole(files[0]) as temporary:
-        text = json.dumps(outcome.as_dict(), indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(with_checksum(outcome.as_dict()), indent=1, ensure_ascii=False, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
     for name, plot in outcome.plots.items():
         files.append(folder / f"{name}.png")

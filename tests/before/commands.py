@@ -116,7 +116,9 @@ def _reproduce(study: str, tape: Tape) -> None:
         tape.add("files", [path.name for path in files])
         for path in files:
             if path.suffix == ".json":
-                tape.add(path.stem, json.loads(path.read_text(encoding="utf-8")))
+                numbers = json.loads(path.read_text(encoding="utf-8"))
+                numbers.pop("sha256", None)  # earlier versions had none
+                tape.add(path.stem, numbers)
             else:
                 tape.add(f"picture {path.stem}", path.read_bytes())
 

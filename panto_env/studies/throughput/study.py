@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ...backend import WIDTH
+from ...base.checked_json import read_checked
 from ...base.errors import InputError
 from ...base.version import __version__
 from ...envs import IDS
@@ -48,10 +48,7 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
 
 def read(path: Path) -> dict[str, Any]:
     """What ``run`` found on some machine, as it was stored. Raises InputError where a file holds none."""
-    try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no result of 'panto speed --json': {error}.") from error
+    result = read_checked(path)
     parts = {"machine", "repeats", "plants", "roofline", "scaling", "environments"}
     if not (isinstance(result, dict) and parts <= set(result)):
         raise InputError(f"{path} is no result of 'panto speed --json'.")
