@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense bounds fuzz oldest pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -104,14 +104,17 @@ fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz.environments --count $(CASES)
 	$(BIN)/python -m tests.fuzz.steps --count $(STEPS)
 
-# The oldest Gymnasium and Numba that are supported, without the extra 'agents'. The newest are in constraints.txt.
-OLDEST := .venv-oldest
-OLDEST_ONES := gymnasium==1.1.1 numba==0.61.0 numpy==2.1.3 scipy==1.15.3
-oldest:
-	$(PYTHON) -m venv $(OLDEST)
-	grep -vE '^(gymnasium|numba|llvmlite|numpy|scipy)==' constraints.txt > $(OLDEST)/constraints.txt
-	$(OLDEST)/bin/pip install -qq --constraint $(OLDEST)/constraints.txt $(OLDEST_ONES) pytest --editable .
-	$(OLDEST)/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_vector_rules.py
+# The lower bounds of pyproject.toml, all at once, without the extra 'agents'; what they need themselves is the
+# newest that there is. The versions tested are in constraints.txt.
+FLOORS := .venv-floors
+FLOOR_EXTRAS := control,diagnosis,render
+floors:
+	$(PYTHON) -m venv $(FLOORS)
+	$(FLOORS)/bin/pip install -qq --upgrade pip packaging
+	$(FLOORS)/bin/python -m tests.floors $(FLOOR_EXTRAS) > $(FLOORS)/floors.txt
+	$(FLOORS)/bin/pip install -q --constraint $(FLOORS)/floors.txt pytest --editable ".[$(FLOOR_EXTRAS)]"
+	$(FLOORS)/bin/pytest tests/test_cli.py tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py \
+	  tests/test_vector_rules.py tests/test_sweep.py tests/test_plots.py tests/test_trajectory.py tests/test_render.py
 
 # Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.
 PYENV = $(shell pyenv root 2> /dev/null)
@@ -161,4 +164,4 @@ libraries:
 	$(LIBRARIES)/bin/pytest tests/test_libraries.py
 
 clean:
-	rm -rf $(VENV) $(OLDEST) .venv-python3.* $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(FLOORS) .venv-python3.* $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
+from panto_env.base.paths import check_path
 from panto_env.base.shown import shown
 
 from .evaluation import Pair
@@ -31,6 +32,7 @@ class RunFolder:
     """Paths of a run's files; it reads and writes those that are neither models nor TensorBoard logs."""
 
     def __init__(self, path: str | Path) -> None:
+        check_path(path)
         self.path = Path(path)
         self.settings = self.path / "settings.json"
         self.model = self.path / "model.zip"  # at the end of the training

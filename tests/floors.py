@@ -1,4 +1,4 @@
-"""The lower bounds of pyproject.toml as pins for pip, one a line: `python -m tests.floors control render`.
+"""The lower bounds of pyproject.toml as constraints for pip, one a line: `python -m tests.floors control`.
 
 Those of the project's own dependencies, and of the extras that are named.
 """
@@ -23,9 +23,8 @@ def floors(extras: Sequence[str] = ()) -> Iterator[str]:
         lowest = [each.version for each in requirement.specifier if each.operator == ">="]
         if len(lowest) != 1:
             raise ValueError(f"{requirement} needs one lower bound, as name>=1.2")
-        wanted = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
-        yield f"{requirement.name}{wanted}=={lowest[0]}"
+        yield f"{requirement.name}=={lowest[0]}"
 
 
 if __name__ == "__main__":
-    print("\n".join(floors(sys.argv[1:])))
+    print("\n".join(floors([extra for given in sys.argv[1:] for extra in given.split(",")])))

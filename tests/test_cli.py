@@ -1,6 +1,7 @@
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from panto_env.base.checked_json import read_checked
 from panto_env.studies.en50318 import reference
 
 PANTO = Path(sys.executable).with_name("panto")
+WITH_AGENTS = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra 'agents'")
 
 
 def panto(*arguments, cwd=None):
@@ -82,7 +84,7 @@ def test_list_shows_entries_sources_and_policies():
         (["simulate", "--spans", "5-60"], "but the run ends at"),
         (["simulate", "--plot", "run.doc"], "must end in one of"),
         (["list", "unknown"], "Unknown"),
-        (["train", "missing.toml"], "missing.toml"),
+        pytest.param(["train", "missing.toml"], "missing.toml", marks=WITH_AGENTS),
         (["benchmark", "--config", "broken.toml"], "broken.toml"),
     ],
 )

@@ -220,7 +220,7 @@ def test_bad_action_is_refused_and_changes_nothing(action):
         ({"distance": -5}, "distance must be a positive number"),
         ({"distance": 1e9}, "distance must be at most 59,520 m"),
         ({"control_interval": 0.0015, "time_step": 1e-3}, "whole number of time steps"),
-        ({"time_step": 0}, "time_step must be greater than 0, not 0"),
+        ({"time_step": 0}, "time_step must be a number from 1e-06 to 10 s, not 0"),
         ({"window": 2}, "must be a number of spans from 3 up"),
         ({"precision": "half"}, "precision must be 'single' or 'double', not 'half'"),
         ({"spans": 1}, "spans must be a whole number from 3 to 1000"),

@@ -200,7 +200,7 @@ def odd_actions(shape):
         (filled(None), "must be numbers"),
         (filled(None, object), "must be numbers"),
         (filled(HUGE, object), "must be numbers"),
-        (filled(Strange(), object), "must be numbers"),
+        (filled(object(), object), "must be numbers"),
         (filled(np.datetime64("2020-01-01")), "must be numbers"),
         (filled(np.nan), "must be finite"),
         (filled(np.inf, np.float32), "must be finite"),

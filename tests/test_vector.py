@@ -165,7 +165,7 @@ def test_bad_actions_change_nothing(actions, message):
     ("settings", "message"),
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),
-        ({"lanes": 0}, "number of lanes must be a whole number from 1"),
+        ({"lanes": 0}, "num_envs must be a whole number from 1"),
         ({"render_mode": "human"}, "must be None or 'rgb_array'"),
     ],
 )

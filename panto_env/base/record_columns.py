@@ -16,7 +16,7 @@ from .names import suggest
 
 JITTER = 0.05
 """How far a time stamp may lie from equal steps, as a share of the step: more is no rounding of digits."""
-_HEADING = re.compile(r"^(?P<name>[^(\[]*?)\s*(?:[(\[]\s*(?P<unit>[^)\]]*?)\s*[)\]])?\s*$")
+_HEADING = re.compile(r"([^(\[]*)(?:[(\[]([^)\]]*)[)\]])?")
 
 
 @dataclass(frozen=True)
@@ -119,14 +119,14 @@ def _places(
         raise InputError(f"Unit of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")
     places: dict[str, tuple[int, float]] = {}
     for place, heading in enumerate(header):
-        match = _HEADING.match(heading.strip())
-        plain = re.sub(r"[\s_-]", "", match["name"]).lower() if match else ""
+        match = _HEADING.fullmatch(heading.strip())
+        plain = re.sub(r"[\s_-]", "", match[1]).lower() if match else ""
         name = next((name for name, column in columns.items() if plain in column.spellings), None)
         if name is None or match is None:
             continue
         if name in places:
             raise InputError(f"{path} has column {name} twice; keep one.")
-        places[name] = (place, _scale(path, name, columns[name], units.get(name) or match["unit"]))
+        places[name] = (place, _scale(path, name, columns[name], units.get(name) or (match[2] or "").strip()))
     missing = [name for name, column in columns.items() if column.required and name not in places]
     if missing:
         wanted = ", ".join(f"{name} ({column.example})" for name, column in columns.items())

@@ -46,12 +46,15 @@ def estimate(
         str, typer.Option(help="Name in the catalogue, or a TOML file, as `panto identify` writes it.")
     ],
     speed: Annotated[
-        float | None, typer.Option(help="Of the train (km/h); needed for an aerodynamic uplift.", min=0)
+        float | None,
+        typer.Option(help="Of the train (km/h); needed for an aerodynamic uplift.", min=0, max=1000),
     ] = None,
-    span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1)] = None,
+    span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1, max=1000)] = None,
     lift: Annotated[
         float | None,
-        typer.Option(help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0),
+        typer.Option(
+            help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0, max=100_000
+        ),
     ] = None,
     displacements: Annotated[
         bool, typer.Option("--displacements", help="Leave out velocities, though they were measured.")
