@@ -67,6 +67,8 @@ def _fork(case: Callable[[], None], folder: Path) -> int:
         os.setsid()  # so that its own processes can be ended with it
         for descriptor, name in ((1, "output"), (2, "errors")):
             os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT), descriptor)
+        # Whatever wrote for the process before, as pytest's capture, must not now.
+        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (_size() + ROOM, hard))
         case()
