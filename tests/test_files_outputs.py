@@ -50,13 +50,13 @@ OF_FILES = {
     "a link to itself": ("link{suffix}", "its symbolic links lead round in a circle"),
     "no suffix": ("out", "must end in "),
     "another suffix": ("out.docx", "must end in "),
-    "a name too long": ("o" * 5000 + "{suffix}", "cannot be written: File name too long"),
+    "a name too long": ("o" * 5000 + "{suffix}", "a name has 200 bytes at most"),
 }
 OF_FOLDERS = {
     "a file for it": ("file", "file"),
     "a file for the one above": ("file/out", "file/out"),
     "a pipe": ("pipe", "pipe"),
-    "a name too long": ("o" * 5000, "File name too long"),
+    "a name too long": ("o" * 5000, "a name has 200 bytes at most"),
 }
 CASES = [
     (option, trouble)

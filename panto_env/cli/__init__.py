@@ -45,7 +45,7 @@ def main() -> None:
     if stopped:
         print("panto: Stopped by SIGTERM before it was done.", file=sys.stderr)
         status = 128 + signal.SIGTERM
-    sys.exit(status)
+    sys.exit(status or 0)
 
 
 def _stop_on_sigterm() -> list[int]:
