@@ -103,6 +103,7 @@ fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz.command_lines
 	$(BIN)/python -m tests.fuzz.environments --count $(CASES)
 	$(BIN)/python -m tests.fuzz.steps --count $(STEPS)
+	$(BIN)/python -m tests.fuzz.soak
 
 # The lower bounds of pyproject.toml, all at once, without the extra 'agents'; what they need themselves is the
 # newest that there is. The versions tested are in constraints.txt.
