@@ -61,16 +61,19 @@ RULES = (
 )
 """The only exceptions; whatever has none is run as it stands."""
 BY_HAND = {
+    "bounds": "proofs run its tests",
     "benchmark": "six minutes; tests run each track shortened",
     "coverage": "tells what tests do not reach",
     "demo": "some minutes; its parts are tested",
     "docs": "tests build the site, too",
     "films": "a minute; tests make short ones",
+    "fuzz": "half an hour; tests and proofs run some of each",
     "libraries": "wants an environment of its own",
     "lint": "part of test",
     "mutants": "an hour",
     "notebook": "two minutes; a slow test runs it, too",
     "nonsense": "any number of lines; proofs run some",
+    "pythons": "wants other versions of Python",
     "ptx": "wants an environment of its own",
     "ray": "wants an environment of its own",
     "rllib": "wants an environment of its own",

@@ -13,6 +13,7 @@ from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings
 from panto_env import InputError, simulate
 from panto_env.analysis.sweep import sweep
+from panto_env.base.errors import AccuracyWarning
 from panto_env.base.settings import parse
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
@@ -81,18 +82,19 @@ def diverging(monkeypatch):
 
 
 def test_a_run_that_diverges_gives_no_figures(diverging):
-    with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):
+    with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):  # noqa: PT031 - at which step is not known
         simulate(**diverging)
 
 
-def test_an_episode_that_diverges_ends_with_an_error(diverging):
+def test_an_episode_that_diverges_ends_and_has_no_figures(diverging):
     env = gymnasium.make("panto_env:Pantograph-v0", **BARE | diverging)
     env.reset(seed=0)
     still, ended = np.zeros(1, dtype=np.float32), False
-    with pytest.raises(InputError, match="diverged"):  # noqa: PT012 - at which step is not known
+    with pytest.warns(AccuracyWarning, match="diverged, so it has no result; take a time_step below"):  # noqa: PT031 - at which step is not known
         while not ended:
-            _, _, *ends, _ = env.step(still)
+            _, _, *ends, info = env.step(still)
             ended = any(ends)
+    assert set(info["figures"].values()) == {np.inf}
 
 
 def test_an_entry_that_the_observation_has_not_is_named():

@@ -232,7 +232,7 @@ def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
 
     path = tmp_path / "s.parquet"
     path.write_text("mine")
-    monkeypatch.setattr(pyarrow.parquet, "write_table", lambda *_: 1 / 0)
+    monkeypatch.setattr(pyarrow.parquet, "write_table", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_rows([{"a": 1.0}], path)
     assert path.read_text() == "mine"

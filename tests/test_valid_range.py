@@ -46,7 +46,7 @@ def test_a_passive_run_ends_where_one_under_a_policy_does(force):
 
 
 def test_contact_lost_for_long_ends_a_passive_run():
-    falling = pressed(0.0)
+    falling = pressed(1e-3)
     run = simulate(pantograph=falling)
     assert run.terminated
     assert "contact was lost for 0.5 s" in run.ending

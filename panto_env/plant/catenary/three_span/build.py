@@ -121,7 +121,8 @@ def modes(data: ThreeSpanData) -> tuple[Array, Array]:
     for position in (data.span_length, 2 * data.span_length):
         sines = scale * np.sin(wavenumber * position)
         stiffness += data.suspension_stiffness * np.outer(sines, sines)
-    squared, vectors = np.linalg.eigh(stiffness)
+    with one_thread():  # several may turn the sign of a mode
+        squared, vectors = np.linalg.eigh(stiffness)
     return np.sqrt(squared[: data.modes]), vectors[:, : data.modes]
 
 
