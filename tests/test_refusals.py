@@ -82,7 +82,7 @@ def diverging(monkeypatch):
 
 
 def test_a_run_that_diverges_gives_no_figures(diverging):
-    with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):  # noqa: PT031 - at which step is not known
+    with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):
         simulate(**diverging)
 
 
