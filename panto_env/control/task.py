@@ -339,7 +339,8 @@ class Task:
 
     def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
         """What a kernel has answered: whether an episode may have ended; InputError for a wrong action."""
-        if answer > 0:
+        # Places of a group without a lane come to an end, too: of a single lane it is seen at once.
+        if answer > 0 and (self.lanes > 1 or results.flags.item(0, 0) or results.flags.item(1, 0)):
             ended = results.terminated | results.truncated
             self._over |= ended if skip is None else ended & ~skip
             self._any_over = bool(self._over.any())

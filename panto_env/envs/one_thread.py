@@ -7,7 +7,7 @@ import threading
 import weakref
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from ..base.errors import InputError
 
@@ -30,6 +30,11 @@ class InUse:
         return InUse, ()
 
 
+def refuse() -> NoReturn:
+    """Raise InputError: another thread is using an environment."""
+    raise InputError("Another thread is using this environment just now; give each thread one of its own.")
+
+
 def one_at_a_time(method: F) -> F:
     """Decorator of a method of an environment, which has an ``InUse`` under ``_in_use``.
 
@@ -40,9 +45,7 @@ def one_at_a_time(method: F) -> F:
     def alone(self: Any, *arguments: Any, **named: Any) -> Any:
         in_use = self._in_use
         if not in_use.begin(False):
-            raise InputError(
-                "Another thread is using this environment just now; give each thread one of its own."
-            )
+            refuse()
         try:
             return method(self, *arguments, **named)
         finally:

@@ -22,7 +22,7 @@ from ..plant.actuators import actuator_settings
 from .episodes import task_with_options, with_longest_episode
 from .ids import IDS
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, first_info, told
-from .one_thread import InUse, one_at_a_time
+from .one_thread import InUse, one_at_a_time, refuse
 from .settings import EnvironmentSettings, render_metadata
 
 if TYPE_CHECKING:
@@ -177,11 +177,20 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         vars(self).update(state)
         self._watch(self.task)
 
-    @one_at_a_time
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Hold ``action`` for one control interval. Raises InputError for an action that is not valid."""
+        if not self._in_use.begin(False):
+            refuse()
+        try:  # as ``one_at_a_time`` does, in half the time
+            return self._step(action)
+        finally:
+            self._in_use.end()
+
+    def _step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
         self.task.step(checked(action, self._shape))
