@@ -10,6 +10,7 @@ import pytest
 
 import panto_env
 from panto_env.base import machine
+from panto_env.base.checked_json import with_checksum
 from panto_env.base.errors import InputError
 from panto_env.cli import speed
 from panto_env.envs import IDS
@@ -32,7 +33,9 @@ def result(tmp_path_factory):
     )
     assert told.returncode == 0, told.stderr
     assert picture.read_bytes().startswith(b"\x89PNG")
-    return json.loads(told.stdout)
+    stored = picture.with_name("speed.json")
+    stored.write_text(told.stdout)
+    return study.read(stored)
 
 
 @pytest.mark.slow
@@ -124,7 +127,7 @@ def test_results_of_several_machines_stand_side_by_side(result, tmp_path, capsys
         row["ratio"] = 7.7
     paths = [tmp_path / "one.json", tmp_path / "other.json"]
     for path, each in zip(paths, (result, other), strict=True):
-        path.write_text(json.dumps(each))
+        path.write_text(json.dumps(with_checksum(each)))
     speed.speed(paths, markdown=True)
     told = capsys.readouterr().out
     assert "(2) Another One" in told
