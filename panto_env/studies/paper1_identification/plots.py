@@ -114,7 +114,7 @@ def convergence(
     """Errors of the equations as printed over the sampling step, and of all methods over the noise."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(12.5, 5.2), layout="constrained")
+    figure = Figure(figsize=(11.6, 4.9), layout="constrained")
     axes = figure.subplots(1, 3)
     steps = 1e3 / np.array(rates)
     for k, (name, errors) in enumerate(sampling.items()):
