@@ -74,7 +74,18 @@ def end_episodes(line, wire, episode, own, task, values, flags, lane):
     task[TASK_ROW.ENDING] = ending
     put_across(flags, FLAG.TERMINATED, lane, early)
     put_across(flags, FLAG.TRUNCATED, lane, choose(early, 0.0, choose(at_end, 1.0, 0.0)) > 0.0)
-    return any_of(early) or any_of(at_end)
+    anywhere = any_of(early) or any_of(at_end)
+    return anywhere and (width_of(line) == 1 or any_ended(episode, flags, lane, width_of(line)))
+
+
+@inlined
+def any_ended(episode, flags, lane, count):
+    """Whether the episode of any of so many lanes from one on has ended, but of those that are idle."""
+    ended = False
+    for i in range(lane, lane + count):
+        if not episode.idle[i]:
+            ended = ended or flags[FLAG.TERMINATED, i] or flags[FLAG.TRUNCATED, i]
+    return ended
 
 
 @inlined
@@ -155,9 +166,9 @@ def all_finite(line, action):
 def control_steps(packed, entries, values, flags, first, last, size, role, patience):
     """Control steps of the lanes from ``first`` to before ``last`` under ``episode.action``.
 
-    Returns 0 where no episode has ended, 1 where one may have, and -1, having done nothing, where an action
-    is not finite. Results go to entries, values and flags, as of ``Results``. A lane that is idle stays as it
-    is, unless another one of its group is not. size, role, patience: of shares, as of ``LaneThreads``.
+    Returns 0 where no episode has ended, 1 where one has, and -1, having done nothing, where an action is not
+    finite. Results go to entries, values and flags, as of ``Results``. A lane that is idle stays as it is,
+    unless another one of its group is not. size, role, patience: of shares, as of ``LaneThreads``.
     packed: line, wire, pantographs, actuators, run, sensors, samples, episode, running figures, shares.
     """
     line, _, _, _, _, _, _, episode, _, shares = open_packed(packed)

@@ -299,10 +299,10 @@ class Task:
     ) -> bool:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
-        Returns whether an episode may have ended: False where none has. Actions are clipped to -1..1.
-        Results go to ``results``, by default the task's own. Lanes that are skipped stay as they are; without
-        ``keep``, they may be left anyhow, to be reset next. Raises InputError, and changes nothing, for an
-        action that is not finite, or a lane whose episode has ended or not begun.
+        Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
+        default the task's own. Lanes that are skipped stay as they are; without ``keep``, they may be left
+        anyhow, to be reset next. Raises InputError, and changes nothing, for an action that is not finite, or
+        a lane whose episode has ended or not begun.
         """
         if self._any_over:
             self._refuse_over(skip)
@@ -338,9 +338,8 @@ class Task:
             )
 
     def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
-        """What a kernel has answered: whether an episode may have ended; InputError for a wrong action."""
-        # Places of a group without a lane come to an end, too: of a single lane it is seen at once.
-        if answer > 0 and (self.lanes > 1 or results.flags.item(0, 0) or results.flags.item(1, 0)):
+        """What a kernel has answered: whether an episode has ended; InputError for a wrong action."""
+        if answer > 0:
             ended = results.terminated | results.truncated
             self._over |= ended if skip is None else ended & ~skip
             self._any_over = bool(self._over.any())

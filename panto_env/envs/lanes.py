@@ -48,8 +48,8 @@ class Lanes:
     def step(self, action: Array, waiting: Flags | None, random: LaneGenerators) -> bool:
         """One control step of all lanes under actions, (lanes, actions), but those waiting to begin anew.
 
-        Returns whether an episode may have ended: False where none has. Raises InputError, and changes
-        nothing, for an action that is not finite.
+        Returns whether an episode has ended. Raises InputError, and changes nothing, for an action that is
+        not finite.
         """
         results, ended = self.usual.new_results(), False
         for task, its in self._tasks():
