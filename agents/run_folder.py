@@ -6,15 +6,14 @@ import csv
 import io
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
+from panto_env.base.locks import alone_in
 from panto_env.base.paths import check_path
 from panto_env.base.shown import shown
 
@@ -74,26 +73,9 @@ class RunFolder:
                 f"more, but not fewer ({training.total_steps})."
             )
 
-    @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Within the body no other process trains into the folder, as far as files can be locked there.
-
-        The system opens the lock of a process that is killed. Raises InputError where another one holds it.
-        """
-        make_folder(self.path)
-        lock = FileLock(self.path / ".lock")
-        try:
-            lock.acquire(timeout=0)
-        except Timeout as error:
-            raise InputError(
-                f"Another process trains into {self.path}; wait until it has ended, or end it."
-            ) from error
-        except (OSError, NotImplementedError):
-            pass  # files cannot be locked here
-        try:
-            yield
-        finally:
-            lock.release()
+    def alone(self) -> AbstractContextManager[None]:
+        """Within it no other process trains into the folder; as ``alone_in``."""
+        return alone_in(self.path, "trains into")
 
     def read_settings(self) -> Training:
         """Settings of the run. Raises InputError where the file is damaged."""

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-from filelock import FileLock, Timeout
 
 from panto_env.analysis.pool import Progress
 from panto_env.backend.cache import source_hash
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
+from panto_env.base.locks import alone_in
 from panto_env.base.version import __version__, commit
 from panto_env.cluster import spread
 
@@ -93,26 +92,9 @@ def remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-@contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Within the body no other process makes data in the folder, as far as files can be locked there.
-
-    The system opens the lock of a process that is killed. Raises InputError where another one holds it.
-    """
-    make_folder(folder)
-    lock = FileLock(folder / ".lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout as error:
-        raise InputError(
-            f"Another process makes data in {folder}; wait until it has ended, or end it."
-        ) from error
-    except (OSError, NotImplementedError):
-        pass  # files cannot be locked here
-    try:
-        yield
-    finally:
-        lock.release()
+def alone(folder: Path) -> AbstractContextManager[None]:
+    """Within it no other process makes data in the folder; as ``alone_in``."""
+    return alone_in(folder, "makes data in")
 
 
 def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
