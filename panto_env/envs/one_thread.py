@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import threading
-import weakref
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, NoReturn, TypeVar
 
 from ..base.errors import InputError
+from ..base.forked import renew_in_forked
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -19,7 +18,7 @@ class InUse:
 
     def __init__(self) -> None:
         self.renew()
-        _ALL.add(self)
+        renew_in_forked(self)
 
     def renew(self) -> None:
         """Nobody uses it."""
@@ -52,16 +51,3 @@ def one_at_a_time(method: F) -> F:
             in_use.end()
 
     return alone  # type: ignore[return-value]
-
-
-_ALL: weakref.WeakSet[InUse] = weakref.WeakSet()
-
-
-def _renew_all() -> None:
-    """In a forked process none of the threads runs that were using an environment."""
-    for each in list(_ALL):
-        each.renew()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_renew_all)
