@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,10 +75,10 @@ class ThreeSpan:
         check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
-        places = np.linspace(0.0, 3 * data.span_length, VIEW_POINTS)
+        self._data = data
         with one_thread():
-            self.line: Any = _constants(data, self.time_step)
-            self._view_shapes = mode_shapes(data, modes(data)[1], places)
+            frequency, self._vectors = modes(data)
+            self.line: Any = _constants(data, frequency, self._vectors, self.time_step)
         self.wire: Any = _at_rest(lanes, data.modes)
         self.contact_gain = contact_gain(self.line)
         self.usual_end = spans * data.span_length
@@ -95,6 +96,13 @@ class ThreeSpan:
     def rest_tension(self, lane: int) -> Array:
         """No tension: the equivalent wire has no droppers."""
         return np.zeros(0)
+
+    @cached_property
+    def _view_shapes(self) -> Array:
+        """Mode shapes of a picture, (points, modes)."""
+        places = np.linspace(0.0, 3 * self._data.span_length, VIEW_POINTS)
+        with one_thread():
+            return mode_shapes(self._data, self._vectors, places)
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
         """As far as the three spans about the train; the wire's own sag is no part of this model."""
@@ -134,8 +142,7 @@ def mode_shapes(data: ThreeSpanData, vectors: Array, positions: Array) -> Array:
     return np.asarray(np.sqrt(2 / (data.wire.mass * length)) * sines @ vectors)
 
 
-def _constants(data: ThreeSpanData, time_step: float) -> ThreeSpanLine:
-    frequency, vectors = modes(data)
+def _constants(data: ThreeSpanData, frequency: Array, vectors: Array, time_step: float) -> ThreeSpanLine:
     span = data.span_length
     points = int(np.ceil((span + 2 * MARGIN) / SHAPE_SPACING)) + 1
     positions = span - MARGIN + SHAPE_SPACING * np.arange(points)
