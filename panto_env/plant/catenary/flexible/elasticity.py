@@ -32,8 +32,9 @@ def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
     per_span = PLACES * int(np.ceil(line.span_length / SPACING / PLACES))
     spacing, nodes = line.span_length / per_span, SPANS * per_span - 1
     stiffness, droppers = _stiffness(line, nodes, spacing)
-    tension = np.tile(solve(line).dropper_tension, SPANS)
-    springs = np.tile(solve(line).dropper_stiffness, SPANS)
+    at_rest = solve(line)
+    tension = np.tile(at_rest.dropper_tension, SPANS)
+    springs = np.tile(at_rest.dropper_stiffness, SPANS)
     first = (SPANS // 2) * per_span - 1
     places = first + (per_span // PLACES) * np.arange(PLACES + 1)
     lifts = [
