@@ -16,30 +16,21 @@ from panto_env.cli import main
 from panto_env.terminal import print_json
 
 from .documents import ROOT
+from .fuzz.lines import SHORT
 
 ENCODINGS = {
     "Latin-1": {"PYTHONIOENCODING": "latin-1"},
     "cp1252": {"PYTHONIOENCODING": "cp1252"},
     "the C locale": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
 }
-SHORT = [
-    "simulate",
-    "--catenary",
-    "periodic-stiffness",
-    "--pantograph",
-    "three-mass",
-    "--distance",
-    "150",
-    "--spans",
-    "1-2",
-]
+RUN = ("simulate", *SHORT)
 COMMANDS = {
     "help": ["--help"],
     "help of a command": ["oracle", "--help"],
     "all that can be named": ["list"],
     "one of it": ["list", "h-infinity"],
     "a file of the catalogue": ["list", "en50318-2002", "--toml"],
-    "a run": SHORT,
+    "a run": RUN,
     "a table with Greek letters": ["oracle", "--stored"],
     "a result for a document": ["report", "--markdown", str(ROOT / "docs" / "benchmark" / "head.json")],
     "bad input": ["simulate", "--catenary", "σ≤−µ"],
@@ -101,8 +92,8 @@ def test_so_does_a_process_of_its_own(encoding, name):
 
 
 def test_figures_are_those_of_an_output_that_shows_all(monkeypatch):
-    _, whole, _ = command(*SHORT, encoding="utf-8", monkeypatch=monkeypatch)
-    _, latin, _ = command(*SHORT, encoding="latin-1", monkeypatch=monkeypatch)
+    _, whole, _ = command(*RUN, encoding="utf-8", monkeypatch=monkeypatch)
+    _, latin, _ = command(*RUN, encoding="latin-1", monkeypatch=monkeypatch)
     whole, latin = whole.decode(), latin.decode("latin-1")
     words = [word for word in whole.split() if word.isascii() and any(map(str.isalnum, word))]
     assert len(words) > 50

@@ -13,16 +13,8 @@ from panto_env import InputError, studies
 from panto_env.base import files
 from panto_env.cli import make_app, reproduce
 
-LINE = [
-    "--catenary",
-    "periodic-stiffness",
-    "--pantograph",
-    "three-mass",
-    "--distance",
-    "150",
-    "--spans",
-    "1-2",
-]
+from .fuzz.lines import SHORT
+
 LIMITED = """
 import resource
 import panto_env.analysis.simulation as simulation
@@ -41,10 +33,10 @@ main()
 LIMIT = 8192
 """Bytes that a file may have once the run is over: a result has more."""
 COMMANDS = {
-    "simulate": (["simulate", *LINE, "--output", "run.parquet"], "run.parquet"),
-    "simulate --json": (["simulate", *LINE, "--json", "--output", "run.parquet"], "run.parquet"),
-    "simulate --plot": (["simulate", *LINE, "--plot", "run.png"], "run.png"),
-    "simulate --plot of vectors": (["simulate", *LINE, "--plot", "run.pdf"], "run.pdf"),
+    "simulate": (["simulate", *SHORT, "--output", "run.parquet"], "run.parquet"),
+    "simulate --json": (["simulate", *SHORT, "--json", "--output", "run.parquet"], "run.parquet"),
+    "simulate --plot": (["simulate", *SHORT, "--plot", "run.png"], "run.png"),
+    "simulate --plot of vectors": (["simulate", *SHORT, "--plot", "run.pdf"], "run.pdf"),
 }
 
 
@@ -80,14 +72,14 @@ def full(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "file", "shown"),
     [
-        (["simulate", *LINE, "--output", "out.parquet"], "out.parquet", "standard deviation"),
-        (["sweep", "speed_kmh=200,250", *LINE, "--output", "out.csv"], "out.csv", "250"),
-        (["sweep", "speed_kmh=200,250", *LINE, "--output", "out.parquet"], "out.parquet", "250"),
+        (["simulate", *SHORT, "--output", "out.parquet"], "out.parquet", "standard deviation"),
+        (["sweep", "speed_kmh=200,250", *SHORT, "--output", "out.csv"], "out.csv", "250"),
+        (["sweep", "speed_kmh=200,250", *SHORT, "--output", "out.parquet"], "out.parquet", "250"),
         (
             [
                 "benchmark",
                 "passive",
-                *LINE[:4],
+                *SHORT[:4],
                 "--speed",
                 "250",
                 "--seeds",
@@ -121,7 +113,7 @@ def test_one_file_that_fails_does_not_keep_the_others_from_being_written(tmp_pat
         return real(self, target)
 
     monkeypatch.setattr(files.Path, "replace", replace)
-    result = CliRunner().invoke(make_app(), ["simulate", *LINE, "--output", "a.parquet", "--plot", "a.png"])
+    result = CliRunner().invoke(make_app(), ["simulate", *SHORT, "--output", "a.parquet", "--plot", "a.png"])
     assert isinstance(result.exception, InputError)
     assert os.listdir(tmp_path) == ["a.png"]
 
