@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from panto_env.base.files import PAGES, check_output, write_whole
+from panto_env.report.template import page_template
 
 from ..benchmark.report import LEGEND
 from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH
@@ -19,17 +20,8 @@ def page(results: Sequence[Result]) -> str:
 
     Everything that comes from a result is escaped, a policy's name too: a result may be anyone's.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
-
-    environment = Environment(
-        loader=PackageLoader("panto_baselines.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["signed"] = signed
-    return environment.get_template("page.html.jinja").render(
+    template = page_template("panto_baselines.report", signed=signed)
+    return template.render(
         tracks=[track(result) for result in results],
         legend=LEGEND,
         box={

@@ -17,6 +17,7 @@ from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory
 from . import charts
 from .findings import Findings
+from .template import page_template
 from .words import ACCURACY, FILTER, LEFT_OUT
 
 MOST = 8
@@ -28,22 +29,13 @@ def page(found: Sequence[Findings]) -> str:
 
     Raises InputError where there are too many runs, or one does not hold its line and pantograph.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
-
     if not 1 <= len(found) <= MOST:
         raise InputError(f"A report is of 1 to {MOST} runs, not {len(found)}.")
-    environment = Environment(
-        loader=PackageLoader("panto_env.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": number, "digits": digits, "limits": limits_in_words}
+    template = page_template("panto_env.report", number=number, digits=digits, limits=limits_in_words)
     names = charts.names_of(found)
     judged = {one: name for one, name in names.items() if one.figures is not None}
     lines = _different(found, "line")
-    return environment.get_template("page.html.jinja").render(
+    return template.render(
         version=__version__,
         title=_title(found),
         names=[names[one] for one in found],

@@ -1,0 +1,29 @@
+"""Where the templates of pages come from, and how they treat what they are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from jinja2 import Template
+
+
+def page_template(package: str, **filters: Callable[..., Any]) -> Template:
+    """The template of a package's page, with filters of its own.
+
+    Everything that it is given is escaped, since it may come from anyone's file; a name that is not given is
+    an error.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    environment = Environment(
+        loader=PackageLoader(package),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= filters
+    return environment.get_template("page.html.jinja")
