@@ -96,12 +96,14 @@ nonsense: $(READY)
 bounds: $(READY)
 	$(BIN)/pytest tests/test_bounds_checked.py
 
-# Bad command lines, random environments and very many steps: each ends well, and is counted.
+# Bad command lines, random environments, damaged files and very many steps: each ends well, and is counted.
 CASES := 2000
+FILES := 10000
 STEPS := 1e8
 fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz.command_lines
 	$(BIN)/python -m tests.fuzz.environments --count $(CASES)
+	$(BIN)/python -m tests.fuzz.mutations --count $(FILES)
 	$(BIN)/python -m tests.fuzz.steps --count $(STEPS)
 	$(BIN)/python -m tests.fuzz.soak
 

@@ -304,6 +304,8 @@ class TestChecksums:
             verify(copied)
         with pytest.raises(InputError, match="There is no SHA256SUMS in or below"):
             verify(tmp_path / "nothing")
+        with pytest.raises(InputError, match="can be no file"):
+            verify(tmp_path / ("x" * 5000))
 
 
 class TestDesigns:

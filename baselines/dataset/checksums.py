@@ -7,6 +7,7 @@ from pathlib import Path
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_whole
+from panto_env.base.paths import check_path
 
 LIST = "SHA256SUMS"
 
@@ -21,9 +22,10 @@ def write_checksums(folder: Path) -> None:
 def verify(path: Path) -> list[tuple[Path, int]]:
     """Folders with a list in or below ``path``, each with the number of its files, all of them as listed.
 
-    Raises InputError, naming the file, where one is missing, differs or is not listed, and where there is no
-    list.
+    Raises InputError, naming the file, where one is missing, differs or is not listed, where there is no
+    list, and for a path that nothing can have.
     """
+    check_path(path)
     lists = sorted(path.rglob(LIST))
     if not lists:
         raise InputError(f"There is no {LIST} in or below {path}; give the folder of a data set.")

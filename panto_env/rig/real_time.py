@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.errors import InputError
 from .computer import RigComputer
 
 SLEEP_UNTIL = 2e-4
@@ -45,9 +46,14 @@ def against_the_clock(
     """Step a computer at its interval for so long, under a force as of a pantograph, by the wall clock.
 
     At the line's end it begins anew. Python's garbage collector is off meanwhile, as a rig's program would
-    have it.
+    have it. Raises InputError for a time without a step.
     """
     count, interval = round(seconds / computer.interval), computer.interval
+    if count < 1:
+        raise InputError(
+            f"Against the clock a rig's computer must run for {interval:g} s or longer, a step of its own, not "
+            f"for {seconds:g} s."
+        )
     steps, late = np.zeros(count), np.zeros(count)
     force = 120 + 40 * np.sin(2 * np.pi * 1.2 * interval * np.arange(count))
     enabled = gc.isenabled()

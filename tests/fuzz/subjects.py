@@ -1,0 +1,133 @@
+"""The files that are damaged: each kind that the project reads, whole ones, and how each is read."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel
+
+from panto_agents.ablation import load_ablation
+from panto_agents.model_file import read_model
+from panto_agents.run_folder import RunFolder
+from panto_agents.settings import load_training
+from panto_agents.stored import FOLDER as MODELS
+from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.settings import load_episodes
+from panto_baselines.oracle import stored
+from panto_baselines.policies.gains import load_gains
+from panto_baselines.report.result import read_result
+from panto_env import Trajectory, simulate
+from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.catalog.loader import text_of
+from panto_env.estimation.motion_file import read_motion
+from panto_env.identification.record_file import read_record
+from panto_env.rig.computer import load_rig
+from panto_env.studies.throughput import study as speed
+
+from .files import write_files
+
+ROOT = Path(__file__).parents[2]
+
+
+class Subject(NamedTuple):
+    """A whole file and how it is read; checked: it has a checksum, so that no change goes unnoticed."""
+
+    kind: str
+    file: Path
+    read: Callable[[Path], Any]
+    checked: bool = False
+
+
+def subjects(folder: Path) -> dict[str, Subject]:
+    """All of them by name; those that have to be made are written into the folder."""
+    write_files(folder)
+    run = RunFolder(folder / "run")
+    run.path.mkdir()
+    run.write_settings(load_training(folder / "training.toml"))
+    run.evaluations.write_text(
+        "steps,speed_kmh,seed,policy_sigma\n" + "".join(f"{128 * k},300,1,{20.5 - k}\n" for k in range(1, 9))
+    )
+    found = {
+        f"line {name}": Subject("TOML", _entry(name, folder), _line) for name in available("catenary")
+    } | {
+        f"pantograph {name}": Subject("TOML", _entry(name, folder), _pantograph)
+        for name in ("three-mass", "dsa350")
+    }
+    configs = ROOT / "configs"
+    found |= {
+        "training": Subject("TOML", configs / "agent-high-speed.toml", load_training),
+        "ablation": Subject("TOML", configs / "ablation.toml", load_ablation),
+        "track": Subject("TOML", configs / "benchmark" / "as-built.toml", load_benchmark),
+        "episodes": Subject("TOML", configs / "dataset-known-line.toml", load_episodes),
+        "designs": Subject("TOML", configs / "dataset-designs.toml", load_designs),
+        "gains": Subject("TOML", next((configs / "policies").glob("*.toml")), load_gains),
+        "record": Subject("CSV", folder / "rig.csv", read_record),
+        "motion": Subject("CSV", folder / "motion.csv", lambda path: read_motion(path, 120.0)),
+        "evaluations": Subject("CSV", run.evaluations, _evaluations),
+        "saved run": Subject("Parquet", folder / "run.parquet", Trajectory.load, checked=True),
+        "benchmark": Subject("JSON", ROOT / "docs" / "benchmark" / "head.json", read_result, checked=True),
+        "oracles": Subject("JSON", stored.RESULTS, stored.read, checked=True),
+        "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
+        "settings of a training": Subject("JSON", run.settings, _settings),
+    }
+    models = {f"model {path.stem}": Subject("model", path, read_model, True) for path in MODELS.glob("*.zip")}
+    return found | models
+
+
+def _entry(name: str, folder: Path) -> Path:
+    path = folder / f"{name}.toml"
+    path.write_text(text_of(name), encoding="utf-8")
+    return path
+
+
+def _line(path: Path) -> Any:
+    """A line, and its first meters under a pantograph that fits it."""
+    line = load_catenary(path)
+    if line.kind == "rig":
+        return line, load_rig(line)
+    pantograph = "three-mass" if line.kind == "periodic-stiffness" else "dsa350"
+    return line, _pass(line, pantograph, 40.0)
+
+
+def _pantograph(path: Path) -> Any:
+    """A pantograph, and its first meters along a line in no time."""
+    pantograph = load_pantograph(path)
+    return pantograph, _pass("periodic-stiffness", pantograph, 40.0)
+
+
+def _pass(line: Any, pantograph: Any, distance: float) -> Trajectory:
+    with warnings.catch_warnings(action="ignore"):
+        return simulate(line, pantograph, 200.0, distance=distance, accuracy="fast")
+
+
+def _evaluations(path: Path) -> Any:
+    run = RunFolder(path.parent)
+    run.evaluations = path
+    return run._rows()
+
+
+def _settings(path: Path) -> Any:
+    run = RunFolder(path.parent)
+    run.settings = path
+    return run.read_settings()
+
+
+def said(value: Any) -> str:
+    """Anything that is read from a file, as text in which every bit of every number shows."""
+    if isinstance(value, BaseModel):
+        value = value.model_dump()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
+    if isinstance(value, dict):
+        return str({key: said(each) for key, each in value.items()})
+    if isinstance(value, tuple | list):
+        return str([said(each) for each in value])
+    return repr(value)
