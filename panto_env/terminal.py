@@ -80,16 +80,6 @@ def print_json(value: Any) -> None:
     sys.stdout.write("\n")
 
 
-LONGEST = 1000
-"""Letters of a message: what a user gave may be a whole file."""
-
-
-def one_line(text: str) -> str:
-    """A message as one line that any terminal bears: what is no letter is escaped, a long middle left out."""
-    plain = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
-    return plain if len(plain) <= LONGEST else f"{plain[: LONGEST // 2]} [...] {plain[-LONGEST // 2 :]}"
-
-
 def this_command() -> str:
     """The command that is running, as it is noted beside what it makes."""
     return shlex.join(["panto", *sys.argv[1:]])

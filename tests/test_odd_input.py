@@ -20,11 +20,11 @@ from panto_env.analysis.plots import plot_run, save
 from panto_env.base.files import read_toml, write_whole
 from panto_env.base.inline import parse_inline
 from panto_env.base.settings import parse
+from panto_env.base.shown import LONGEST_LINE
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control.settings import RunSettings, run_settings
 from panto_env.envs import IDS
 from panto_env.policies import find_policy
-from panto_env.terminal import LONGEST, one_line
 
 HUGE = 10**400
 LONG = "x" * 5000
@@ -85,9 +85,8 @@ ODD = {
 def sentence(error):
     message = str(error)
     assert message.endswith((".", "?")), message[-200:]
-    assert "\n" not in one_line(message)
-    message.encode()
-    assert len(one_line(message)) <= LONGEST + 10
+    assert message.isprintable()
+    assert len(message) <= LONGEST_LINE + 10
 
 
 @pytest.mark.parametrize("odd", ODD)
@@ -164,12 +163,6 @@ def test_a_name_that_no_file_can_have_is_refused(name, message):
 def test_a_value_that_is_no_literal_is_a_word():
     for text in ("(" * 5000, "-" * 5000 + "1", "{[]: 1}"):
         assert parse_inline(f"a={text}") == {"a": text}
-
-
-def test_a_message_is_one_line_that_any_terminal_bears():
-    assert one_line("a\nb\x1b[31m\udc80\0") == r"a\nb\x1b[31m\udc80\x00"
-    assert one_line("é σ ²") == "é σ ²"
-    assert len(one_line(LONG)) < LONGEST + 10
 
 
 def test_a_name_that_is_no_mathematics_is_drawn_as_it_is(tmp_path):
@@ -278,3 +271,20 @@ def test_an_odd_action_of_a_policy_is_refused(returned, tmp_path: Path):
     )
     with pytest.raises(InputError, match="its action must be finite numbers"):
         simulate("periodic-stiffness", "three-mass", policy=f"{tmp_path}/odd.py:Odd", distance=100.0)
+
+
+def test_a_message_is_one_line_whatever_it_quotes():
+    odd = "a\nb\r\x1b[31m\0\udc80" + "x" * 5000 + " " * 5000 + "y, z" * 3000
+    told = str(InputError(f"The line '{odd}' is not known."))
+    assert told.isprintable()
+    assert len(told) < LONGEST_LINE
+    assert told.startswith(r"The line 'a\nb\r\x1b[31m\x00\udc80xxx")
+    assert told.endswith("z' is not known.")
+    assert str(InputError("σ ≤ 3 µm; give „more“.")) == "σ ≤ 3 µm; give „more“."
+
+
+def test_of_many_wrong_keys_the_first_are_told_and_the_others_counted():
+    table = {f"key{k}": k for k in range(40)}
+    with pytest.raises(InputError, match=r"and 32 more keys are wrong\.$") as caught:
+        simulate(actuator=table)
+    assert str(caught.value).count("is not known") == 8

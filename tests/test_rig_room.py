@@ -97,7 +97,9 @@ def test_a_line_is_no_rig():
 
 def test_every_step_is_timed_and_the_late_ones_are_missed():
     computer = RigComputer("rig", SPEED, force=120.0)
-    with pytest.raises(InputError, match=r"must run for \S+ s or longer, a step of its own, not for 1e-308 s\.$"):
+    with pytest.raises(
+        InputError, match=r"must run for \S+ s or longer, a step of its own, not for 1e-308 s\.$"
+    ):
         against_the_clock(computer, 1e-308)
     timing = against_the_clock(computer, 0.3)
     assert len(timing.steps) == len(timing.late) == 300

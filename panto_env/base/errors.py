@@ -1,12 +1,14 @@
 """The one error that bad input of any kind raises, and the warnings of ours."""
 
+from .shown import one_line
+
 
 class InputError(ValueError):
     """Bad input (action, argument or file): one sentence that says what was wrong and what to do."""
 
     def __init__(self, message: str = "") -> None:
-        """Letters that no encoding has, as a broken file name may hold, are escaped: it can be printed."""
-        super().__init__(message.encode("utf-8", "backslashreplace").decode("utf-8"))
+        """Whatever the message quotes, a damaged file or a broken name, it can be printed in one line."""
+        super().__init__(one_line(message))
 
 
 class AccuracyWarning(UserWarning):

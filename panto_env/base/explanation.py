@@ -27,6 +27,9 @@ WORDS = {
 }
 """By pydantic's names of what is wrong; for others its own words are taken."""
 
+MOST = 8
+"""Keys of a table that are told as wrong; the others are counted."""
+
 
 class Complaint(NamedTuple):
     """What is wrong at one key."""
@@ -38,12 +41,14 @@ class Complaint(NamedTuple):
 
 
 def explain(error: ValidationError, kind: type[BaseModel]) -> str:
-    """One clause per key of a table of ``kind`` that is wrong."""
+    """One clause per wrong key of a table of ``kind``; of many the first, and how many more there are."""
     clauses = []
-    for key, words, given, clause in complaints(error, kind):
+    found = complaints(error, kind)
+    for key, words, given, clause in found[:MOST]:
         place = "" if not key else f"key '{key}': " if clause else f"key '{key}' "
         clauses.append(f"{place}{words}{f' (given: {given})' if given else ''}")
-    return "; ".join(clauses)
+    more = len(found) - len(clauses)
+    return "; ".join(clauses) + (f"; and {more} more keys are wrong" if more > 0 else "")
 
 
 def sentence(error: ValidationError, kind: type[BaseModel]) -> str:

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Callable
 from typing import Any
 
 LONGEST = 300
-"""Letters of a value that is shown whole."""
+"""Letters of a value, or of a word, that is shown whole."""
+LONGEST_LINE = 1000
+"""Letters of a message that is told whole: what a user gave may be a whole file."""
+_WORD = re.compile(r"\S+|\s+")
 
 
 def shown(value: Any) -> str:
     """A value as Python writes it, whole unless it is very long."""
-    text = _written(repr, value)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]}...{text[-LONGEST // 3 :]}"
+    return _cut(_written(repr, value), LONGEST)
+
+
+def one_line(text: str) -> str:
+    """A text that may quote anything, with its line ends and other controls escaped and long words cut."""
+    line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+    return _cut(_WORD.sub(lambda word: _cut(word[0], LONGEST), line), LONGEST_LINE)
 
 
 def shortly(value: Any) -> str:
     """A value as Python writes it, shortened to some 30 letters."""
     return _written(reprlib.repr, value)
+
+
+def _cut(text: str, longest: int) -> str:
+    """A text whose middle is left out where it is very long."""
+    return text if len(text) <= longest else f"{text[: longest // 2]}...{text[-longest // 3 :]}"
 
 
 def _written(write: Callable[[Any], str], value: Any) -> str:

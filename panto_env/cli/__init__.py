@@ -14,8 +14,8 @@ from typer import Abort
 from ..base import plugins
 from ..base.errors import AccuracyWarning, InputError, UncheckedWarning
 from ..base.plain_characters import show_always
+from ..base.shown import one_line
 from ..base.version import __version__
-from ..terminal import one_line
 
 UsageError: Any = typer.BadParameter.__base__
 """Of Click, which older releases of Typer import and newer ones bring along."""

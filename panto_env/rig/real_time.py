@@ -51,8 +51,8 @@ def against_the_clock(
     count, interval = round(seconds / computer.interval), computer.interval
     if count < 1:
         raise InputError(
-            f"Against the clock a rig's computer must run for {interval:g} s or longer, a step of its own, not "
-            f"for {seconds:g} s."
+            f"Against the clock a rig's computer must run for {interval:g} s or longer, a step of its own, "
+            f"not for {seconds:g} s."
         )
     steps, late = np.zeros(count), np.zeros(count)
     force = 120 + 40 * np.sin(2 * np.pi * 1.2 * interval * np.arange(count))

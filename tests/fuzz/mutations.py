@@ -23,6 +23,7 @@ import numpy as np
 
 from panto_env import InputError
 from panto_env.base.errors import UncheckedWarning
+from panto_env.base.shown import LONGEST_LINE
 
 from .processes import run_all
 from .subjects import Subject, said, subjects
@@ -32,8 +33,6 @@ AT_ONCE = 25
 """Cases that share a process."""
 LIMIT = 120.0
 """Seconds that they may take together."""
-LONGEST = 1000
-"""Characters of a refusal: one that carries the file's own content is none to read."""
 BAD = "BAD"
 ODD = (
     *b"nan inf -inf -1 0 1e400 -1e308 5e-324 true null 0x1F 1_000 2026-11-23 '' [] {} x [1,2] ,".split(),
@@ -146,7 +145,7 @@ def judged(subject: Subject, path: Path, whole: str) -> str:
             now = said(subject.read(path))
         except InputError as error:
             text = str(error)
-            good = text.endswith((".", "?", "!")) and "\n" not in text and len(text) < LONGEST
+            good = text.endswith((".", "?", "!")) and "\n" not in text and len(text) <= LONGEST_LINE + 10
             return "refused" if good else f"{BAD}: not one sentence: {text[:2000]!r}"
     if now == whole:
         return "unchanged"
