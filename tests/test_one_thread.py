@@ -1,6 +1,9 @@
 """Environments, tasks and plants used by two threads at once, or beyond their end: refused, never a crash."""
 
 import copy
+import os
+import subprocess
+import sys
 import threading
 
 import gymnasium
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError
+from panto_env.backend import JIT
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -45,7 +49,7 @@ def test_an_environment_is_one_thread_s_at_a_time(name):
     told, refused = used_by_four_threads(lambda: env.step(action)[0], lambda text: "has ended" in text)
     assert all(np.isfinite(seen).all() for seen in told)
     assert {text.split(";")[0] for text in refused} <= {
-        "Another thread is using this environment just now",
+        "Another thread is using this environment just now, or was when this process was forked",
         "The episode has not begun or has ended",
     }
     assert any("Another thread" in text for text in refused)
@@ -60,6 +64,52 @@ def test_a_vector_environment_is_one_thread_s_at_a_time():
     told, refused = used_by_four_threads(lambda: envs.step(actions)[0], lambda text: False)
     assert all(np.isfinite(seen).all() for seen in told)
     assert any("Another thread" in text for text in refused)
+
+
+FORKED = """
+import os, signal, threading, time, warnings
+import gymnasium
+warnings.simplefilter("ignore")
+envs = gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=64, accuracy="fast")
+envs.reset(seed=0)
+action = envs.action_space.sample()
+stop = threading.Event()
+
+def use():
+    while not stop.is_set():
+        envs.step(action)
+
+thread = threading.Thread(target=use)
+thread.start()
+for k in range(100):
+    time.sleep(0.003 * (k % 7))
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        try:
+            for _ in range(3):
+                envs.step(action)
+            print("stepped", flush=True)
+        except BaseException as error:
+            print(error, flush=True)
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+stop.set()
+thread.join()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.skipif(not JIT, reason="plain Python takes too long")
+def test_forked_while_another_thread_steps_it_is_refused_or_steps():
+    """It had waited for ever for a generator of random numbers that the thread had locked."""
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    told, ends = done.stdout.splitlines()[::2], done.stdout.splitlines()[1::2]
+    assert ends == ["0"] * 100
+    refused = [line for line in told if line != "stepped"]
+    assert refused
+    assert all("or was when this process was forked; give each" in line for line in refused)
 
 
 def test_a_copy_made_in_use_is_not_in_use():

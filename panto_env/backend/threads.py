@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 import weakref
@@ -9,7 +10,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ..base.forked import renew_in_forked
 from ..base.machine import cores
 from .compile import JIT
 from .shares import ALONE, HELPER, LEADER, Shares
@@ -50,7 +50,7 @@ class LaneThreads:
         wanted = 1 if not JIT else cores() if threads is None else threads
         self._threads = min(wanted, -(-lanes // abreast))
         self._begin_alone()
-        renew_in_forked(self)
+        _ALL.add(self)
 
     def _begin_alone(self) -> None:
         """Nobody helps yet."""
@@ -59,7 +59,7 @@ class LaneThreads:
         self._size = 0  # lanes of a share; 0: not shared
         self._helpers: list[_Helper] = []
 
-    def renew(self) -> None:
+    def forget_threads(self) -> None:
         """Begin anew: in a process that was forked there are no threads but the one that forked."""
         for helper in self._helpers:
             helper.forget()
@@ -137,3 +137,15 @@ def _serve(help_with_steps: Callable[[], Any], called: threading.Event, state: _
 def _dismiss(called: threading.Event, state: _State) -> None:
     state.dismissed = True
     called.set()
+
+
+_ALL: weakref.WeakSet[LaneThreads] = weakref.WeakSet()
+
+
+def _forget_threads() -> None:
+    for each in list(_ALL):
+        each.forget_threads()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_threads)

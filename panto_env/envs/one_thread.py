@@ -8,20 +8,18 @@ from functools import wraps
 from typing import Any, NoReturn, TypeVar
 
 from ..base.errors import InputError
-from ..base.forked import renew_in_forked
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 class InUse:
-    """Whether a thread is using an environment just now; the copy of one is not in use."""
+    """Whether a thread is using an environment just now; the copy of one is not in use.
+
+    In a forked process it stays in use if another thread was using it: nobody finishes there what that thread
+    had begun, and a generator of random numbers that it had locked would be waited for without end.
+    """
 
     def __init__(self) -> None:
-        self.renew()
-        renew_in_forked(self)
-
-    def renew(self) -> None:
-        """Nobody uses it."""
         lock = threading.Lock()
         self.begin, self.end = lock.acquire, lock.release
 
@@ -31,7 +29,10 @@ class InUse:
 
 def refuse() -> NoReturn:
     """Raise InputError: another thread is using an environment."""
-    raise InputError("Another thread is using this environment just now; give each thread one of its own.")
+    raise InputError(
+        "Another thread is using this environment just now, or was when this process was forked; give each "
+        "thread and each process one of its own."
+    )
 
 
 def one_at_a_time(method: F) -> F:
