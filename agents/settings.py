@@ -99,7 +99,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
 
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
     """Ends and middle of an environment's range of speeds, or its one speed (km/h)."""
-    low, high = Task(run_settings(arguments(environment))).speed_range
+    low, high = Task(run_settings(arguments(environment))).length.speed_range
     return tuple(sorted({round(3.6 * v, 6) for v in (low, (low + high) / 2, high)}))
 
 
@@ -148,7 +148,7 @@ def _check_environment(training: Training) -> None:
         settings = run_settings(training.arguments)
         task = Task(settings)
         for speed in training.evaluation.speeds_kmh or ():
-            task.check_speeds(speed)
+            task.length.check_speeds(speed)
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
 

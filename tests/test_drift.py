@@ -59,7 +59,7 @@ def test_the_kernel_s_train_is_where_python_s_is():
         observed.append(env.context.layout.read(observation, "speed"))
         ended = any(ends)
     task, run = env.task, env.trajectory
-    steps = task.control_steps * np.arange(1, len(positions) + 1)
+    steps = task.length.control_steps * np.arange(1, len(positions) + 1)
     row = task.plant.run.drift[0, :, 0]
     times = steps * task.plant.time_step
     expected = 200 / 3.6 * times + ahead(row[None], steps[None])[0]
@@ -71,7 +71,7 @@ def test_the_kernel_s_train_is_where_python_s_is():
     # Samples are of the middle of their steps.
     middle = 200 / 3.6 * run.time + ahead(row[None], run.time[None] / run.time_step)[0]
     np.testing.assert_allclose(run.position, middle, atol=1e-9)
-    assert env.task.most_control_steps >= len(positions)
+    assert env.task.length.most_control_steps >= len(positions)
 
 
 @pytest.mark.parametrize("line", [SIMPLE, {}])

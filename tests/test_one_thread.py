@@ -170,7 +170,7 @@ def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
     task = Task(run_settings(given), lanes=lanes)
     task.reset(np.arange(lanes), np.random.default_rng(0))
     action = np.zeros((lanes, 1))
-    *before, last = [task.step(action) for _ in range(task.most_control_steps)]
+    *before, last = [task.step(action) for _ in range(task.length.most_control_steps)]
     assert last
     assert len(before) > 10
     assert not any(before)

@@ -124,14 +124,14 @@ def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))
-    last = last_whole_span(task.distance, task.plant.catenary.span_length)
+    last = last_whole_span(task.length.distance, task.plant.catenary.span_length)
     first, last = line.spans or (FIRST_SETTLED, last)
-    where = f"on line '{line.catenary}', where every run covers {task.distance:g} m"
+    where = f"on line '{line.catenary}', where every run covers {task.length.distance:g} m"
     if not 1 <= first <= last:
         raise InputError(
             f"There are no spans {first} to {last} to evaluate {where}; "
             "give a longer distance, or spans of your own."
         )
-    if last * task.plant.catenary.span_length > task.distance:
+    if last * task.plant.catenary.span_length > task.length.distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
     return first, last

@@ -79,10 +79,10 @@ class _Group:
     ) -> None:
         task = Task(settings, lanes=lanes, keep_samples=False, trim=trim)
         task.reset(np.arange(lanes), lambda _: np.random.default_rng(seed))
-        self._plant, self._steps = task.plant, task.control_steps
+        self._plant, self._steps = task.plant, task.length.control_steps
         self._places = [int(place) for place in task.actuator.places]
-        self._first = begin * task.control_steps
-        rows = self._first + control_steps * task.control_steps + 1
+        self._first = begin * task.length.control_steps
+        rows = self._first + control_steps * task.length.control_steps + 1
         shape = (lanes, rows, CONTACTS, SAMPLE_ROWS)
         check_record(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never touched, and so take no memory.

@@ -101,7 +101,7 @@ def _low_passed(task: Task, settings: RunSettings) -> Array:
     start = settled[:, None, :] * force[None, :, :1]
     filtered, _ = sosfilt(sections, force, axis=1, zi=start)
     position = (np.arange(force.shape[1]) + 0.5) * time_step * float(task.speed[0])
-    spans = chosen_spans(None, task.distance, span)
+    spans = chosen_spans(None, task.length.distance, span)
     assert spans is not None  # of a choice that is not "all"
     inside = filtered[:, within(position, spans, span)]
     return np.asarray(inside[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

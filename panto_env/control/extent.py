@@ -1,14 +1,17 @@
-"""How far a run goes, on how long a line, and what its plant must be good for."""
+"""How far a run goes, on how long a line, and the plant that is good for it."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from ..base.errors import InputError
 from ..metrics.spans import CLEAR
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.drift import largest_drift
 from ..plant.numerics import Runs
+from ..plant.plant import Plant
+from .cost import FEW_LANES, check_lanes
 from .settings import RunSettings
 
 
@@ -50,3 +53,22 @@ def whole_steps(control_interval: float, time_step: float) -> int:
             f"not {1e3 * control_interval:g} ms."
         )
     return steps
+
+
+def new_plant(settings: RunSettings, lanes: int) -> Plant:
+    """The plant of so many lanes. Raises InputError where they do not fit into memory."""
+    make_plant = partial(
+        Plant,
+        settings.catenary,
+        settings.pantograph,
+        spans=spans(settings),
+        numerics=settings.numerics,
+        actuator=settings.actuator,
+        runs=runs(settings),
+        bilateral=settings.bilateral,
+        varied=settings.pantograph_scatter > 0,
+        drifting=settings.speed_drift > 0,
+    )
+    if lanes > FEW_LANES:
+        check_lanes(lanes, FEW_LANES, make_plant(lanes=FEW_LANES).arrays)
+    return make_plant(lanes=lanes)

@@ -92,7 +92,7 @@ def trajectory(
         time_step=plant.time_step,
         nominal_force=nominal_force,
         target_mean=task.target_mean(lane),
-        settings=identity(task.settings, plant, task.distance),
+        settings=identity(task.settings, plant, task.length.distance),
         policy=policy,
         seed=seed,
         terminated=_ending(task, lane) is not Ending.NONE,

@@ -25,12 +25,14 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
     droppers, supports = len(plant.model.droppers), len(plant.model.supports)
-    drawn = draw_starts(task.settings, task.speed_range, droppers, supports, lanes, of_lane, plant.time_step)
+    drawn = draw_starts(
+        task.settings, task.length.speed_range, droppers, supports, lanes, of_lane, plant.time_step
+    )
     forces = task.static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
-    run_in = np.round(drawn.way / (drawn.speed * task.control_interval))
-    end = task.plant_steps(drawn.speed, run_in, drawn.drift)
-    run_in = np.minimum(run_in, end // task.control_steps - 1).astype(np.int64)
+    run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
+    end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
+    run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
     task.speed[lanes] = drawn.speed
     _begin(task, lanes, end)
     plant.clear(task.samples, lanes)

@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..backend import (
-    ALONE,
-    Lanes,
-    LaneThreads,
-    bind,
-    copy_whole,
-    new_shares,
-    of_lanes,
-    pack,
-    set_lanes,
-)
+from ..backend import Lanes, of_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.shown import shown
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
-from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
-from .cost import FEW_LANES, arrays_of, check_lanes, run_cost
+from .cost import Cost, arrays_of, run_cost
 from .entries import ESTIMATED, Asked
-from .episode import Flags, Results, new_episode, new_results
-from .extent import runs, spans, whole_steps
+from .episode import Flags, Results, new_episode
+from .extent import new_plant
+from .length import EpisodeLength
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .normalise import normalised
 from .observation import layout
@@ -42,18 +31,13 @@ from .passive_run import LOW_PASSED, PassiveRun, passive_run
 from .record import diverged, divergence, ending, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
-from .settings import RunSettings, speed_range
+from .settings import RunSettings
 from .start import LaneGenerators
 from .state import TaskRow
-from .step import control_steps, observe_start
-
-COASTED = 100
-"""Control steps without a policy that are made at once."""
-BOUND_ANEW = ("_action", "_threads", "_plain_step", "_observe_start")
-"""Attributes that ``Task._bind`` makes of the others."""
+from .stepping import Stepping
 
 
-class Task:
+class Task(Stepping):
     """Lanes of one pantograph, line and controller; each lane is reset and judged on its own."""
 
     def __init__(
@@ -75,163 +59,62 @@ class Task:
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.catenary.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or take another line.")
-        self.settings, self.lanes, self.actuator = settings, lanes, settings.actuator
-        make_plant = partial(
-            Plant,
-            settings.catenary,
-            settings.pantograph,
-            spans=spans(settings),
-            numerics=settings.numerics,
-            actuator=settings.actuator,
-            runs=runs(settings),
-            bilateral=settings.bilateral,
-            varied=settings.pantograph_scatter > 0,
-            drifting=settings.speed_drift > 0,
-        )
-        if lanes > FEW_LANES:
-            check_lanes(lanes, FEW_LANES, make_plant(lanes=FEW_LANES).arrays)
-        self.plant = plant = make_plant(lanes=lanes)
-        self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
-        if self.distance > plant.model.length:
-            raise InputError(
-                f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
-                f"not {self.distance:g} m; ask for more spans."
-            )
-        self.control_interval = settings.control_interval
-        self.control_steps = whole_steps(settings.control_interval, plant.time_step)
-        self.speed_range = self.check_speeds(settings.speed_kmh)
-        stride = self.speed_range[1] * self.control_interval
-        if self.distance < stride - 1e-9:
-            raise InputError(
-                f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
-                f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
-            )
+        self.settings, self.actuator, self.trim = settings, settings.actuator, trim
+        plant = new_plant(settings, lanes)
+        self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
-        rows = self._rows()
+        self.cost = self._cost(plant, lanes)
         asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
         self.layout = layout(settings.observation, asked)
         self.known_pantograph = settings.known_pantograph or settings.pantograph
         if settings.normalise is not None:
             known = settings.model_copy(update={"pantograph": self.known_pantograph})
-            speeds = self.check_speeds(settings.normalise)
+            speeds = length.check_speeds(settings.normalise)
             self.layout = normalised(self.layout, passive_run(known, speeds, passive_pass))
         self.passive: PassiveRun | None = None  # that the reward counts from
         if settings.reward.target == "passive":
-            self.passive = passive_run(settings, self.speed_range, passive_pass)
+            self.passive = passive_run(settings, length.speed_range, passive_pass)
         self.speed = np.zeros(lanes)  # m/s
-        self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
-        self._any_over = True
-        self.trim = trim
-        self.odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
-        self.episode = new_episode(settings, plant, self.layout, self.control_steps, self.odometers.arrays())
-        self.results = self.new_results()
-        self.sensors, rms = self._sensors()
-        self.noise = None if rms is None else Noise(rms, lanes)
-        self.samples = plant.samples(rows, tension=record_droppers)
-        self.running = running_figures(lanes, len(plant.model.supports), plant.time_step)
-        copy_whole(*self._arrays)
-        self._bind()
+        odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
+        sensors, rms = self._sensors(plant, lanes)
+        rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
+        super().__init__(
+            plant,
+            lanes,
+            episode=new_episode(settings, plant, self.layout, length.control_steps, odometers.arrays()),
+            sensors=sensors,
+            samples=plant.samples(rows, tension=record_droppers),
+            running=running_figures(lanes, len(plant.model.supports), plant.time_step),
+            noise=None if rms is None else Noise(rms, lanes),
+            odometers=odometers,
+            entries=len(self.layout.entries),
+        )
 
-    def _rows(self) -> int:
-        """Samples that an episode may have at most, of which row 0 is the start; and its ``cost``.
+    def _cost(self, plant: Plant, lanes: int) -> Cost:
+        """What the longest episode takes.
 
-        Raises InputError where it takes more memory than the machine has, or more time than anyone has.
+        Raises InputError where that is more memory than the machine has, or more time than anyone has.
         """
-        plant, settings = self.plant, self.settings
-        slow = self.speed_range[0]  # the slowest run sets how many
-        longest = np.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
-        steps = float(self.plant_steps(slow, longest)) + self._late
-        supports = len(plant.model.supports)
+        steps, supports = self.length.most_plant_steps, len(plant.model.supports)
         droppers = len(plant.model.droppers) if self.record_droppers else 0
         moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
-        self.cost = run_cost(self.lanes, steps, supports, droppers, moving, self.keep_samples)
-        self.cost.check(f"{steps:,.0f} time steps with {supports} supports")
-        return int(steps) + 1 if self.keep_samples else 1
+        cost = run_cost(lanes, steps, supports, droppers, moving, self.keep_samples)
+        cost.check(f"{steps:,.0f} time steps with {supports} supports")
+        return cost
 
-    def _sensors(self) -> tuple[Any, tuple[float, ...] | None]:
+    def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
         """Sensors of all lanes, and the rms of their noise."""
-        settings, plant = self.settings, self.plant
-        form = plant.time_step, self.control_steps, self.lanes, plant.lanes_abreast
+        settings = self.settings
+        form = plant.time_step, self.length.control_steps, lanes, plant.lanes_abreast
         if settings.observation != ESTIMATED:
             return settings.sensors.arrays(*form), settings.sensors.noise_rms
         from ..estimation.readings import estimating  # slow: it imports SciPy
 
-        speed = 0.5 * sum(self.speed_range)
+        speed = 0.5 * sum(self.length.speed_range)
         span_length = settings.catenary.span_length
         return estimating(
             settings.sensors, settings.estimator, self.known_pantograph, speed, span_length, *form
         )
-
-    @property
-    def _arrays(self) -> tuple[Any, ...]:
-        """The named tuples that the kernels take after those of the plant."""
-        return self.sensors, self.samples, self.episode, self.running
-
-    def _bind(self) -> None:
-        """Bind the kernels to the arrays."""
-        self._action = self.episode.action[:, : self.lanes].T
-        shares = new_shares()
-        packed = pack(*self.plant.arrays, *self._arrays, shares)
-        run = bind(control_steps, packed, *self.results[1:], 0, self.lanes, self.lanes, ALONE, 0)
-        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast, shares)
-        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results[1:]
-        self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
-        self._observe_start = bind(observe_start, packed, *self.results[1:], 0, self.lanes)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
-        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        copy_whole(*self._arrays)
-        self._bind()
-
-    def new_results(self) -> Results:
-        """Room for the results of a step."""
-        return new_results(self.lanes, self.episode.action.shape[1], len(self.layout.entries))
-
-    def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
-        """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
-        low, high = (speed / 3.6 for speed in speed_range(speed_kmh))
-        drift = largest_drift(self.settings.speed_drift) / 3.6
-        for speed in (low - drift, high + drift):
-            self.plant.check_speed(speed)
-        return low, high
-
-    def plant_steps(self, speed: Any, run_in: Any = 0, drift: Array | None = None) -> Any:
-        """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
-
-        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins. drift: of
-        each speed, as ``Plant.start`` takes it.
-        """
-        stride = speed * self.control_interval
-        if drift is not None:
-            return np.array([self._drifting_steps(*each) for each in zip(stride, run_in, drift, strict=True)])
-        wanted = run_in + np.ceil(self.distance / stride - 1e-9)
-        possible = self.plant.model.length / stride + 1e-9
-        return np.maximum(1, np.floor(np.minimum(wanted, possible))) * self.control_steps
-
-    def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
-        """The same of one train that drifts about this stride of a control step (m)."""
-        lag = largest_lag(self.settings.speed_drift / 3.6)
-        most = min(self.plant.model.length, stride * run_in + lag + self.distance) + lag
-        steps = np.arange(math.ceil(most / stride) + 1.0)
-        position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # it rises
-        wanted = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
-        possible = np.searchsorted(position, self.plant.model.length + 1e-9) - 1
-        return max(1, min(int(wanted), int(possible))) * self.control_steps
-
-    @property
-    def _late(self) -> int:
-        """Plant steps by which a train may fall back."""
-        lag = largest_lag(self.settings.speed_drift / 3.6)
-        return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
-
-    @property
-    def most_control_steps(self) -> int:
-        """Control steps of an episode at the lowest speed: the longest that there are."""
-        return (int(self.plant_steps(self.speed_range[0])) + self._late) // self.control_steps
 
     def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
         """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.
@@ -241,24 +124,15 @@ class Task:
         the task's own. Raises InputError where a run leaves the plant's valid range before its episode.
         """
         lanes = np.atleast_1d(lanes)
-        self._over[lanes] = False
-        self._any_over = bool(self._over.any())
+        self.begin(lanes)
         reset(self, lanes, random, results or self.results)
-
-    def observe_start(self, lanes: Any, results: Results) -> None:
-        """Write into results what is observed of lanes, (n,), that stand at their start."""
-        idle = self.episode.idle
-        idle[:] = True
-        idle[lanes] = False
-        self._observe_start(*results[1:], int(lanes.min()), int(lanes.max()) + 1)
-        idle[: self.lanes] = False
 
     def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is to be met, else None."""
         if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
-            self.trim = trim_as_designed(self.settings, self.speed_range, passive_mean)
+            self.trim = trim_as_designed(self.settings, self.length.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
 
     def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
@@ -281,112 +155,13 @@ class Task:
             actions=len(self.actuator.places),
             channels=tuple(int(place) for place in self.actuator.places),
             force_limit=self.actuator.force_limit,
-            control_interval=self.control_interval,
+            control_interval=self.length.control_interval,
             speed=float(self.speed[lane]),
             span_length=self.plant.catenary.span_length,
             nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),
             catenary=self.plant.catenary,
             pantograph=self.known_pantograph,
         )
-
-    def step(
-        self,
-        action: Array,
-        skip: Flags | None = None,
-        results: Results | None = None,
-        *,
-        keep: bool = True,
-    ) -> bool:
-        """One control step of all lanes, but those to skip, under actions, (lanes, actions).
-
-        Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
-        default the task's own. Lanes that are skipped stay as they are; without ``keep``, they may be left
-        anyhow, to be reset next. Raises InputError, and changes nothing, for an action that is not finite, or
-        a lane whose episode has ended or not begun.
-        """
-        if self._any_over:
-            self._refuse_over(skip)
-        self._action[...] = action
-        if self.noise is not None:
-            self.noise.prepare(self.sensors, skip)
-        if self.odometers.drawn:
-            self.odometers.prepare(self.episode.odometer, skip)
-        if skip is None and results is None:
-            return self._told(self._plain_step(), self.results)  # the usual step, as short as it can be
-        results = results or self.results
-        if skip is None:
-            return self._told(self._threads.step(*results[1:]), results)
-        idle, lanes = self.episode.idle[: self.lanes], np.flatnonzero(skip)
-        idle[:] = skip
-        tables = self._tables if keep and self.plant.lanes_abreast > 1 else []
-        kept, told = [of_lanes(table, lanes) for table in tables], [each[:, lanes] for each in results[1:]]
-        answer = self._threads.step(*results[1:])
-        for table, values in zip(tables, kept, strict=True):
-            set_lanes(table, lanes, values)
-        if tables:
-            for each, before in zip(results[1:], told, strict=True):
-                each[:, lanes] = before
-        idle[:] = False
-        return self._told(answer, results, skip)
-
-    def _refuse_over(self, skip: Flags | None) -> None:
-        """Raise InputError where a lane that is not skipped has nothing to step."""
-        over = self._over if skip is None else self._over & ~skip
-        if over.any():
-            raise InputError(
-                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
-            )
-
-    def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
-        """What a kernel has answered: whether an episode has ended; InputError for a wrong action."""
-        if answer > 0:
-            ended = results.terminated | results.truncated
-            self._over |= ended if skip is None else ended & ~skip
-            self._any_over = bool(self._over.any())
-        if answer < 0:
-            lane = int(np.flatnonzero(~np.isfinite(self._action).all(axis=1))[0])
-            whose = f" of lane {lane}" if self.lanes > 1 else ""
-            raise InputError(f"The action{whose} must be finite, not {self._action[lane]}; check the policy.")
-        return answer > 0
-
-    @property
-    def _tables(self) -> list[Array]:
-        """All that a step changes of lanes that go in groups."""
-        plant = self.plant
-        return [*plant.run.table, *plant.actuators.table, *self.sensors.tables, self.episode.table]
-
-    def run_passively(self, watch: Callable[[Task], None] | None = None) -> None:
-        """Run all lanes, just reset, to their ends without actuators.
-
-        watch: called with the task now and then, after some control steps; it must change nothing.
-        """
-        ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
-        while not ended.all():
-            self.coast(np.where(ended, 0, at_once), self.results)
-            ended = self.results.terminated | self.results.truncated
-            if watch is not None:
-                watch(self)
-
-    @property
-    def _one_by_one(self) -> bool:
-        """Whether each lane can make control steps of its own, as many as its episode has at most."""
-        return self.plant.lanes_abreast == 1
-
-    def coast(self, steps: Any, results: Results) -> None:
-        """Control steps without control, (lanes,) of them in each lane, whose episode must not end before.
-
-        Where lanes go one by one a call makes all, none beyond an episode's end, and noise is drawn for the
-        observation behind the last alone.
-        """
-        action = np.zeros_like(self._action)
-        if not self._one_by_one:
-            for done in range(int(steps.max())):
-                self.step(action, steps <= done, results)
-            return
-        own = self.episode.steps[: self.lanes]
-        own[:] = steps
-        self.step(action, steps == 0, results)
-        own[:] = 1
 
     def figures(self, lane: int) -> Figures:
         """Figures of a lane's control steps so far, the same as its trajectory's summary.

@@ -10,17 +10,14 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
-from ..catalog import load_pantograph
 from ..control import Context, Task
 from ..control.action import checked
-from ..control.arguments import table, takes
-from ..control.entries import CENTRED, Asked
-from ..control.observation import BOUND, layout
-from ..control.settings import default, read_settings
+from ..control.arguments import takes
+from ..control.observation import BOUND
+from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
-from ..plant.actuators import actuator_settings
+from .description import described
 from .episodes import task_with_options, with_longest_episode
-from .ids import IDS
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, first_info, told
 from .one_thread import InUse, one_at_a_time, refuse
 from .settings import EnvironmentSettings, render_metadata
@@ -132,7 +129,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._usual.most_control_steps)
+        self._spec = with_longest_episode(spec, self._usual.length.most_control_steps)
 
     @property
     def context(self) -> Context:
@@ -255,32 +252,4 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return f"pantograph {plant.pantograph.name}, line {plant.catenary.name}"
 
 
-def _observation_table(kind: str) -> str:
-    """The entries of an observation as a Markdown table."""
-    actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, Asked(actuator, pantograph)).entries
-    rows = [
-        f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
-        for k, each in enumerate(entries)
-    ]
-    return "\n".join(
-        ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
-    )
-
-
-def _id_table(name: str) -> str:
-    """What an id sets, as a Markdown table."""
-    rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
-    return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
-
-
-def _indented(text: str) -> str:
-    return text.replace("\n", "\n    ")
-
-
-PantographEnv.__doc__ = (PantographEnv.__doc__ or "").format(
-    in_service=_indented(_id_table("Pantograph-v0")),
-    centred=_indented(_observation_table(CENTRED)),
-    observation=_indented(_observation_table(default("observation"))),
-    arguments=_indented(table(EnvironmentSettings)),
-)
+PantographEnv.__doc__ = described(PantographEnv.__doc__ or "")

@@ -94,7 +94,7 @@ class PantographVectorEnv(
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._limit or self.task.most_control_steps)
+        self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]

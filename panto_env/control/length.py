@@ -1,0 +1,84 @@
+"""How long episodes are: from distance, speed and drift to time steps and control steps."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..plant.drift import ahead, largest_drift, largest_lag
+from ..plant.plant import Plant
+from .extent import whole_steps
+from .settings import RunSettings, speed_range
+
+
+class EpisodeLength:
+    """Of all lanes of a task; each lane's speed, run-in and drift say how long its own episode is."""
+
+    def __init__(self, settings: RunSettings, plant: Plant) -> None:
+        """Raises InputError for a distance, a control interval or speeds that the plant is not good for."""
+        self._drift, self._plant = settings.speed_drift, plant
+        self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
+        if self.distance > plant.model.length:
+            raise InputError(
+                f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
+                f"not {self.distance:g} m; ask for more spans."
+            )
+        self.control_interval = settings.control_interval
+        self.control_steps = whole_steps(settings.control_interval, plant.time_step)
+        self.speed_range = self.check_speeds(settings.speed_kmh)
+        stride = self.speed_range[1] * self.control_interval
+        if self.distance < stride - 1e-9:
+            raise InputError(
+                f"distance must be at least the {stride:.4g} m that a train covers in one control interval "
+                f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
+            )
+        # In the slowest run, after the longest run-in.
+        slow = self.speed_range[0]
+        run_in = np.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
+        self.most_plant_steps = float(self.plant_steps(slow, run_in)) + self._late
+
+    def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
+        """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
+        low, high = (speed / 3.6 for speed in speed_range(speed_kmh))
+        drift = largest_drift(self._drift) / 3.6
+        for speed in (low - drift, high + drift):
+            self._plant.check_speed(speed)
+        return low, high
+
+    def plant_steps(self, speed: Any, run_in: Any = 0, drift: Array | None = None) -> Any:
+        """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
+
+        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins. drift: of
+        each speed, as ``Plant.start`` takes it.
+        """
+        stride = speed * self.control_interval
+        if drift is not None:
+            return np.array([self._drifting_steps(*each) for each in zip(stride, run_in, drift, strict=True)])
+        wanted = run_in + np.ceil(self.distance / stride - 1e-9)
+        possible = self._plant.model.length / stride + 1e-9
+        return np.maximum(1, np.floor(np.minimum(wanted, possible))) * self.control_steps
+
+    def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
+        """The same of one train that drifts about this stride of a control step (m)."""
+        lag = largest_lag(self._drift / 3.6)
+        most = min(self._plant.model.length, stride * run_in + lag + self.distance) + lag
+        steps = np.arange(math.ceil(most / stride) + 1.0)
+        position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # it rises
+        wanted = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
+        possible = np.searchsorted(position, self._plant.model.length + 1e-9) - 1
+        return max(1, min(int(wanted), int(possible))) * self.control_steps
+
+    @property
+    def _late(self) -> int:
+        """Plant steps by which a train may fall back."""
+        lag = largest_lag(self._drift / 3.6)
+        return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
+
+    @property
+    def most_control_steps(self) -> int:
+        """Control steps of an episode at the lowest speed: the longest that there are."""
+        return (int(self.plant_steps(self.speed_range[0])) + self._late) // self.control_steps

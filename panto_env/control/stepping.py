@@ -1,0 +1,192 @@
+"""Lanes that make control steps: kernels bound to their arrays, and whose episode has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+
+from ..backend import ALONE, LaneThreads, bind, copy_whole, new_shares, of_lanes, pack, set_lanes
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..plant.plant import Plant
+from ..plant.sensors import Noise, Odometers
+from .episode import Flags, Results, new_results
+from .step import control_steps, observe_start
+
+COASTED = 100
+"""Control steps without a policy that are made at once."""
+BOUND_ANEW = ("_action", "_threads", "_plain_step", "_observe_start")
+"""Attributes that ``Stepping._bind`` makes of the others."""
+
+
+class Stepping:
+    """Lanes of a plant with the arrays of their episodes, stepped together or some of them."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        lanes: int,
+        *,
+        episode: Any,
+        sensors: Any,
+        samples: Any,
+        running: Any,
+        noise: Noise | None,
+        odometers: Odometers,
+        entries: int,
+    ) -> None:
+        """Bind the kernels. entries: of an observation; sensors, samples, episode, running: named tuples of
+        arrays, as the kernels take them after those of the plant.
+        """
+        self.plant, self.lanes, self.noise, self.odometers = plant, lanes, noise, odometers
+        self.sensors, self.samples, self.episode, self.running = sensors, samples, episode, running
+        self._entries = entries
+        self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
+        self._any_over = True
+        self.results = self.new_results()
+        copy_whole(*self._arrays)
+        self._bind()
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    def _bind(self) -> None:
+        """Bind the kernels to the arrays."""
+        self._action = self.episode.action[:, : self.lanes].T
+        shares = new_shares()
+        packed = pack(*self.plant.arrays, *self._arrays, shares)
+        run = bind(control_steps, packed, *self.results[1:], 0, self.lanes, self.lanes, ALONE, 0)
+        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast, shares)
+        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results[1:]
+        self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
+        self._observe_start = bind(observe_start, packed, *self.results[1:], 0, self.lanes)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    def new_results(self) -> Results:
+        """Room for the results of a step."""
+        return new_results(self.lanes, self.episode.action.shape[1], self._entries)
+
+    def begin(self, lanes: Any) -> None:
+        """Take it that episodes begin in lanes, (n,)."""
+        self._over[lanes] = False
+        self._any_over = bool(self._over.any())
+
+    def observe_start(self, lanes: Any, results: Results) -> None:
+        """Write into results what is observed of lanes, (n,), that stand at their start."""
+        idle = self.episode.idle
+        idle[:] = True
+        idle[lanes] = False
+        self._observe_start(*results[1:], int(lanes.min()), int(lanes.max()) + 1)
+        idle[: self.lanes] = False
+
+    def step(
+        self,
+        action: Array,
+        skip: Flags | None = None,
+        results: Results | None = None,
+        *,
+        keep: bool = True,
+    ) -> bool:
+        """One control step of all lanes, but those to skip, under actions, (lanes, actions).
+
+        Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
+        default the task's own. Lanes that are skipped stay as they are; without ``keep``, they may be left
+        anyhow, to be reset next. Raises InputError, and changes nothing, for an action that is not finite, or
+        a lane whose episode has ended or not begun.
+        """
+        if self._any_over:
+            self._refuse_over(skip)
+        self._action[...] = action
+        if self.noise is not None:
+            self.noise.prepare(self.sensors, skip)
+        if self.odometers.drawn:
+            self.odometers.prepare(self.episode.odometer, skip)
+        if skip is None and results is None:
+            return self._told(self._plain_step(), self.results)  # the usual step, as short as it can be
+        results = results or self.results
+        if skip is None:
+            return self._told(self._threads.step(*results[1:]), results)
+        idle, lanes = self.episode.idle[: self.lanes], np.flatnonzero(skip)
+        idle[:] = skip
+        tables = self._tables if keep and self.plant.lanes_abreast > 1 else []
+        kept, told = [of_lanes(table, lanes) for table in tables], [each[:, lanes] for each in results[1:]]
+        answer = self._threads.step(*results[1:])
+        for table, values in zip(tables, kept, strict=True):
+            set_lanes(table, lanes, values)
+        if tables:
+            for each, before in zip(results[1:], told, strict=True):
+                each[:, lanes] = before
+        idle[:] = False
+        return self._told(answer, results, skip)
+
+    def _refuse_over(self, skip: Flags | None) -> None:
+        """Raise InputError where a lane that is not skipped has nothing to step."""
+        over = self._over if skip is None else self._over & ~skip
+        if over.any():
+            raise InputError(
+                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
+            )
+
+    def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
+        """What a kernel has answered: whether an episode has ended; InputError for a wrong action."""
+        if answer > 0:
+            ended = results.terminated | results.truncated
+            self._over |= ended if skip is None else ended & ~skip
+            self._any_over = bool(self._over.any())
+        if answer < 0:
+            lane = int(np.flatnonzero(~np.isfinite(self._action).all(axis=1))[0])
+            whose = f" of lane {lane}" if self.lanes > 1 else ""
+            raise InputError(f"The action{whose} must be finite, not {self._action[lane]}; check the policy.")
+        return answer > 0
+
+    @property
+    def _tables(self) -> list[Array]:
+        """All that a step changes of lanes that go in groups."""
+        plant = self.plant
+        return [*plant.run.table, *plant.actuators.table, *self.sensors.tables, self.episode.table]
+
+    def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
+        """Run all lanes, just reset, to their ends without actuators.
+
+        watch: called with this object now and then, after some control steps; it must change nothing.
+        """
+        ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
+        while not ended.all():
+            self.coast(np.where(ended, 0, at_once), self.results)
+            ended = self.results.terminated | self.results.truncated
+            if watch is not None:
+                watch(self)
+
+    @property
+    def _one_by_one(self) -> bool:
+        """Whether each lane can make control steps of its own, as many as its episode has at most."""
+        return self.plant.lanes_abreast == 1
+
+    def coast(self, steps: Any, results: Results) -> None:
+        """Control steps without control, (lanes,) of them in each lane, whose episode must not end before.
+
+        Where lanes go one by one a call makes all, none beyond an episode's end, and noise is drawn for the
+        observation behind the last alone.
+        """
+        action = np.zeros_like(self._action)
+        if not self._one_by_one:
+            for done in range(int(steps.max())):
+                self.step(action, steps <= done, results)
+            return
+        own = self.episode.steps[: self.lanes]
+        own[:] = steps
+        self.step(action, steps == 0, results)
+        own[:] = 1
