@@ -16,14 +16,16 @@ import pytest
 
 from panto_baselines.benchmark import seeds
 from panto_baselines.benchmark.controls import OTHER_SEED
-from panto_baselines.dataset import designs, make_designs, make_episodes, parts
+from panto_baselines.dataset import designs, make_designs, make_episodes
 from panto_baselines.dataset.checksums import LIST, verify
 from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs
 from panto_baselines.dataset.episodes import Stage
 from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
 from panto_configs import names
 from panto_env import InputError, simulate
+from panto_env.base.locks import alone_in
 from panto_env.base.settings import parse
+from panto_env.cluster import parts
 
 from .deadly import deadly
 
@@ -242,7 +244,7 @@ class TestParts:
         assert not (tmp_path / "out/pantograph").exists()
         other = panto(*command, "--episodes", 13, cwd=tmp_path)
         assert other.returncode == 2
-        assert "holds parts of another data set (its sets is" in other.stderr
+        assert "holds parts of another work (its sets is" in other.stderr
         assert kept.stat().st_mtime_ns == before
         done = panto(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
@@ -277,7 +279,10 @@ class TestParts:
         assert made < (tmp_path / "out/designs").stat().st_mtime_ns
 
     def test_two_processes_do_not_make_data_in_one_folder(self, tmp_path):
-        with parts.alone(tmp_path), pytest.raises(InputError, match="Another process makes data in"):
+        with (
+            alone_in(tmp_path, "makes data in"),
+            pytest.raises(InputError, match="Another process makes data in"),
+        ):
             make_designs.make_designs(few_designs(), tmp_path, workers=1)
 
 

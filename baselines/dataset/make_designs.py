@@ -12,15 +12,10 @@ from typing import Any
 
 from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
-
-from .checksums import LIST, write_checksums
-from .designs import simulate_designs
-from .designs_card import card, columns
-from .designs_settings import DesignsSettings
-from .parts import (
+from panto_env.base.locks import alone_in
+from panto_env.cluster.parts import (
     PARTS,
     Job,
-    alone,
     first_difference,
     identity,
     make_parts,
@@ -28,6 +23,11 @@ from .parts import (
     remove_if_empty,
     remove_parts,
 )
+
+from .checksums import LIST, write_checksums
+from .designs import simulate_designs
+from .designs_card import card, columns
+from .designs_settings import DesignsSettings
 
 PER_PART = 64
 """Designs in a part: some seconds of work."""
@@ -66,7 +66,7 @@ def make_designs(
     """
     made_of = identity("designs", settings.model_dump(mode="json"))
     folder = output / "designs"
-    with alone(output):
+    with alone_in(output, "makes data in"):
         there = (folder / LIST).is_file()
         if there:
             difference = first_difference(read_identity(folder / TABLE), made_of)

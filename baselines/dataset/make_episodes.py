@@ -13,15 +13,10 @@ from typing import Any
 from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder
-
-from .checksums import LIST, write_checksums
-from .episodes import Episode, check_places, make, read_episodes, record
-from .episodes_card import card, description, summary
-from .minari_set import KEY, check_minari, write_minari
-from .parts import (
+from panto_env.base.locks import alone_in
+from panto_env.cluster.parts import (
     PARTS,
     Job,
-    alone,
     first_difference,
     identity,
     make_parts,
@@ -29,6 +24,11 @@ from .parts import (
     remove_if_empty,
     remove_parts,
 )
+
+from .checksums import LIST, write_checksums
+from .episodes import Episode, check_places, make, read_episodes, record
+from .episodes_card import card, description, summary
+from .minari_set import KEY, check_minari, write_minari
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
 
 PER_PART = 10
@@ -67,7 +67,7 @@ def make_episodes(
     """
     check_minari()
     check_places(settings)
-    with alone(output):
+    with alone_in(output, "makes data in"):
         wanted = [_Wanted.of(settings, policy_set, output) for policy_set in settings.sets]
         kept = [each.kept() for each in wanted]
         jobs: dict[Path, Job] = {}

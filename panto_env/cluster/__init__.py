@@ -1,4 +1,4 @@
-"""Jobs beyond one machine: as tasks of a Ray cluster, where processes of this machine would do them."""
+"""Many jobs: on this machine or as tasks of a Ray cluster, and in parts that outlast what ends them."""
 
 from .spread import RayAddress, spread
 

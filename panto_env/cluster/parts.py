@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from panto_env.analysis.pool import Progress
-from panto_env.backend.cache import source_hash
-from panto_env.base.errors import InputError
-from panto_env.base.files import make_folder, write_whole
-from panto_env.base.locks import alone_in
-from panto_env.base.version import __version__, commit
-from panto_env.cluster import spread
+from ..analysis.pool import Progress
+from ..backend.cache import source_hash
+from ..base.errors import InputError
+from ..base.files import make_folder, write_whole
+from ..base.version import __version__, commit
+from .spread import spread
 
 Job = Callable[[Path], None]
 """Work that writes its result to a path; ``functools.partial`` of a function of a module."""
@@ -26,13 +24,13 @@ IDENTITY = "identity.json"
 
 
 def identity(kind: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What a data set is made of, plain data: results of the same are the same."""
+    """What a work is made of, plain data: results of the same are the same."""
     made_by = {"version": __version__, "commit": commit(), "sources": source_hash()}
     return {"kind": kind, **made_by, "settings": json.loads(json.dumps(settings))}
 
 
 def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
-    """Make the folder of a data set's parts, or go on with it; made_of: what ``identity`` gives.
+    """Make the folder of a work's parts, or go on with it; made_of: what ``identity`` gives.
 
     Raises InputError where it holds parts of something else.
     """
@@ -52,8 +50,8 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
         ) from error
     if difference:
         raise InputError(
-            f"{folder} holds parts of another data set ({difference}); finish that one, remove the folder, "
-            "or take another --output."
+            f"{folder} holds parts of another work ({difference}); finish that one, remove the folder, or "
+            "take another --output."
         )
 
 
@@ -90,11 +88,6 @@ def remove_if_empty(folder: Path) -> None:
     """Remove a folder in which nothing is left."""
     if folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
-
-
-def alone(folder: Path) -> AbstractContextManager[None]:
-    """Within it no other process makes data in the folder; as ``alone_in``."""
-    return alone_in(folder, "makes data in")
 
 
 def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
