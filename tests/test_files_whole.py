@@ -145,3 +145,28 @@ def test_an_interrupted_body_leaves_nothing(tmp_path):
         temporary.write_text("half")
         raise KeyboardInterrupt
     assert not os.listdir(tmp_path)
+
+
+def test_a_file_is_on_the_disk_before_it_takes_the_old_one_s_place(tmp_path, monkeypatch):
+    path, done = tmp_path / "result.json", []
+    path.write_text("old")
+    monkeypatch.setattr(os, "fsync", lambda number: done.append(os.fstat(number).st_ino))
+    with write_whole(path) as temporary:
+        temporary.write_text("new")
+        written = temporary.stat().st_ino
+    assert done == [written] == [path.stat().st_ino]
+    assert path.read_text() == "new"
+
+
+def test_a_file_that_does_not_reach_the_disk_leaves_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "result.json"
+    path.write_text("old")
+
+    def fail(number):
+        raise OSError(errno.EIO, "no")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(InputError, match="cannot be written"), write_whole(path) as temporary:
+        temporary.write_text("new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]

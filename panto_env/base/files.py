@@ -36,6 +36,7 @@ def write_whole(path: str | Path) -> Iterator[Path]:
             umask = os.umask(0)
             os.umask(umask)
             temporary.chmod(0o666 & ~umask)
+            _reach_the_disk(temporary)
             temporary.replace(target)
         except OSError as error:
             raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
@@ -43,6 +44,12 @@ def write_whole(path: str | Path) -> Iterator[Path]:
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+def _reach_the_disk(path: Path) -> None:
+    """Wait until a file is on the disk: else a power failure may leave its name without its content."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def regular_file(path: str | Path) -> Path:
