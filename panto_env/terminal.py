@@ -144,3 +144,14 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
     ) as progress:
         bar = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(bar, completed=done, total=total)
+
+
+@contextmanager
+def counting_on(what: str, folder: Path) -> Iterator[Callable[[int, int], None]]:
+    """The same of work that keeps its parts in a folder: one that is interrupted says how it goes on."""
+    try:
+        with counting(what) as progress:
+            yield progress
+    except KeyboardInterrupt as error:
+        progress_console.print(f"Stopped. To continue, repeat the command ({folder}).", markup=False)
+        raise typer.Exit(130) from error

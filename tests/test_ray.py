@@ -25,7 +25,7 @@ from panto_agents.settings import Training, parse_training
 from panto_agents.trainings import train_all
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_baselines.tuning.tune import tune
+from panto_baselines.tuning.parts import tune
 from panto_env import InputError
 from panto_env.cluster import spread, tasks
 from panto_env.control.settings import run_settings
@@ -166,10 +166,11 @@ def test_a_machine_that_dies_loses_no_job(tmp_path):
     assert results[2:] == ["0", "1", "2", "3"]
 
 
-def test_gains_are_those_that_processes_find(two_nodes):
+def test_gains_are_those_that_processes_find(two_nodes, tmp_path):
     settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
     given = {"speeds_kmh": (250.0, 300.0), "seeds": 1, "passes": 40}
-    assert tune("skyhook", settings, **given, ray=two_nodes) == tune("skyhook", settings, **given, workers=1)
+    on_ray = tune(tmp_path / "ray", "skyhook", settings, **given, ray=two_nodes)
+    assert on_ray == tune(tmp_path / "here", "skyhook", settings, **given, workers=1)
 
 
 def training(seed: int, **changes) -> Training:

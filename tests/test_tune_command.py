@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +15,11 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark import seeds
 from panto_baselines.policies.gains import load_gains
-from panto_baselines.tuning import tune as tuning
+from panto_baselines.tuning import parts
 from panto_baselines.tuning.command import tune
 from panto_baselines.tuning.gauss_newton import DAMPINGS
-from panto_env import simulate
+from panto_env import InputError, simulate
+from panto_env.control.settings import run_settings
 
 SMALL = ("--speed", "350", "--seeds", "1", "--passes", "11", "--workers", "1")
 
@@ -66,8 +70,66 @@ def test_what_it_cannot_do_is_said_at_once(
 ) -> None:
     file = tmp_path / "lqg.toml"
     file.write_text('policy = "lqg"\n')
-    monkeypatch.setattr(tuning, "tune", None)  # nothing may be run
+    monkeypatch.setattr(parts, "tune", None)  # nothing may be run
     result = called(*(each.format(lqg=file) for each in arguments), *SMALL)
     assert result.exit_code != 0
     assert words in str(result.exception)
     assert file.read_text() == 'policy = "lqg"\n'
+
+
+KILLED = """
+import sys, time
+from panto_baselines.tuning import parts
+from panto_env.cli import main
+
+forever, tune_at = sys.argv.pop() == "forever", parts.tune_at
+
+def told(policy, settings, speed_kmh, *more):
+    if forever and speed_kmh > 260:
+        time.sleep(3600)
+    print("tuned", speed_kmh, flush=True)
+    return tune_at(policy, settings, speed_kmh, *more)
+
+def here(jobs, take, **_):
+    for place, job in enumerate(jobs):
+        take(place, job())
+
+parts.tune_at, parts.spread = told, here
+main()
+"""
+
+
+def test_a_tuning_that_is_killed_loses_no_finished_speed(tmp_path: Path) -> None:
+    line = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--actuator", "ideal")
+    small = ("tune", "skyhook", *line, "--line-condition", "new", "--speed", "250", "--speed", "300")
+    small += ("--seeds", "1", "--passes", "11", "--output")
+
+    def order(file: str, how: str) -> list[str]:
+        return [sys.executable, "-c", KILLED, *small, file, how]
+
+    with subprocess.Popen(order("a.toml", "forever"), cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+        while not (tmp_path / ".a-parts" / "250.0.json").exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.kill()  # SIGKILL, at the second speed
+    assert process.returncode != 0
+    assert not (tmp_path / "a.toml").exists()
+    for file, tuned in (("a.toml", ["300.0"]), ("b.toml", ["250.0", "300.0"])):
+        done = subprocess.run(order(file, "now"), cwd=tmp_path, text=True, capture_output=True)
+        assert done.returncode == 0, done.stderr
+        assert [row.split()[1] for row in done.stdout.splitlines() if row.startswith("tuned")] == tuned
+    once, anew = (load_gains(tmp_path / file).tunings[0] for file in ("a.toml", "b.toml"))
+    assert once.model_copy(update={"command": anew.command}) == anew
+    assert {path.name for path in tmp_path.iterdir()} == {"a.toml", "b.toml"}
+
+
+def test_parts_of_another_tuning_are_not_taken(tmp_path: Path) -> None:
+    settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
+    given: dict[str, Any] = {"speeds_kmh": (250.0,), "passes": 11, "workers": 1}
+    first = parts.tune(tmp_path, "skyhook", settings, seeds=1, **given)
+    assert parts.tune(tmp_path, "skyhook", settings, seeds=1, **given) == first
+    with pytest.raises(InputError, match=r"holds parts of another work \(its seeds is 1, this is 2\)"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=2, **given)
+    part = tmp_path / "250.0.json"
+    part.write_text(part.read_text().replace("0.", "1.", 1))
+    with pytest.raises(InputError, match="damaged or was changed"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=1, **given)

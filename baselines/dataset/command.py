@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
 import typer
 
@@ -13,9 +12,8 @@ from panto_env.base.files import make_folder
 from panto_env.base.settings import parse
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Json, console, counting, print_json, print_table, progress_console
+from panto_env.terminal import Json, console, counting_on, print_json, print_table
 
-T = TypeVar("T")
 dataset = typer.Typer(no_args_is_help=True, help="Make data to learn from, and check it.")
 Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)]
 
@@ -50,10 +48,9 @@ def episodes(
     if episodes is not None:
         sets = [each.model_dump() | {"episodes": episodes} for each in settings.sets]
         settings = parse(type(settings), settings.model_dump() | {"sets": sets}, str(config))
-    made = _going_on(
-        output,
-        lambda progress: make_episodes(settings, output, workers=workers, ray=ray, progress=progress),
-    )
+    make_folder(output)
+    with counting_on("parts", output) as progress:
+        made = make_episodes(settings, output, workers=workers, ray=ray, progress=progress)
     if json:
         print_json([asdict(each) | {"folder": str(each.folder)} for each in made])
         return
@@ -87,9 +84,9 @@ def designs(
     settings = load_designs(config)
     if count is not None:
         settings = parse(type(settings), settings.model_dump() | {"count": count}, str(config))
-    made = _going_on(
-        output, lambda progress: make_designs(settings, output, workers=workers, ray=ray, progress=progress)
-    )
+    make_folder(output)
+    with counting_on("parts", output) as progress:
+        made = make_designs(settings, output, workers=workers, ray=ray, progress=progress)
     if json:
         print_json(asdict(made) | {"folder": str(made.folder)})
         return
@@ -113,14 +110,3 @@ def verify(
         return
     for folder, files in found:
         console.print(f"{folder}: {files} files as listed", highlight=False)
-
-
-def _going_on(output: Path, work: Callable[[Any], T]) -> T:
-    """The result of work that shows its progress, and can be gone on with where it is interrupted."""
-    make_folder(output)
-    try:
-        with counting("parts") as progress:
-            return work(progress)
-    except KeyboardInterrupt as error:
-        progress_console.print(f"Stopped. To continue, repeat the command ({output}).")
-        raise typer.Exit(130) from error

@@ -9,7 +9,7 @@ import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.cluster import RayAddress
-from panto_env.terminal import Force, Json, counting, print_json, print_table, this_command, written_last
+from panto_env.terminal import Force, Json, counting_on, print_json, print_table, this_command, written_last
 
 
 @with_settings(
@@ -52,16 +52,19 @@ def tune(
     Least squares of the contact force at a mean force like the passive one's, on training seeds; the table
     shows what the gains do on selection seeds. Actuator and sensors are "realistic", the line "fair", unless
     told otherwise. Gains of the same line, pantograph and place in the file are replaced only with --force.
+    A tuning that was ended loses the speeds that were in work; the same command goes on with it.
     """
+    from panto_env.cluster.parts import remove_parts
     from panto_env.control import Task
     from panto_env.control.settings import run_settings
 
     from ..benchmark.seeds import TRAINING
     from ..policies.gains import gain_file
+    from .parts import parts_of
+    from .parts import tune as run
     from .store import check_gain_file, make_tuning, store
     from .tables import table
     from .tune import PASSES, SEEDS, SPEEDS_KMH, tunable
-    from .tune import tune as run
 
     settings = run_settings(
         {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
@@ -71,12 +74,24 @@ def tune(
     names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS
     speeds = sorted(set(speed or SPEEDS_KMH))
-    with counting("speeds") as progress:
-        tuned = run(policy, settings, speeds, count, passes or PASSES, workers, progress, ray)
+    parts = parts_of(path)
+    with counting_on("speeds", parts) as progress:
+        tuned = run(
+            parts,
+            policy,
+            settings,
+            speeds,
+            count,
+            passes or PASSES,
+            workers=workers,
+            ray=ray,
+            progress=progress,
+        )
     command = this_command()
     tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
     with written_last() as later:
         later(store, path, policy, tuning)
+        later(remove_parts, parts)
         if json:
             print_json(tuning.model_dump(mode="json"))
             return

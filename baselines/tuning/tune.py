@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
-from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.settings import RunSettings
 from panto_env.policies import maker_of, policy_names
@@ -59,29 +55,12 @@ def tunable(name: str) -> type[TunableLaw]:
     return able[name]
 
 
-def tune(
-    policy: str,
-    settings: RunSettings,
-    speeds_kmh: Sequence[float] = SPEEDS_KMH,
-    seeds: int = SEEDS,
-    passes: int = PASSES,
-    workers: int | None = None,
-    progress: Progress | None = None,
-    ray: str | None = None,
-) -> list[Tuned]:
-    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at each speed.
-
-    seeds: how many training seeds. passes: budget of one speed. Training runs with ``accuracy="fast"``, the
-    selection seeds run as the settings say. workers, ray: as ``spread`` takes them; the gains depend on
-    neither. Raises InputError for a policy without gains.
-    """
-    tunable(policy)
-    jobs = [partial(tune_at, policy, settings, speed, seeds, passes) for speed in speeds_kmh]
-    return spread(jobs, workers=workers, ray=ray, progress=progress)
-
-
 def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:
-    """As ``tune``, at one speed (km/h)."""
+    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at one speed (km/h).
+
+    seeds: how many training seeds. passes: budget. Training runs with ``accuracy="fast"``, the selection
+    seeds run as the settings say.
+    """
     kind, training = tunable(policy), TRAINING[:seeds]
     at_speed = settings.model_copy(update={"speed_kmh": (speed_kmh, speed_kmh)})
     fast = at_speed.model_copy(update={"accuracy": "fast"})

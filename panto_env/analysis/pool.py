@@ -19,6 +19,8 @@ Job = Callable[[], T]
 """Work without arguments; ``functools.partial`` of a function of a module goes to another process."""
 Progress = Callable[[int, int], None]
 """Called with the number of jobs done and of all."""
+Take = Callable[[int, T], None]
+"""Called with the place of a job among all and its result, as soon as it is there."""
 
 MOST_PASSES = 100_000
 """That a sweep or a benchmark may have: an hour and more, on two cores."""
@@ -32,7 +34,11 @@ def check_passes(count: int, what: str) -> None:
 
 
 def in_processes(
-    jobs: Sequence[Job[T]], *, workers: int | None = None, progress: Progress | None = None
+    jobs: Sequence[Job[T]],
+    *,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    take: Take[T] | None = None,
 ) -> list[T]:
     """Results of jobs that run in fresh processes, one per core by default.
 
@@ -46,7 +52,7 @@ def in_processes(
             workers_for(len(jobs), workers), mp_context=get_context("spawn"), initializer=end_with_parent
         )
         try:
-            return _through(executor, jobs, progress)
+            return _through(executor, jobs, progress, take)
         except BrokenProcessPool as error:
             raise InputError(
                 "A worker process died; in a script, make this call under `if __name__ == '__main__':`."
@@ -85,19 +91,24 @@ def workers_for(jobs: int, workers: int | None) -> int:
     return max(1, min(cores() if workers is None else workers, jobs))
 
 
-def collect(futures: Sequence[Future[T]], progress: Progress | None) -> list[T]:
+def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[T] | None = None) -> list[T]:
     """Results of futures, in their order, with a report as each is done; raises the first error at once."""
+    places = {future: place for place, future in enumerate(futures)}
     for done, future in enumerate(as_completed(futures), start=1):
-        future.result()
+        result = future.result()
+        if take is not None:
+            take(places[future], result)
         if progress is not None:
             progress(done, len(futures))
     return [future.result() for future in futures]
 
 
-def _through(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:
+def _through(
+    executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None, take: Take[T] | None = None
+) -> list[T]:
     """Submit all jobs, collect their results, and shut the executor down."""
     try:
-        return collect([executor.submit(job) for job in jobs], progress)
+        return collect([executor.submit(job) for job in jobs], progress, take)
     except (KeyboardInterrupt, SystemExit):
         if isinstance(executor, ProcessPoolExecutor):
             for process in list((executor._processes or {}).values()):  # a job may take many minutes yet

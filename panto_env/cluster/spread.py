@@ -7,7 +7,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from ..analysis.pool import Job, Progress, in_processes
+from ..analysis.pool import Job, Progress, Take, in_processes
 from ..base.errors import InputError
 from .tasks import on_ray
 
@@ -29,16 +29,18 @@ def spread(
     workers: int | None = None,
     ray: str | None = None,
     progress: Progress | None = None,
+    take: Take[T] | None = None,
 ) -> list[T]:
     """Results of jobs, in their order, which must not depend on where a job runs.
 
     workers: processes of this machine, one per core by default. ray: address of a cluster to work on
-    instead. Raises InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
+    instead. take: called here with the place and the result of each job, as soon as it is there. Raises
+    InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
     """
     if ray is None:
-        return in_processes(jobs, workers=workers, progress=progress)
+        return in_processes(jobs, workers=workers, progress=progress, take=take)
     if workers is not None:
         raise InputError(
             "The workers of a Ray cluster are as many as its CPUs; leave out either workers or ray."
         )
-    return on_ray(jobs, ray, progress=progress)
+    return on_ray(jobs, ray, progress=progress, take=take)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, collect
+from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, Take, collect
 from ..backend.cache import source_hash
 from ..base.errors import InputError
 from ..base.machine import cores
@@ -33,7 +33,13 @@ class Home(NamedTuple):
     folder: Path  # to which relative paths of jobs refer
 
 
-def on_ray(jobs: Sequence[Job[T]], address: str, *, progress: Progress | None = None) -> list[T]:
+def on_ray(
+    jobs: Sequence[Job[T]],
+    address: str,
+    *,
+    progress: Progress | None = None,
+    take: Take[T] | None = None,
+) -> list[T]:
     """Results of jobs, in their order, that run as tasks of a Ray cluster, one on each of its CPUs.
 
     address: of the cluster's head, as "10.0.0.5:6379"; "auto", the one that runs on this machine; or LOCAL. A
@@ -49,7 +55,7 @@ def on_ray(jobs: Sequence[Job[T]], address: str, *, progress: Progress | None = 
         # An error of the job itself is final: it would be the same again.
         task = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(_run)
         try:
-            return collect([task.remote(job, home).future() for job in jobs], progress)
+            return collect([task.remote(job, home).future() for job in jobs], progress, take)
         except ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, ray.exceptions.RaySystemError):
                 raise InputError(

@@ -1,0 +1,75 @@
+"""A tuning kept speed by speed beside its file of gains: one that was ended goes on with what is missing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from panto_env.analysis.pool import Progress
+from panto_env.base.checked_json import read_checked, with_checksum
+from panto_env.base.files import write_whole
+from panto_env.base.locks import alone_in
+from panto_env.cluster import spread
+from panto_env.cluster.parts import identity, open_parts
+from panto_env.control.settings import RunSettings
+
+from .tune import PASSES, SEEDS, SPEEDS_KMH, Tuned, tunable, tune_at
+
+
+def parts_of(gains: Path) -> Path:
+    """The folder of what is tuned for a file of gains, until it is stored there; hidden."""
+    return gains.with_name(f".{gains.stem}-parts")
+
+
+def tune(
+    folder: Path,
+    policy: str,
+    settings: RunSettings,
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    seeds: int = SEEDS,
+    passes: int = PASSES,
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> list[Tuned]:
+    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at each speed.
+
+    Each speed is written into the folder once it is done, and one that is there is taken. seeds, passes: as
+    of ``tune_at``. workers, ray: as ``spread`` takes them; the gains depend on neither. Raises InputError for
+    a policy without gains, where the folder holds parts of another tuning, or one that is damaged, and where
+    another process tunes into it.
+    """
+    tunable(policy)
+    asked = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
+    with alone_in(folder, "tunes into"):
+        open_parts(folder, identity("tuning", asked))
+        parts = {speed: folder / f"{speed!r}.json" for speed in speeds_kmh}
+        missing = [speed for speed, path in parts.items() if not path.is_file()]
+        kept = len(parts) - len(missing)
+        if progress is not None:
+            progress(kept, len(parts))
+        spread(
+            [partial(tune_at, policy, settings, speed, seeds, passes) for speed in missing],
+            workers=workers,
+            ray=ray,
+            progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
+            take=lambda place, tuned: _write(parts[missing[place]], tuned),
+        )
+        return [_read(path) for path in parts.values()]
+
+
+def _write(path: Path, tuned: Tuned) -> None:
+    with write_whole(path) as temporary:
+        temporary.write_text(json.dumps(with_checksum(asdict(tuned))), encoding="utf-8")
+
+
+def _read(path: Path) -> Tuned:
+    values: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in read_checked(path).items()
+    }
+    return Tuned(**values)
