@@ -224,7 +224,7 @@ class TestEpisodes:
 class TestParts:
     def test_killed_in_the_middle_it_goes_on_and_ends_the_same(self, minari, tmp_path, monkeypatch):
         monkeypatch.setattr(make_episodes, "PER_PART", 1)
-        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz")
+        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz.sha256")
         (tmp_path / "tiny.toml").write_text(
             f"""
             title = "tiny"
@@ -264,7 +264,7 @@ class TestParts:
         command = [PANTO, "dataset", "designs", "few.toml", "--output", "out", "--workers", "1"]
         process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
         first = tmp_path / "out/.parts/designs/0000000.parquet"
-        while not first.exists():
+        while not first.with_name(f"{first.name}.sha256").exists():
             assert process.poll() is None
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
@@ -399,13 +399,19 @@ def test_without_minari_its_extra_is_named(monkeypatch, tmp_path):
         make_episodes.make_episodes(settings(), tmp_path, workers=1)
 
 
-def test_kept_parts_count_as_done(tmp_path):
-    told = []
-    jobs = {tmp_path / f"{k}.txt": partial(Path.write_text, data="") for k in range(0)}
-    (tmp_path / "0.txt").write_text("there")
-    jobs[tmp_path / "0.txt"] = partial(_never)
-    parts.make_parts(jobs, workers=1, progress=lambda *done: told.append(done))
+def test_kept_parts_count_as_done_and_damaged_ones_are_made_again(tmp_path):
+    told, path = [], tmp_path / "0.txt"
+    parts.make_parts({path: partial(_text, "whole")}, workers=1)
+    parts.make_parts({path: _never}, workers=1, progress=lambda *done: told.append(done))
     assert told == [(1, 1)]
+    for damage in (lambda: path.write_text("Whole"), path.unlink):
+        damage()
+        parts.make_parts({path: partial(_text, "again")}, workers=1)
+        assert path.read_text() == "again"
+
+
+def _text(text, path):
+    path.write_text(text)
 
 
 def _never(path):

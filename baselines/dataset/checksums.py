@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 from panto_env.base.errors import InputError
-from panto_env.base.files import write_whole
+from panto_env.base.files import sha256_of, write_whole
 from panto_env.base.paths import check_path
 
 LIST = "SHA256SUMS"
@@ -14,7 +13,7 @@ LIST = "SHA256SUMS"
 
 def write_checksums(folder: Path) -> None:
     """Write the list of all files of a folder but hidden ones."""
-    lines = [f"{_checksum(folder / name)}  {name}\n" for name in _files(folder)]
+    lines = [f"{sha256_of(folder / name)}  {name}\n" for name in _files(folder)]
     with write_whole(folder / LIST) as temporary:
         temporary.write_text("".join(lines), encoding="utf-8", newline="")
 
@@ -47,7 +46,7 @@ def _verify(folder: Path) -> int:
     for name, checksum in listed.items():
         if name not in found:
             raise InputError(f"{folder / name} is missing; make or download the data set anew.")
-        if _checksum(folder / name) != checksum:
+        if sha256_of(folder / name) != checksum:
             raise InputError(
                 f"{folder / name} is not what {LIST} says: it was damaged or changed; make or download the "
                 "data set anew."
@@ -66,8 +65,3 @@ def _files(folder: Path) -> list[str]:
         for path in paths
         if path.name != LIST and not any(p.startswith(".") for p in path.parts)
     )
-
-
-def _checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

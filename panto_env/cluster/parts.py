@@ -12,7 +12,7 @@ from typing import Any
 from ..analysis.pool import Progress
 from ..backend.cache import source_hash
 from ..base.errors import InputError
-from ..base.files import make_folder, write_whole
+from ..base.files import make_folder, sha256_of, write_whole
 from ..base.version import __version__, commit
 from .spread import spread
 
@@ -62,11 +62,11 @@ def make_parts(
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Make all files, each by its job; those that are there are kept.
+    """Make all files, each by its job; those that are there and fit their checksum are kept.
 
     workers, ray: as ``spread`` takes them. progress: called with the files there, and of all.
     """
-    missing = {path: job for path, job in jobs.items() if not path.is_file()}
+    missing = {path: job for path, job in jobs.items() if not _whole(path)}
     kept = len(jobs) - len(missing)
     if progress is not None:
         progress(kept, len(jobs))
@@ -107,3 +107,17 @@ def _short(value: Any) -> str:
 def _write(job: Job, path: Path) -> None:
     with write_whole(path) as temporary:
         job(temporary)
+    with write_whole(_checksum_file(path)) as temporary:
+        temporary.write_text(sha256_of(path), encoding="utf-8")
+
+
+def _whole(path: Path) -> bool:
+    """Whether a part is there as it was written."""
+    try:
+        return _checksum_file(path).read_text(encoding="utf-8") == sha256_of(path)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _checksum_file(path: Path) -> Path:
+    return path.with_name(f"{path.name}.sha256")
