@@ -1,6 +1,5 @@
 """Single bits flipped in files: each is refused when it is read, or says what it said before."""
 
-import dataclasses
 import json
 import random
 import shutil
@@ -26,6 +25,7 @@ from panto_env.studies import write as write_study
 from panto_env.studies.throughput import study as speed
 
 from .documents import ROOT
+from .said import said
 
 FLIPS = 220
 
@@ -40,19 +40,6 @@ def saved(run, tmp_path_factory):
     path = tmp_path_factory.mktemp("saved") / "run.parquet"
     run.save(path)
     return path
-
-
-def said(value):
-    """Anything that is read from a file, as text in which every bit of every number shows."""
-    if dataclasses.is_dataclass(value):
-        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    if isinstance(value, np.ndarray):
-        return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
-    if isinstance(value, dict):
-        return str({key: said(each) for key, each in value.items()})
-    if isinstance(value, tuple | list):
-        return str([said(each) for each in value])
-    return repr(value)
 
 
 def flipped(source, target, read, places=None):

@@ -25,8 +25,9 @@ from panto_env import InputError
 from panto_env.base.errors import UncheckedWarning
 from panto_env.base.shown import LONGEST_LINE
 
+from ..said import said
 from .processes import run_all
-from .subjects import Subject, said, subjects
+from .subjects import Subject, subjects
 
 Generator = np.random.Generator
 AT_ONCE = 25

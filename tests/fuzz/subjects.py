@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
-from pydantic import BaseModel
 
 from panto_agents.ablation import load_ablation
 from panto_agents.model_file import read_model
@@ -116,18 +112,3 @@ def _settings(path: Path) -> Any:
     run = RunFolder(path.parent)
     run.settings = path
     return run.read_settings()
-
-
-def said(value: Any) -> str:
-    """Anything that is read from a file, as text in which every bit of every number shows."""
-    if isinstance(value, BaseModel):
-        value = value.model_dump()
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    if isinstance(value, np.ndarray):
-        return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
-    if isinstance(value, dict):
-        return str({key: said(each) for key, each in value.items()})
-    if isinstance(value, tuple | list):
-        return str([said(each) for each in value])
-    return repr(value)
