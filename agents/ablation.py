@@ -17,7 +17,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
 
-from .algorithm import Count
+from .ranges import Count
 from .run_folder import RunFolder
 from .settings import Training, parse_training
 from .trainings import train_all

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from panto_env.base.settings import NonNegative, Positive, Settings
 
-from .algorithm import MOST_KEPT
+from .ranges import MOST_KEPT
 
 _Count = Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)]
 

@@ -10,7 +10,8 @@ from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive
 
 from .actor import Actor
-from .algorithm import MOST_KEPT, Algorithm, Count, Share
+from .algorithm import Algorithm
+from .ranges import MOST_KEPT, Count, Share
 
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError

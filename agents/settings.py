@@ -19,10 +19,11 @@ from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
 
-from .algorithm import Algorithm, Count, Share
+from .algorithm import Algorithm
 from .base_policy import check_wishes
 from .cloning_settings import Cloning
 from .ppo import PPO
+from .ranges import Count, Share
 from .sac import SAC
 
 ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}

@@ -40,7 +40,7 @@ def heads(name: str, env: PantographEnv) -> str:
     rows = [
         ("Action space", f"`{env.action_space}`"),
         ("Observation space", f"`{env.observation_space}`"),
-        ("Control step", f"{1e3 * env.task.control_interval:g} ms"),
+        ("Control step", f"{1e3 * env.task.length.control_interval:g} ms"),
         ("Import", f'`gymnasium.make("panto_env:{name}")`'),
         ("Many at once", f'`gymnasium.make_vec("panto_env:{name}", num_envs=64)`'),
     ]
