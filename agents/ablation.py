@@ -106,7 +106,8 @@ def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         if value == "default":
             made.pop(key, None)
         elif isinstance(value, Mapping):
-            made[key] = _changed(table.get(key, {}), value)
+            before = table.get(key)
+            made[key] = _changed(before if isinstance(before, Mapping) else {}, value)
         else:
             made[key] = value
     return made

@@ -129,6 +129,7 @@ def test_the_interval_of_a_difference_is_that_of_its_normal_law():
         ('harmonics = "default"', None),
         ("harmonic = 2", "The variant 'one harmonic': .*unknown key 'harmonic'"),
         ("harmonics = -1", "The variant 'one harmonic'"),
+        ("harmonics = { of = 2 }", "The variant 'one harmonic'"),
     ],
 )
 def test_what_is_wrong_is_said_of_the_variant(config, change, message):
