@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+from panto_env.base.checked_json import read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
 from panto_env.base.locks import alone_in
@@ -79,28 +80,20 @@ class RunFolder:
 
     def read_settings(self) -> Training:
         """Settings of the run. Raises InputError where the file is damaged."""
-        try:
-            table = json.loads(self.settings.read_text(encoding="utf-8"))
-            if not isinstance(table, dict):
-                raise ValueError("it holds no table")
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(
-                f"{self.settings} could not be read ({error}); train into another --output."
-            ) from error
+        table = read_checked(self.settings)
+        if not isinstance(table, dict):
+            raise InputError(f"{self.settings} holds no settings; train into another --output.")
         return parse_training(table, str(self.settings))
 
     def write_settings(self, training: Training) -> None:
         """Note what the run is; with it a new run begins."""
         # First of all, so that whatever a killed run leaves is either nothing or can be resumed.
-        with write_whole(self.settings) as temporary:
-            temporary.write_text(training.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        _write_json(self.settings, training.model_dump(mode="json"))
         make_folder(self.checkpoints)
 
     def note_cloning(self, policy: str, told: Any) -> None:
         """Write how far the agent is from the policy that it starts from (``CloningError``)."""
-        with write_whole(self.cloning) as temporary:
-            text = json.dumps({"policy": policy} | told.model_dump(), indent=1)
-            temporary.write_text(text + "\n", encoding="utf-8")
+        _write_json(self.cloning, {"policy": policy} | told.model_dump(mode="json"))
 
     def checkpoint(self, steps: int) -> Path:
         """Path of the checkpoint at ``steps``."""
@@ -170,6 +163,11 @@ class RunFolder:
         writer.writerows(rows)
         with write_whole(self.evaluations) as temporary:
             temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
+
+
+def _write_json(path: Path, table: Mapping[str, Any]) -> None:
+    with write_whole(path) as temporary:
+        temporary.write_text(json.dumps(with_checksum(table), indent=1) + "\n", encoding="utf-8")
 
 
 def _counts(path: Path) -> bool:

@@ -5,6 +5,7 @@ import random
 import shutil
 import warnings
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from panto_agents.add_checksums import add_checksum
 from panto_agents.model_file import read_model
 from panto_agents.model_parts import CHECKSUMS
+from panto_agents.run_folder import RunFolder
+from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER
 from panto_baselines.oracle import stored
 from panto_baselines.report.result import read_result
@@ -95,6 +98,16 @@ def test_the_numbers_of_a_study(tmp_path):
     assert read_checked(path) == outcome.as_dict()
     assert json.loads(path.read_text())[CHECKSUM]
     refused, same = flipped(path, tmp_path / "flipped.json", read_checked)
+    assert refused > FLIPS / 2
+    assert refused + same == FLIPS
+
+
+def test_the_settings_of_a_training(tmp_path):
+    run = RunFolder(tmp_path / "run")
+    run.path.mkdir()
+    run.write_settings(load_training(ROOT / "configs" / "agent-high-speed.toml"))
+    source = Path(shutil.copy(run.settings, tmp_path / "whole.json"))
+    refused, same = flipped(source, run.settings, lambda _: run.read_settings())
     assert refused > FLIPS / 2
     assert refused + same == FLIPS
 

@@ -70,7 +70,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "benchmark": Subject("JSON", ROOT / "docs" / "benchmark" / "head.json", read_result, checked=True),
         "oracles": Subject("JSON", stored.RESULTS, stored.read, checked=True),
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
-        "settings of a training": Subject("JSON", run.settings, _settings),
+        "settings of a training": Subject("JSON", run.settings, _settings, checked=True),
     }
     models = {f"model {path.stem}": Subject("model", path, read_model, True) for path in MODELS.glob("*.zip")}
     return found | models
