@@ -20,6 +20,7 @@ from rich.text import Text
 from .base.errors import InputError
 from .base.files import PICTURES, check_output, finite
 from .base.plain_characters import shows_all
+from .base.standard_streams import say
 from .base.table import Alarm, Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
@@ -44,7 +45,7 @@ def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[st
 def announce_overwriting(path: str | Path) -> None:
     """Say, in a line on standard error, that a file which is there will be overwritten."""
     if Path(path).is_file():
-        print(f"panto: {path} exists already and will be overwritten.", file=sys.stderr)
+        say(f"{path} exists already and will be overwritten.")
 
 
 def refuse_overwriting(path: str | Path, force: bool) -> None:
@@ -76,8 +77,7 @@ def alert(words: str, rest: str = "", to: Console | None = None) -> None:
 
 def print_json(value: Any) -> None:
     """Print JSON to standard output; figures that are not numbers become null."""
-    json.dump(finite(value), sys.stdout, indent=2, ensure_ascii=not shows_all(sys.stdout))
-    sys.stdout.write("\n")
+    print(json.dumps(finite(value), indent=2, ensure_ascii=not shows_all(sys.stdout)))
 
 
 def this_command() -> str:
@@ -123,7 +123,6 @@ def written_last() -> Iterator[Callable[..., None]]:
         for write, arguments in jobs:
             attempt(write, *arguments)
         if errors:
-            sys.stdout.flush()
             raise errors[0]
 
 

@@ -6,7 +6,7 @@ import signal
 import sys
 import warnings
 from types import FrameType
-from typing import Annotated, Any, NoReturn, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer import Abort
@@ -15,6 +15,7 @@ from ..base import plugins
 from ..base.errors import AccuracyWarning, InputError, UncheckedWarning
 from ..base.plain_characters import show_always
 from ..base.shown import one_line
+from ..base.standard_streams import guarded_streams, say
 from ..base.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
@@ -28,24 +29,32 @@ def main() -> None:
     """
     show_always()
     warnings.showwarning = _show_warning
+    with guarded_streams():
+        sys.exit(_run())
+
+
+def _run() -> int:
+    """Exit status of the command."""
     stopped = _stop_on_sigterm()
+    status: int | None
     try:
         status = make_app()(standalone_mode=False)  # else Typer draws a box around what it refuses
+        print(end="", flush=True)  # what cannot be written is told here, not at the exit
     except InputError as error:
-        _refuse(str(error))
+        return _refuse(str(error))
     except UsageError as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # no error: what it says is the help
             error.show()
-            sys.exit(error.exit_code)
+            return int(error.exit_code)
         context = error.ctx
         command = "panto" if context is None else context.command_path
-        _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
+        return _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
     except Abort:
         status = 1
     if stopped:
-        print("panto: Stopped by SIGTERM before it was done.", file=sys.stderr)
+        say("Stopped by SIGTERM before it was done.")
         status = 128 + signal.SIGTERM
-    sys.exit(status or 0)
+    return status or 0
 
 
 def _stop_on_sigterm() -> list[int]:
@@ -61,9 +70,9 @@ def _stop_on_sigterm() -> list[int]:
     return stopped
 
 
-def _refuse(sentence: str) -> NoReturn:
-    print(f"panto: {one_line(sentence)}", file=sys.stderr)
-    sys.exit(2)
+def _refuse(sentence: str) -> int:
+    say(one_line(sentence))
+    return 2
 
 
 def _show_warning(
@@ -76,8 +85,8 @@ def _show_warning(
 ) -> None:
     """Write our own warnings without the place in our sources, which tells the user nothing."""
     if issubclass(category, AccuracyWarning | UncheckedWarning):
-        print(f"panto: warning: {message}", file=sys.stderr)
-    else:
+        say(f"warning: {message}")
+    elif sys.stderr is not None:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -14,6 +13,7 @@ from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.requirements import print_criteria
+from ..base.standard_streams import say
 from ..metrics.labels import LABELS
 from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import SUFFIXES, Trajectory
@@ -106,7 +106,7 @@ def _shown(
             yield None, watch
         return
     if live:
-        print("panto: --live needs a terminal to draw in; the run goes on without.", file=sys.stderr)
+        say("--live needs a terminal to draw in; the run goes on without.")
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
