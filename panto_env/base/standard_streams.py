@@ -52,9 +52,6 @@ def guarded_streams() -> Iterator[None]:
     output, remarks = sys.stdout, sys.stderr
 
     def output_failed(error: OSError) -> None:
-        # What is still in the buffer would be tried again at the exit.
-        with suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
         if error.errno == errno.EPIPE:
             raise SystemExit(1) from error
         raise InputError(f"Standard output cannot be written: {error.strerror or error}.") from error
@@ -67,3 +64,16 @@ def guarded_streams() -> Iterator[None]:
         yield
     finally:
         sys.stdout, sys.stderr = output, remarks
+        for stream in (output, remarks):
+            _empty(stream)
+
+
+def _empty(stream: TextIO | None) -> None:
+    """Drop what is in a stream's buffer and cannot be written: the exit would fail over it."""
+    if stream is None:
+        return
+    try:
+        stream.flush()
+    except OSError:
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
