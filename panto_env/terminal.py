@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,12 +14,14 @@ from typing import Annotated, Any
 import rich.progress
 import rich.table
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.text import Text
 
 from .base.errors import InputError
 from .base.files import PICTURES, check_output, finite
 from .base.plain_characters import shows_all
+from .base.shown import harmless
 from .base.standard_streams import say
 from .base.table import Alarm, Table
 
@@ -62,9 +64,29 @@ Plot = Annotated[
     typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
 ]
 
-# Without markup: names and descriptions are a user's, who may write brackets into them.
-console = Console(markup=False)
-progress_console = Console(stderr=True, markup=False)
+
+class PlainConsole(Console):
+    """A console for names and descriptions, which are a user's, or anyone's whose file is read.
+
+    Brackets in them are no markup, and what would tell the terminal to do something is escaped.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(markup=False, **settings)
+
+    def render_str(self, text: str, **settings: Any) -> Text:
+        """Of strings and cells, before they are measured, so that none is cut."""
+        return super().render_str(harmless(text), **settings)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Of whatever is printed."""
+        for segment in super().render(renderable, options):
+            text, style, control = segment
+            yield segment if control else Segment(harmless(text), style)
+
+
+console = PlainConsole()
+progress_console = PlainConsole(stderr=True)
 ALARM = "bold red"
 """Style of what is wrong."""
 

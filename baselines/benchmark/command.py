@@ -13,6 +13,7 @@ from panto_env.cluster import RayAddress
 from panto_env.terminal import (
     Force,
     Json,
+    PlainConsole,
     Plot,
     counting,
     print_json,
@@ -65,8 +66,6 @@ def benchmark(
     Ranks them by paper 1's cost function CF; a policy whose mean force leaves its range is disqualified.
     The plot shows the contact force on every line at its highest speed, and σ over speed.
     """
-    from rich.console import Console
-
     from panto_env.analysis.plots import save
 
     from ..report.page import save as save_page
@@ -96,9 +95,9 @@ def benchmark(
         if json:
             print_json(outcome.as_dict())
             return
-        console = Console(markup=False)
+        console = PlainConsole()
         if not console.is_terminal:
-            console = Console(markup=False, width=WIDTH)
+            console = PlainConsole(width=WIDTH)
         console.print(tables(outcome))
 
 

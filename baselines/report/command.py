@@ -9,6 +9,7 @@ import typer
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import PAGES, check_output
+from panto_env.base.shown import harmless
 from panto_env.terminal import announce_overwriting, console
 
 
@@ -49,7 +50,7 @@ def report(
         from .summary import summary
 
         tables = [summary(read_result(file)) for file in files]
-        print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
+        print(harmless("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables)))
         return
     path = files[0].with_suffix(PAGES[0]) if output is None else output
     check_output(path, PAGES)

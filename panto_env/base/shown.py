@@ -12,6 +12,8 @@ LONGEST = 300
 LONGEST_LINE = 1000
 """Letters of a message that is told whole: what a user gave may be a whole file."""
 _WORD = re.compile(r"\S+|\s+")
+_CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""What tells a terminal to do something, or turns the direction of writing; line ends are none of it."""
 
 
 def shown(value: Any) -> str:
@@ -23,6 +25,11 @@ def one_line(text: str) -> str:
     """A text that may quote anything, with its line ends and other controls escaped and long words cut."""
     line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
     return _cut(_WORD.sub(lambda word: _cut(word[0], LONGEST), line), LONGEST_LINE)
+
+
+def harmless(text: str) -> str:
+    """A text in which a file that may be anyone's has no control over the terminal: they are escaped."""
+    return _CONTROLS.sub(lambda control: repr(control[0])[1:-1], text)
 
 
 def shortly(value: Any) -> str:

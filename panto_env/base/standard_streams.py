@@ -10,12 +10,13 @@ from contextlib import contextmanager, suppress
 from typing import Any, TextIO, cast
 
 from .errors import InputError
+from .shown import harmless
 
 
 def say(sentence: str) -> None:
     """Print a line on standard error, if that is open."""
     if sys.stderr is not None:  # print would take standard output instead, which is for results
-        print(f"panto: {sentence}", file=sys.stderr)
+        print(f"panto: {harmless(sentence)}", file=sys.stderr)
 
 
 class _Guarded:
