@@ -23,8 +23,12 @@ BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHON
 
 
 def shell(words, folder, environment=BUFFERED):
+    return script(f"{COMMAND} {words}", folder, environment)
+
+
+def script(text, folder, environment=BUFFERED):
     return subprocess.run(
-        ["sh", "-c", f"{COMMAND} {words}"],
+        ["sh", "-c", text],
         cwd=folder,
         env=environment,
         capture_output=True,
@@ -69,14 +73,7 @@ def test_results_come_though_no_remark_can_be_made(end, tmp_path):
 
 @pytest.mark.parametrize("words", ["list", "list --json"])
 def test_where_nobody_reads_on_it_ends_without_a_word(words, tmp_path):
-    done = subprocess.run(
-        ["sh", "-c", f"({COMMAND} {words}; echo $? >&2) | true"],
-        cwd=tmp_path,
-        env=BUFFERED,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    done = script(f"({COMMAND} {words}; echo $? >&2) | true", tmp_path)
     assert done.stderr in ("1\n", "0\n")  # 0: it was done before the reader was gone
 
 
