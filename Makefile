@@ -69,9 +69,10 @@ films: $(READY)
 	$(BIN)/panto film pd --catenary ohl-three-span --pantograph dsa350 $(SMALL) \
 	  --output docs/films/pantograph-three-span.mp4
 
-# Slow proofs: more lines against finite elements, longer trainings.
+# Slow proofs: more lines against finite elements, longer trainings, random environments.
+CASES := 2000
 proofs: $(READY)
-	$(BIN)/pytest -n auto -m slow
+	CASES=$(CASES) $(BIN)/pytest -n auto -m slow
 
 # Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
 coverage: $(READY)
@@ -97,7 +98,6 @@ bounds: $(READY)
 	$(BIN)/pytest tests/test_bounds_checked.py
 
 # Bad command lines, random environments, damaged files and very many steps: each ends well, and is counted.
-CASES := 2000
 FILES := 10000
 STEPS := 1e8
 fuzz: $(READY)

@@ -175,7 +175,7 @@ def test_no_exception_is_left_of_a_document_that_has_changed():
 
 
 def test_targets_that_documents_name_are_run_by_ci_or_by_hand():
-    ci = {line.removeprefix("make ") for line in (ROOT / ".ci" / "run").read_text().splitlines()}
+    ci = set(re.findall(r"^make (\w+)", (ROOT / ".ci" / "run").read_text(), re.MULTILINE))
     named = {word for each in shown("make ") for word in each.words[1:] if "=" not in word}
     assert named <= ci | set(BY_HAND)
     assert [target for target in BY_HAND if target not in named or target in ci] == []
