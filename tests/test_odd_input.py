@@ -9,6 +9,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from panto_baselines.benchmark.settings import BenchmarkSettings
 from panto_baselines.dataset.designs_settings import DesignsSettings
@@ -170,6 +171,13 @@ def test_a_name_that_is_no_mathematics_is_drawn_as_it_is(tmp_path):
     run = simulate(line, "three-mass", distance=100.0)
     save(plot_run(run, "all"), tmp_path / "run.png")
     assert (tmp_path / "run.png").stat().st_size > 1000
+
+
+def test_a_label_of_two_lines_is_drawn_without_a_word(tmp_path, caplog):
+    figure = Figure()
+    figure.subplots().set(title=r"$\sigma$" + "\nover two lines", ylabel="force\n(N)")
+    save(figure, tmp_path / "figure.png")
+    assert caplog.records == []
 
 
 # --- actions --------------------------------------------------------------------------------------

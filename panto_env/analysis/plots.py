@@ -44,7 +44,8 @@ def _leave_odd_names(figure: Figure) -> None:
     parser: MathTextParser[Any] = MathTextParser("path")
     for text in figure.findobj(Text):
         try:
-            parser.parse(text.get_text())
+            for line in text.get_text().split("\n"):  # each is drawn by itself
+                parser.parse(line)
         except ValueError:
             text.set_parse_math(False)
 
