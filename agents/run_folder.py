@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from panto_env.base.checked_json import read_checked, with_checksum
+from panto_env.base.checked_json import read_checked, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
 from panto_env.base.locks import alone_in
@@ -88,12 +87,12 @@ class RunFolder:
     def write_settings(self, training: Training) -> None:
         """Note what the run is; with it a new run begins."""
         # First of all, so that whatever a killed run leaves is either nothing or can be resumed.
-        _write_json(self.settings, training.model_dump(mode="json"))
+        write_checked(self.settings, training.model_dump(mode="json"))
         make_folder(self.checkpoints)
 
     def note_cloning(self, policy: str, told: Any) -> None:
         """Write how far the agent is from the policy that it starts from (``CloningError``)."""
-        _write_json(self.cloning, {"policy": policy} | told.model_dump(mode="json"))
+        write_checked(self.cloning, {"policy": policy} | told.model_dump(mode="json"))
 
     def checkpoint(self, steps: int) -> Path:
         """Path of the checkpoint at ``steps``."""
@@ -163,11 +162,6 @@ class RunFolder:
         writer.writerows(rows)
         with write_whole(self.evaluations) as temporary:
             temporary.write_text(text.getvalue(), encoding="utf-8", newline="")
-
-
-def _write_json(path: Path, table: Mapping[str, Any]) -> None:
-    with write_whole(path) as temporary:
-        temporary.write_text(json.dumps(with_checksum(table), indent=1) + "\n", encoding="utf-8")
 
 
 def _counts(path: Path) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -10,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
-from panto_env.base.checked_json import with_checksum
+from panto_env.base.checked_json import write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import TABLES, check_output, finite, write_rows, write_whole
+from panto_env.base.files import TABLES, check_output, finite, write_rows
 from panto_env.base.machine import cores
 from panto_env.base.version import __version__
 from panto_env.cluster import spread
@@ -65,9 +64,7 @@ class Benchmark:
         if Path(path).suffix.lower() != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
             return
-        with write_whole(path) as temporary:
-            text = json.dumps(with_checksum(self.as_dict()), indent=1)
-            temporary.write_text(text + "\n", encoding="utf-8")
+        write_checked(path, self.as_dict())
 
 
 def run(

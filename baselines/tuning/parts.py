@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
@@ -10,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress
-from panto_env.base.checked_json import read_checked, with_checksum
-from panto_env.base.files import write_whole
+from panto_env.base.checked_json import read_checked, write_checked
 from panto_env.base.locks import alone_in
 from panto_env.cluster import spread
 from panto_env.cluster.parts import identity, open_parts
@@ -58,14 +56,9 @@ def tune(
             workers=workers,
             ray=ray,
             progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
-            take=lambda place, tuned: _write(parts[missing[place]], tuned),
+            take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
         )
         return [_read(path) for path in parts.values()]
-
-
-def _write(path: Path, tuned: Tuned) -> None:
-    with write_whole(path) as temporary:
-        temporary.write_text(json.dumps(with_checksum(asdict(tuned))), encoding="utf-8")
 
 
 def _read(path: Path) -> Tuned:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, UncheckedWarning
+from .files import write_whole
 
 CHECKSUM = "sha256"
 """Key of the checksum, beside those of the result."""
@@ -24,6 +25,12 @@ def with_checksum(table: Mapping[str, Any]) -> dict[str, Any]:
     The checksum is of the values, not of spaces and line breaks between them.
     """
     return {CHECKSUM: _checksum(table), **table}
+
+
+def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:
+    """Write a table of plain data as JSON with its checksum. Raises InputError where it can't be written."""
+    with write_whole(path) as temporary:
+        temporary.write_text(json.dumps(with_checksum(table), indent=1) + "\n", encoding="utf-8")
 
 
 def read_checked(path: str | Path) -> Any:
