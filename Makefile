@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs coverage same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -84,18 +84,14 @@ same: $(READY)
 	$(BIN)/python -m tests.before.compare --before $(BEFORE)
 	$(BIN)/python -m tests.before.speed --before $(BEFORE)
 
-# The source is broken on purpose, place by place: a test must notice (an hour on two cores).
-mutants: $(READY)
-	$(BIN)/python -m tests.mutants
-
 # Thousands of random lines, pantographs and speeds: each refused, or finite, balanced and nearly converged.
 NONSENSE := 3000
 nonsense: $(READY)
-	NONSENSE=$(NONSENSE) $(BIN)/pytest -s -m slow tests/test_nonsense.py
+	NONSENSE=$(NONSENSE) $(BIN)/pytest -s -m slow tests/plant/test_nonsense.py
 
 # Every index of whole episodes and random lines checked against its array.
 bounds: $(READY)
-	$(BIN)/pytest tests/test_bounds_checked.py
+	$(BIN)/pytest tests/backend/test_bounds_checked.py
 
 # Bad command lines, random environments, damaged files and very many steps: each ends well, and is counted.
 FILES := 10000
@@ -116,8 +112,8 @@ floors:
 	$(FLOORS)/bin/pip install -qq --upgrade pip packaging
 	$(FLOORS)/bin/python -m tests.floors $(FLOOR_EXTRAS) > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/pip install -q --constraint $(FLOORS)/floors.txt pytest --editable ".[$(FLOOR_EXTRAS)]"
-	$(FLOORS)/bin/pytest tests/test_cli.py tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py \
-	  tests/test_vector_rules.py tests/test_sweep.py tests/test_plots.py tests/test_trajectory.py tests/test_render.py
+	$(FLOORS)/bin/pytest tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
+	  tests/envs/test_vector_rules.py tests/analysis/test_sweep.py tests/analysis/test_plots.py tests/metrics/test_trajectory.py tests/render/test_render.py
 
 # Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.
 PYENV = $(shell pyenv root 2> /dev/null)
@@ -129,7 +125,7 @@ pythons:
 	  venv=.venv-$$(basename $$python); \
 	  $$python -m venv $$venv && \
 	  $$venv/bin/pip install -qq --constraint constraints.txt pytest --editable '.[control,render]' && \
-	  $$venv/bin/pytest tests/test_env.py tests/test_vector.py tests/test_gymnasium_rules.py tests/test_baselines.py \
+	  $$venv/bin/pytest tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py tests/baselines/test_baselines.py \
 	    || exit 1; done
 
 # The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.
@@ -138,7 +134,7 @@ ptx:
 	$(PYTHON) -m venv $(PTX)
 	$(PTX)/bin/pip install -qq --constraint constraints.txt numba-cuda==0.30.4 nvidia-cuda-nvrtc==13.5.37 \
 	  nvidia-nvvm==13.5.37 nvidia-cuda-cccl==13.3.5.0.6 pytest --editable .
-	$(PTX)/bin/pytest tests/test_ptx.py
+	$(PTX)/bin/pytest tests/backend/test_ptx.py
 
 # Benchmark, tuning and trainings on a Ray cluster of two nodes, which both are this machine.
 RAY := .venv-ray
@@ -146,7 +142,7 @@ ray:
 	$(PYTHON) -m venv $(RAY)
 	$(RAY)/bin/pip install -qq --constraint constraints.txt torch
 	$(RAY)/bin/pip install -qq --constraint constraints.txt pytest --editable '.[agents,ray]'
-	$(RAY)/bin/pytest tests/test_ray.py
+	$(RAY)/bin/pytest tests/cluster/test_ray.py
 
 # RLlib trains on the native vector environment; it pins a Gymnasium of its own.
 RLLIB := .venv-rllib
@@ -154,7 +150,7 @@ rllib:
 	$(PYTHON) -m venv $(RLLIB)
 	$(RLLIB)/bin/pip install -qq --constraint constraints.txt torch
 	$(RLLIB)/bin/pip install -qq 'ray[rllib]==2.60.0' pytest --editable .
-	$(RLLIB)/bin/pytest tests/test_rllib.py
+	$(RLLIB)/bin/pytest tests/envs/test_rllib.py
 
 # TorchRL, Tianshou, skrl and Minari on the environments; Tianshou wants an older filelock.
 LIBRARIES := .venv-libraries
@@ -164,7 +160,7 @@ libraries:
 	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torch
 	$(LIBRARIES)/bin/pip install -qq --constraint $(LIBRARIES)/constraints.txt torchrl==0.14.1 tianshou==2.0.1 skrl==2.1.1 \
 	  'minari[create,hdf5]==0.5.4' pytest --editable .
-	$(LIBRARIES)/bin/pytest tests/test_libraries.py
+	$(LIBRARIES)/bin/pytest tests/envs/test_libraries.py
 
 clean:
 	rm -rf $(VENV) $(FLOORS) .venv-python3.* $(PTX) $(RAY) $(RLLIB) $(LIBRARIES) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

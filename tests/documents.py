@@ -1,4 +1,4 @@
-"""Commands and Python that documents show, found and parsed: `tests/test_documents.py` runs them."""
+"""Commands and Python that documents show, found and parsed: `tests/project/test_documents.py` runs them."""
 
 import contextlib
 import io

@@ -1,4 +1,4 @@
-"""Use what was added to a copy of the project; run by tests/test_extension.py in a process of its own."""
+"""Use what was added to a copy of the project; test_extension.py runs this in a process of its own."""
 
 import contextlib
 import inspect

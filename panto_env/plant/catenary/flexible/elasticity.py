@@ -17,7 +17,7 @@ from .static_shape import solve
 SPANS = 5
 """Computed, of which the middle one is looked at; its neighbours count, further ones hardly do."""
 SPACING = 0.125
-"""Of the grid at most (m): elasticity within 1 % of finite elements (tests/test_run_report.py)."""
+"""Of the grid at most (m): elasticity within 1 % of finite elements (tests/report/test_run_report.py)."""
 PLACES = 48
 """Of a span, at which the force stands."""
 MOST_ROUNDS = 20

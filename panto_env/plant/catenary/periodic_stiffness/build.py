@@ -16,7 +16,7 @@ from ..view import NOTHING, LineView
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
-"""Unless told otherwise (s): forces within 0.2 % of the peak (tests/test_periodic_stiffness.py)."""
+"""Unless told otherwise (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
 
 
 class PeriodicLine(NamedTuple):

@@ -22,7 +22,7 @@ MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the
 VIEW_POINTS = 361
 """Of the three spans, in a picture."""
 TIME_STEP = 2.5e-3
-"""Unless told otherwise (s): tests/test_three_span.py shows how figures converge."""
+"""Unless told otherwise (s): tests/plant/test_three_span.py shows how figures converge."""
 
 
 class ThreeSpanLine(NamedTuple):

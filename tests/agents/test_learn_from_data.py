@@ -1,0 +1,83 @@
+"""What the examples learn from data alone: small here, as their pages say in `make proofs`."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.make_designs import make_designs
+from panto_baselines.dataset.make_episodes import make_episodes
+from panto_baselines.dataset.settings import chosen, load_episodes
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+pytest.importorskip("minari")
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(autouse=True)
+def _minari_s_folder_is_put_back(monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "")
+
+
+def test_offline_data_are_read_back_and_replayed(capsys):
+    returns, same = load("offline_data").main()
+    assert same
+    assert len(returns) == 2
+    assert max(returns) < 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line in load("offline_data").__doc__ for line in printed] == [True, True]
+
+
+def test_a_controller_is_cloned_from_a_few_episodes_at_one_speed(tmp_path):
+    pytest.importorskip("torch")
+    example = load("learn_from_data")
+    settings = chosen(load_episodes("dataset-known-line"), ("fitted-fb-ff-noisy",))
+    few = settings.sets[0].model_copy(update={"episodes": 8})
+    at_300 = settings.places[0].model_copy(update={"speed_kmh": (300.0, 300.0)})
+    make_episodes(
+        settings.model_copy(update={"sets": (few,), "places": (at_300,)}), tmp_path / "data", workers=1
+    )
+    error = example.clone(tmp_path / "data", tmp_path / "clone.npz", epochs=20)
+    assert error < 0.25
+    ((own, teacher, reason),) = example.judge(tmp_path / "clone.npz", (300.0,), seeds=2, workers=1).values()
+    assert reason == ""
+    assert teacher < -15
+    assert own / teacher > 0.9
+
+
+@pytest.mark.slow
+def test_sigma_is_learnt_from_a_few_designs(tmp_path):
+    pytest.importorskip("sklearn")
+    settings = load_designs("dataset-designs").model_copy(update={"count": 320})
+    made = make_designs(settings, tmp_path, workers=1)
+    scores = load("learn_from_data").surrogate(made.folder / "designs.parquet")
+    r2, errors = ({name: each[k] for name, each in scores.items()} for k in (0, 1))
+    assert r2["mean"] < 0.1 < 0.5 < r2["linear"] < 1
+    assert r2["trees"] > 0.7
+    assert errors["trees"] < 0.7 * errors["mean"]
+
+
+@pytest.mark.slow
+def test_from_the_whole_data_a_clone_does_what_its_teacher_does_and_sigma_is_known_to_some_percent(tmp_path):
+    """Half an hour on two cores: the numbers of docs/datasets.md."""
+    pytest.importorskip("torch")
+    pytest.importorskip("sklearn")
+    example = load("learn_from_data")
+    make_episodes(chosen(load_episodes("dataset-known-line"), ("fitted-fb-ff-noisy",)), tmp_path)
+    example.clone(tmp_path, tmp_path / "clone.npz")
+    for own, teacher, reason in example.judge(tmp_path / "clone.npz").values():
+        assert reason == ""
+        assert own / teacher > 0.9
+    made = make_designs(load_designs("dataset-designs"), tmp_path)
+    scores = example.surrogate(made.folder / "designs.parquet")
+    (r2, error), (yardstick, _) = scores["trees"], scores["linear"]
+    assert r2 > 0.93 > 0.9 > yardstick
+    assert error < 6

@@ -1,0 +1,183 @@
+"""Copies of environments, in this process and in others, go on as the original does."""
+
+import copy
+import pickle
+import subprocess
+import sys
+from typing import Any, NamedTuple
+
+import cloudpickle
+import gymnasium
+import numpy as np
+import pytest
+
+import panto_env
+from panto_env.backend.memory import PAGE, aligned_zeros, copy_whole
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
+from panto_env.envs import IDS
+from panto_env.plant.plant import Plant
+from panto_env.plant.state import Row
+
+LIVELY = {
+    "sensors": "realistic",
+    "actuator": "realistic",
+    "line_condition": "worn",
+    "speed_kmh": (200, 300),
+    "pantograph_scatter": 0.1,
+    "distance": 40.0,
+}
+DEFECTIVE = {"line_condition": ["worn", {"dropper_scatter": 0.003, "broken_droppers": [(1, 3)]}]}
+WAYS = {
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "cloudpickle": lambda env: pickle.loads(cloudpickle.dumps(env)),
+    "deepcopy": copy.deepcopy,
+    "copy of a copy": lambda env: copy.deepcopy(pickle.loads(pickle.dumps(env))),
+}
+
+
+def settings_of(name):
+    return LIVELY | (DEFECTIVE if name == "Pantograph-v0" else {})
+
+
+def make(name, lanes=None):
+    settings = settings_of(name)
+    return gymnasium.make(name, **settings) if lanes is None else gymnasium.make_vec(name, lanes, **settings)
+
+
+def run(env, steps, seed=0):
+    """All that an environment answers to actions drawn with ``seed``, over the ends of episodes."""
+    random, answers = np.random.default_rng(seed), []
+    for _ in range(steps):
+        answers.append(env.step(random.uniform(-1, 1, env.action_space.shape)))
+        if isinstance(env, gymnasium.Env) and any(answers[-1][2:4]):
+            answers.append(env.reset())
+    return answers
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("lanes", [None, 3])
+@pytest.mark.parametrize("name", IDS)
+def test_copy_made_in_mid_episode_goes_on_bit_for_bit(name, lanes, way):
+    env = make(name, lanes)
+    env.reset(seed=4)
+    run(env, 30)
+    twin = WAYS[way](env)
+    np.testing.assert_equal(run(twin, 150, seed=1), run(env, 150, seed=1))
+
+
+@pytest.mark.parametrize("lanes", [None, 3])
+@pytest.mark.parametrize("name", IDS)
+def test_copies_do_not_touch_one_another(name, lanes):
+    env = make(name, lanes)
+    env.reset(seed=4)
+    run(env, 30)
+    twins = [make_copy(env) for make_copy in WAYS.values()]
+    expected = run(twins[0], 40, seed=1)
+    for twin in twins[1:]:
+        run(twin, 60, seed=2)  # on another way
+        twin.reset(seed=9)
+    np.testing.assert_equal(run(env, 40, seed=1), expected)
+
+
+@pytest.mark.parametrize("lanes", [None, 3])
+@pytest.mark.parametrize("name", IDS)
+def test_pickled_before_its_first_reset(name, lanes):
+    env = make(name, lanes)
+    env.action_space.seed(3)
+    twin = pickle.loads(pickle.dumps(env))
+    np.testing.assert_equal(twin.reset(seed=1), env.reset(seed=1))
+    np.testing.assert_equal(twin.action_space.sample(), action := env.action_space.sample())
+    np.testing.assert_equal(twin.step(action), env.step(action))
+
+
+@pytest.mark.parametrize("lanes", [None, 3])
+@pytest.mark.parametrize("name", IDS)
+def test_copy_goes_on_in_another_process(tmp_path, name, lanes):
+    env = make(name, lanes)
+    env.reset(seed=4)
+    run(env, 30)
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.write_bytes(pickle.dumps(env))
+    code = (
+        "import pathlib, pickle, sys; here, there = map(pathlib.Path, sys.argv[1:]);"
+        "env = pickle.loads(here.read_bytes());"
+        "from tests.backend.test_copies import run; there.write_bytes(pickle.dumps(run(env, 60, seed=1)))"
+    )
+    subprocess.run([sys.executable, "-c", code, str(here), str(there)], check=True)
+    np.testing.assert_equal(pickle.loads(there.read_bytes()), run(env, 60, seed=1))
+
+
+def test_episode_with_options_goes_on_and_ends_with_them():
+    env = gymnasium.make("PantographStiffness-v0", distance=40.0)
+    env.reset(seed=0, options={"speed_kmh": 200})
+    twin = copy.deepcopy(env)
+    np.testing.assert_equal(run(twin, 80), run(env, 80))
+    assert twin.unwrapped.trajectory.speed_kmh == pytest.approx(300)
+
+
+def test_lanes_begun_with_options_go_on_in_a_copy():
+    envs = gymnasium.make_vec("PantographStiffness-v0", 3, distance=40.0)
+    envs.reset(seed=0)
+    envs.reset(options={"speed_kmh": 200, "reset_mask": np.array([False, True, False])})
+    twin = copy.deepcopy(envs)
+    answers = run(twin, 80)
+    np.testing.assert_equal(answers, run(envs, 80))
+    assert answers[0][4]["speed_kmh"].tolist() == pytest.approx([300, 200, 300])
+    assert answers[-1][4]["speed_kmh"].tolist() == pytest.approx([300, 300, 300])
+
+
+def test_copy_needs_no_file_of_the_user(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text((panto_env.catalog.loader.FOLDERS["catenary"] / "periodic-stiffness.toml").read_text())
+    env = gymnasium.make("PantographStiffness-v0", catenary=str(mine))
+    twin = pickle.loads(pickle.dumps(env))
+    mine.unlink()
+    options = {"distance": 9}
+    np.testing.assert_equal(twin.reset(seed=0, options=options), env.reset(seed=0, options=options))
+
+
+def test_tasks_and_plants_are_copied_too():
+    task = Task(run_settings(settings_of("Pantograph-v0")), lanes=2)
+    task.reset(np.arange(2), np.random.default_rng)
+    action = np.full((2, 1), 0.3)
+    task.step(action)
+    twin = copy.deepcopy(task)
+    for _ in range(3):
+        task.step(action)
+        twin.step(action)
+    np.testing.assert_array_equal(twin.results.observation, task.results.observation)
+    np.testing.assert_array_equal(twin.results.reward_and_terms, task.results.reward_and_terms)
+    np.testing.assert_equal(twin.figures(1).as_dict(), task.figures(1).as_dict())
+    settings = run_settings({})
+    plant = Plant(settings.catenary, settings.pantograph, lanes=2)
+    plant.start(np.arange(2), np.array([80.0, 81.0]))
+    samples = [each.samples(51) for each in (plant, plant)]
+    twin = pickle.loads(pickle.dumps(plant))
+    plant.advance_passively(50, samples[0])
+    twin.advance_passively(50, samples[1])
+    np.testing.assert_array_equal(samples[0].rows, samples[1].rows)
+    assert np.ptp(samples[0].rows[:, -1, 0, 0]) > 0
+    np.testing.assert_array_equal(twin.row(Row.STEP), 50)
+
+
+class Wire(NamedTuple):
+    displacement: Any
+    all_displacement: Any  # the same memory
+    first_span: Any
+    nothing: Any
+
+
+def test_copied_arrays_share_memory_and_lie_as_before():
+    nodes = aligned_zeros((2, 2, 5), np.float32, place=192)
+    wire = Wire(nodes, nodes.reshape(2, 10), np.arange(3), np.zeros(0))
+    copy_whole(wire)
+    for twin in (copy.deepcopy(wire), pickle.loads(pickle.dumps(wire))):
+        assert np.shares_memory(twin.displacement, twin.all_displacement)
+        assert not np.shares_memory(twin.displacement, wire.displacement)
+        assert twin.displacement.ctypes.data % PAGE == 192
+        twin.all_displacement[1, 7] = 3.0
+        assert twin.displacement[1, 1, 2] == 3.0
+        assert (wire.displacement == 0).all()
+        np.testing.assert_array_equal(twin.first_span, np.arange(3))
+        assert twin.nothing.shape == (0,)

@@ -1,0 +1,117 @@
+"""The kernels' source does the same as plain Python (NUMBA_DISABLE_JIT=1) as it does compiled."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import panto_env
+from panto_env.backend import JIT
+from panto_env.catalog import load_catenary
+
+pytestmark = pytest.mark.plain
+
+DEFECTS = {"broken_droppers": [(1, 2)], "miscut_droppers": [(1, 4, 0.02)], "irregularity": 1.0}
+CASES = {
+    "stiffness": ("PantographStiffness-v0", {"sensors": "realistic", "pantograph_scatter": 0.1}),
+    "three spans": ("PantographThreeSpan-v0", {"speed_kmh": 340, "control_interval": 0.05}),
+    "flexible": ("Pantograph-v0", {"precision": "double", "window": 3, "actuator": "realistic"}),
+    "both actuators": (
+        "PantographStiffness-v0",
+        {"observation": "full", "actuator": {"place": "both", "delay": 0.01}, "sensors": {"delay": 0.02}},
+    ),
+    "motors": ("PantographStiffness-v0", {"actuator": {"kind": "motor", "place": "both"}}),
+    "loose motors": ("PantographStiffness-v0", {"actuator": "head-motor:backlash=0.014"}),
+    "defects": ("Pantograph-v0", {"precision": "double", "window": 3, "line_condition": DEFECTS}),
+    "clamps": (
+        "Pantograph-v0",
+        {"catenary": "re330", "precision": "double", "window": 3, "observation": "full"},
+    ),
+}
+STEPS = {"three spans": 20, "stiffness": 30}
+"""Control steps of a case, 6 unless named here: the three-span line is to pass a support."""
+
+
+def observations(name):
+    """All observations and rewards of a case, under a fixed tape of actions."""
+    identifier, settings = CASES[name]
+    env = gymnasium.make(identifier, **settings)
+    rows = [env.reset(seed=3)[0].tolist()]
+    tape = np.random.default_rng(0)
+    for _ in range(STEPS.get(name, 6)):
+        action = tape.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+        observation, reward, *_ = env.step(action)
+        rows.append([*observation.tolist(), reward])
+    return rows
+
+
+def short_line():
+    """The reference line with spans of 12 m: a window of three moves along it within a short run."""
+    line = load_catenary("en50318-2002")
+    near = line.droppers.model_copy(update={"positions": (2.0, 6.0, 10.0), "sag": (0.0, 0.0, 0.0)})
+    return line.model_copy(update={"span_length": 12.0, "droppers": near, "spans": 5})
+
+
+def passive_run():
+    """Forces of contact and droppers and uplift, from the line's first anchor to its last."""
+    run = panto_env.simulate(
+        catenary=short_line(), window=3, precision="double", distance=58.0, spacing=0.5, time_step=2e-3
+    )
+    return [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+
+
+def lanes_abreast():
+    """Observations and rewards of four lanes that end apart, each then idle for a step."""
+    envs = gymnasium.make_vec(
+        "PantographStiffness-v0", num_envs=4, speed_kmh=(200, 300), distance=12.0, line_condition="worn"
+    )
+    rows = [envs.reset(seed=3)[0].tolist()]
+    tape = np.random.default_rng(0)
+    for _ in range(30):
+        action = tape.uniform(-1, 1, envs.action_space.shape).astype(np.float32)
+        observation, reward, *_ = envs.step(action)
+        rows.append(np.column_stack([observation, reward]).tolist())
+    return rows
+
+
+RUNS = {
+    **{name: partial(observations, name) for name in CASES},
+    "a window that moves along a line": passive_run,
+    "lanes abreast": lanes_abreast,
+}
+
+
+def in_the_other_way():
+    """All runs, compiled where this process runs plain Python and the other way round."""
+    code = f"import json; from {__name__} import RUNS; print(json.dumps([run() for run in RUNS.values()]))"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": str(int(JIT))}
+    root = Path(__file__).parents[2]
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
+    )
+    return dict(zip(RUNS, json.loads(result.stdout), strict=True))
+
+
+@pytest.fixture(scope="module")
+def others():
+    return in_the_other_way()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_plain_python_and_compiled_kernels_agree(name, others):
+    for ours, theirs in zip(RUNS[name](), others[name], strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
+
+
+def test_a_passive_run_agrees_with_one_under_control():
+    """Two kernels share the plant's step: a run without policy, and one whose policy does nothing."""
+    settings = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 40.0}
+    passive = panto_env.simulate(**settings)
+    controlled = panto_env.simulate(**settings, policy="passive")
+    np.testing.assert_array_equal(passive.contact_force, controlled.contact_force)

@@ -1,0 +1,360 @@
+"""The benchmark: paired passes, statistics, the rule of the mean force, and its command."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from panto_baselines.benchmark import command, plot
+from panto_baselines.benchmark import run as benchmark
+from panto_baselines.benchmark.run import Benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.report.page import page
+from panto_baselines.report.result import read_result
+from panto_env import InputError, simulate
+from panto_env.base.checked_json import read_checked
+from panto_env.base.settings import parse
+from panto_env.policies import find_policy
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+P = "p:gain=0.1"
+LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
+PLUGIN = """
+import numpy as np
+from panto_baselines.policies.force_law import ForceLaw
+
+class Half(ForceLaw):
+    "Presses with half of the nominal force."
+    def force(self, observation):
+        return -0.5 * self.context.nominal_force
+
+class Bad(ForceLaw):
+    def force(self, observation):
+        raise ArithmeticError("no idea")
+
+class Lost(ForceLaw):
+    def force(self, observation):
+        return -1e9
+
+class Nan:
+    def reset(self, context): pass
+    def act(self, observation): return np.array([float("nan")])
+"""
+
+
+def settings(**given: Any) -> BenchmarkSettings:
+    table = {"policies": [P], "lines": [LINE], "seeds": 2} | given
+    return parse(BenchmarkSettings, table, "the benchmark")
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Benchmark:
+    return benchmark.run(settings(), workers=1)
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody's installed package with policies of their own."""
+    info = tmp_path / "site" / "plugin-1.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
+    names = ("Half", "Bad", "Lost", "Nan")
+    points = "".join(f"{name.lower()} = panto_test_plugin:{name}\n" for name in names)
+    (info / "entry_points.txt").write_text(f"[panto_env.policies]\n{points}")
+    (tmp_path / "site" / "panto_test_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+
+
+def called(*arguments: str) -> Any:
+    """The command's result, run as a program would run it."""
+    app = typer.Typer()
+    app.command()(command.benchmark)
+    short = ("--seeds", "1", "--workers", "1", "--speed", "300", *arguments)
+    return CliRunner().invoke(app, short, env={"COLUMNS": "120"})
+
+
+# --- passes --------------------------------------------------------------------------------------
+
+
+def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Benchmark) -> None:
+    assert [(row.policy, row.seed) for row in outcome.rows] == [
+        *(("passive", 0), ("passive", 1)),
+        *((P, 0), (P, 1)),
+    ]
+    assert outcome.spans == ((3, 5),)
+    run = simulate(policy=P, seed=1, distance=310.0, line_condition="fair", record_droppers=False)
+    assert outcome.rows[3].figures == run.summary((3, 5))
+    interval = round(0.01 / run.time_step)
+    steps = np.diff(run.frame_force[run.position > 120][4::interval])
+    assert outcome.rows[3].action_rate == pytest.approx(np.sqrt(np.mean((steps / 0.01) ** 2)), 0.03)
+    assert outcome.rows[0].action_rate == outcome.rows[0].figures.effort == 0
+
+
+def test_outcome_does_not_depend_on_workers_and_repeats(outcome: Benchmark) -> None:
+    again = benchmark.run(settings(), workers=2)
+    assert again == outcome
+    assert json.dumps(again.as_dict()) == json.dumps(outcome.as_dict())
+
+
+def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome: Benchmark) -> None:
+    assert outcome.rows[0].figures.std != outcome.rows[1].figures.std
+    assert outcome.cells[1].interval is not None
+    assert outcome.cells[0].interval is None  # passive less itself
+    new = benchmark.run(settings(line_condition="new"), workers=1)
+    assert new.rows[0].figures == new.rows[1].figures
+    assert new.cells[1].interval is None
+
+
+def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
+    lines = [
+        {"speeds_kmh": [300]},
+        {"speeds_kmh": [250], "catenary": "periodic-stiffness", "pantograph": "three-mass"},
+    ]
+    done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
+    assert done.spans == ((10, 19), (10, 19))
+    # That line has no supports: the uplift is nan, which JSON does not know.
+    assert math.isnan(done.cells[1].figures["max_uplift"])
+    assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
+
+
+def test_progress_counts_all_passes() -> None:
+    calls: list[tuple[int, int]] = []
+    benchmark.run(settings(), workers=1, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> None:
+    given = settings(policies=["half", "lost"], seeds=1, actuator={"force_limit": 300.0})
+    done = benchmark.run(given, workers=2)
+    passive, half, lost = done.cells
+    assert half.figures["std"] < passive.figures["std"]
+    assert half.rank is None
+    assert "mean force" in half.disqualified
+    assert lost.rank is None
+    assert "ended early" in lost.disqualified
+    assert passive.rank == 1
+
+
+# --- what is not valid ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"policies": ["pp"]}, "Unknown policy 'pp'"),
+        ({"policies": ["p:gain=-1"]}, "'p:gain=-1' cannot be made"),
+        ({"policies": ["p", "p"]}, "key 'policies': 'p' is given twice"),
+        ({"policies": ["model.zip"]}, "model.zip does not exist"),
+        ({"seeds": 0}, "key 'seeds'"),
+        ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
+        ({"seeds": [-1]}, "key 'seeds.0'"),
+        ({"lines": []}, "key 'lines'"),
+        ({"lines": [LINE, LINE]}, "is given twice"),
+        ({"lines": [{"speeds_kmh": [300, 300]}]}, "300.0 is given twice"),
+        ({"lines": [{"speeds_kmh": [500]}]}, "below the wave speed"),
+        ({"lines": [{"catenary": "nowhere"}]}, "Unknown catenary 'nowhere'"),
+        ({"lines": [{"distance": 200.0}]}, "no spans 10 to 3 to evaluate"),
+        ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
+        ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
+        ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
+        ({"sensors": {"noise": 1}}, "key 'noise'"),
+        ({"control_interval": 0.0}, "greater than 0"),
+    ],
+)
+def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("policy", "workers", "words"),
+    [
+        ("bad", 1, "panto_test_plugin.py:12: ArithmeticError: no idea."),
+        ("bad", 2, "panto_test_plugin.py:12: ArithmeticError: no idea."),
+        ("nan", 1, "its action must be finite numbers of shape (1,), not array([nan])."),
+    ],
+)
+def test_a_policy_that_fails_is_named(plugin: None, policy: str, workers: int, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        benchmark.run(settings(policies=[policy], seeds=1), workers=workers)
+    assert str(caught.value).startswith(f"The policy '{policy}' failed in act")
+    assert words in str(caught.value)
+
+
+def test_workers_must_be_some() -> None:
+    with pytest.raises(InputError, match="workers must be 1 or more"):
+        benchmark.run(settings(), workers=0)
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("benchmark*.toml")), ids=lambda path: path.stem)
+def test_shipped_benchmarks_load(path: Path) -> None:
+    loaded = load_benchmark(path)
+    assert len(loaded.policies) >= 4
+    assert len(loaded.seeds) >= 5
+    assert {line.catenary for line in loaded.lines} >= {"en50318-2002", "shinkansen-simple"}
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
+def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
+    track = load_benchmark(f"benchmark/{path.stem}")
+    assert track.title != BenchmarkSettings().title
+    for policy in track.policies:
+        find_policy(policy)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seeds = ", "is not valid TOML"),
+        ("seed = 3", "key 'seed'"),
+        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.0.speeds_kmh.0'"),
+        (None, "does not exist"),
+    ],
+)
+def test_a_bad_file_is_named_with_its_key(tmp_path: Path, text: str | None, words: str) -> None:
+    path = tmp_path / "mine.toml"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_benchmark(path)
+    assert str(path) in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_json_holds_everything_and_the_settings_that_make_it_again(
+    outcome: Benchmark, tmp_path: Path
+) -> None:
+    outcome.save(tmp_path / "out.json")
+    table = read_checked(tmp_path / "out.json")
+    assert table == outcome.as_dict()
+    assert parse(BenchmarkSettings, table["settings"], "it") == outcome.settings
+    assert len(table["rows"]) == 4
+    assert table["cells"][1]["rank"] in (1, 2)
+    assert [(each["policy"], each["seed"]) for each in table["traces"]] == [("passive", 0), (P, 0)]
+
+
+def test_command_writes_the_page_that_its_json_gives(tmp_path: Path) -> None:
+    files = tmp_path / "out.json", tmp_path / "out.html"
+    result = called("p", "--output", str(files[0]), "--html", str(files[1]))
+    assert result.exit_code == 0, result.output
+    assert files[1].read_text(encoding="utf-8") == page([read_result(files[0])])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffix: str) -> None:
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    path = tmp_path / f"out{suffix}"
+    outcome.save(path)
+    read = pyarrow.csv.read_csv if suffix == ".csv" else pyarrow.parquet.read_table
+    assert read(path)["std"].to_pylist() == pytest.approx([r.figures.std for r in outcome.rows])
+
+
+def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
+    figure = plot.plot(outcome)
+    forces, sigmas, changes = figure.axes
+    limits = ["nominal force", "limit of EN 50367", "0 N: no contact"]
+    assert forces.get_legend_handles_labels()[1] == ["passive", P, *limits]
+    assert forces.get_xlim() == (180, 300)  # the last two spans evaluated
+    means = [cell.figures["mean"] for cell in outcome.cells if cell.policy == "passive"]
+    assert list(sigmas.lines[-1].get_ydata()) == pytest.approx([0.3 * mean for mean in means])
+    intervals = [list(line.get_ydata()) for line in changes.lines if len(line.get_xdata()) == 2]
+    for cell in outcome.cells:
+        if cell.interval is not None:
+            assert list(cell.interval) in intervals
+    (part,) = figure.subfigs
+    assert "spans" in part.get_suptitle()
+    assert all(axis.get_legend() is None for axis in figure.axes)  # none lies on data
+    assert "(N)" in forces.get_ylabel()
+    assert "(km/h)" in sigmas.get_xlabel()
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def test_command_prints_a_table_for_people() -> None:
+    result = called("p:gain=0.5")
+    assert result.exit_code == 0, result.output
+    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
+        assert words in result.stdout
+
+
+def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
+    files = (tmp_path / "out.csv", tmp_path / "out.png")
+    result = called("p", "--json", "--output", str(files[0]), "--plot", str(files[1]))
+    assert result.exit_code == 0, result.output
+    assert [cell["policy"] for cell in json.loads(result.stdout)["cells"]] == ["passive", "p"]
+    assert all(path.stat().st_size > 100 for path in files)
+    assert files[1].read_bytes().startswith(b"\x89PNG")
+
+
+def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'policies = ["p"]\n[[lines]]\ncatenary = "benchmark-2015"\ndistance = 350\nspans = [4, 6]\n'
+    )
+    result = called("--config", str(path), "--json", "--line-condition", "new")
+    assert result.exit_code == 0, result.output
+    used = json.loads(result.stdout)["settings"]
+    assert used["policies"] == ["passive", "p"]
+    assert used["seeds"] == [0]
+    assert used["line_condition"]["irregularity"] == 0
+    assert used["lines"] == [
+        Line(catenary="benchmark-2015", speeds_kmh=(300,), distance=350, spans=(4, 6)).model_dump(mode="json")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["q"], "Unknown policy 'q'"),
+        (["p", "--catenary", "nowhere"], "Unknown catenary"),
+        (["p", "--actuator", "strong"], "key 'actuator'"),
+        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .parquet"),
+        (["p", "--html", "out.txt"], "out.txt must end in .html"),
+        (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
+    ],
+)
+def test_command_raises_one_sentence_and_overwrites_nothing(
+    tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    kept = tmp_path / "out.json"
+    kept.write_text("kept")
+    result = called("--output", str(kept), "--force", *arguments)
+    assert isinstance(result.exception, InputError)
+    assert words in str(result.exception)
+    assert "\n" not in str(result.exception)
+    assert kept.read_text() == "kept"
+
+
+def test_the_command_is_looked_up_fast() -> None:
+    code = (
+        "import sys, panto_baselines.benchmark.command; "
+        "print({'torch', 'matplotlib', 'pyarrow', 'scipy.stats'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_a_line_can_have_policies_of_its_own():
+    lines = [LINE, {**LINE, "catenary": "ln2", "speeds_kmh": [200], "policies": ["p"]}]
+    done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
+    assert [(row.catenary, row.policy) for row in done.rows] == [
+        ("en50318-2002", "passive"),
+        ("ln2", "passive"),
+        ("ln2", "p"),
+    ]

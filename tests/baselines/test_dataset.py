@@ -1,0 +1,418 @@
+"""Data to learn from: episodes as Minari reads them, designs as a table, whatever ended their making."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from panto_baselines.benchmark import seeds
+from panto_baselines.benchmark.controls import OTHER_SEED
+from panto_baselines.dataset import designs, make_designs, make_episodes
+from panto_baselines.dataset.checksums import LIST, verify
+from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs
+from panto_baselines.dataset.episodes import Stage
+from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
+from panto_configs import names
+from panto_env import InputError, simulate
+from panto_env.base.locks import alone_in
+from panto_env.base.settings import parse
+from panto_env.cluster import parts
+
+from ..deadly import deadly
+
+PANTO = Path(sys.executable).with_name("panto")
+KNOWN = {"catenary": "en50318-2002", "pantograph": "en50318-2002", "speed_kmh": [280, 300]}
+OTHER = {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": [240, 260]}
+TABLE = {
+    "title": "tiny",
+    "environment": {"distance": 60.0},
+    "places": [KNOWN],
+    "sets": [{"name": "noisy-pd", "policies": ["pd"], "noise": [0.0, 0.2], "episodes": 2}],
+}
+RANGES = {
+    "speed_kmh": (200.0, 300.0),
+    "catenary.span_length": (50.0, 65.0),
+    "pantograph.masses.0": (5.0, 10.0),
+}
+
+
+def settings(**changes):
+    return parse(EpisodesSettings, TABLE | changes, "test")
+
+
+def few_designs(**changes):
+    return parse(DesignsSettings, {"title": "few", "ranges": RANGES, "count": 3} | changes, "test")
+
+
+def panto(*arguments, cwd):
+    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+
+
+@pytest.fixture(scope="module")
+def minari():
+    return pytest.importorskip("minari")
+
+
+@pytest.fixture(scope="module")
+def made(minari, tmp_path_factory):
+    """A folder of one data set, and what was told of it."""
+    folder = tmp_path_factory.mktemp("data")
+    (one,) = make_episodes.make_episodes(settings(), folder, workers=1)
+    return folder, one
+
+
+@pytest.fixture
+def data(made, minari, monkeypatch):
+    folder, one = made
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder))
+    return minari.load_dataset(one.dataset_id)
+
+
+class TestSettings:
+    def test_of_the_project_are_whole_and_have_seeds_of_their_own(self):
+        for name in names("dataset"):
+            found = load_episodes(name)
+            for policy_set in found.sets:
+                plans = list(found.plans(policy_set))
+                assert len(plans) == found.count(policy_set)
+                assert {plan.seed for plan in plans} <= set(seeds.DATA)
+                assert len({plan.seed for plan in plans}) == len(plans)
+                kinds = {(plan.policy, plan.noise, plan.place) for plan in plans}
+                assert len(kinds) * policy_set.episodes == len(plans)
+        assert {"dataset-known-line", "dataset-unknown-lines"} <= set(names("dataset"))
+        assert load_designs("dataset-designs").count >= 10_000
+
+    def test_seeds_for_data_are_nobody_else_s(self):
+        others = [each for purpose, each in seeds.SEEDS.items() if purpose != "data"]
+        tapes = range(seeds.TEST[0] + OTHER_SEED, seeds.TEST[-1] + OTHER_SEED + 1)
+        assert all(set(seeds.DATA).isdisjoint(each) for each in (*others, tapes))
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"title": "Known Line"}, "title"),
+            ({"places": [KNOWN, KNOWN]}, "is given twice"),
+            ({"environment": {"speed_kmh": 300}}, "speed_kmh belongs into places"),
+            ({"seed": 999_998}, "a set has 4 episodes from seed 999,998 on, of 1,000,000 seeds"),
+            ({"sets": [TABLE["sets"][0] | {"episodes": 0}]}, "episodes"),
+        ],
+    )
+    def test_nonsense_is_refused(self, changes, message):
+        with pytest.raises(InputError, match=message):
+            settings(**changes)
+
+    def test_what_cannot_be_run_is_refused_before_anything_is_made(self, tmp_path, minari):
+        for changes, message in (
+            ({"environment": {"distanse": 60}}, "arguments of the environment"),
+            ({"sets": [TABLE["sets"][0] | {"policies": ["pdd"]}]}, "Unknown policy 'pdd'"),
+            ({"places": [KNOWN | {"catenary": "nowhere"}]}, "nowhere"),
+            (
+                {
+                    "sets": [TABLE["sets"][0] | {"policies": ["tuned-pd"]}],
+                    "places": [KNOWN | {"speed_kmh": [200, 300]}],
+                },
+                "'tuned-pd' failed in reset: .* not for 200 km/h",
+            ),
+        ):
+            with pytest.raises(InputError, match=message):
+                make_episodes.make_episodes(settings(**changes), tmp_path / "out", workers=1)
+            assert not (tmp_path / "out").exists()
+
+    def test_sets_are_chosen_by_name(self):
+        found = load_episodes("dataset-known-line")
+        assert [each.name for each in chosen(found, ("passive",)).sets] == ["passive"]
+        with pytest.raises(InputError, match="There is no set 'pasive'"):
+            chosen(found, ("pasive",))
+
+
+class TestEpisodes:
+    def test_a_data_set_loads_and_gives_its_environment_back(self, data, made):
+        _, one = made
+        assert (one.episodes, one.steps, one.kept) == (len(data), data.total_steps, False)
+        env = data.recover_environment()
+        assert env.spec.kwargs["distance"] == 60.0
+        assert env.spec == data.env_spec
+        assert env.observation_space == data.observation_space
+        assert data.spec.env_spec.kwargs["catenary"] == "en50318-2002"
+
+    def test_seed_and_actions_give_an_episode_again(self, data):
+        env = data.recover_environment()
+        for k, (episode, facts) in enumerate(
+            zip(data, data.storage.get_episode_metadata(range(len(data))), strict=True)
+        ):
+            assert facts["seed"] == seeds.DATA[k]
+            observations, rewards = [env.reset(seed=facts["seed"], options=facts.get("options"))[0]], []
+            for step, action in enumerate(episode.actions, start=1):
+                observation, reward, terminated, truncated, info = env.step(action)
+                observations.append(observation)
+                rewards.append(reward)
+                assert info["contact_force"] == episode.infos["contact_force"][step]
+                assert info["reward_terms"]["rate"] == episode.infos["reward_terms"]["rate"][step]
+            np.testing.assert_array_equal(observations, episode.observations)
+            np.testing.assert_array_equal(rewards, episode.rewards)
+            assert (terminated, truncated) == (episode.terminations[-1], episode.truncations[-1])
+            assert truncated
+            assert facts["figures"]["std"] == info["figures"]["std"]
+            assert facts["return"] == pytest.approx(sum(rewards))
+
+    def test_noise_is_as_strong_as_asked_for_and_the_policy_s_own_wish_is_kept(self, data):
+        for episode, facts in zip(data, data.storage.get_episode_metadata(range(4)), strict=True):
+            added = episode.actions - episode.infos["policy_action"][1:]
+            inside = np.abs(episode.actions) < 1
+            assert np.std(added[inside]) == pytest.approx(facts["noise"], abs=0.05)
+            assert (np.abs(added).max() > 1e-6) == (facts["noise"] > 0)
+        assert {facts["noise"] for facts in data.storage.get_episode_metadata(range(4))} == {0.0, 0.2}
+
+    def test_metadata_say_what_it_is(self, data, made):
+        folder, one = made
+        told = data.storage.metadata
+        assert told["algorithm_name"] == "pd, with white noise of rms 0.2 on the action"
+        assert "Seeds 2000000 to 2000003" in told["description"]
+        assert told["code_permalink"].startswith("panto-env ")
+        card = (folder / one.dataset_id / "card.md").read_text()
+        assert card.startswith("# pantograph/tiny/noisy-pd-v0")
+        assert "| pd | 0.2 | en50318-2002 | 2 |" in card
+        assert "| 7 | force deviation |" in card
+
+    def test_the_same_is_made_again_to_the_last_byte_and_kept_where_it_is(self, made, tmp_path):
+        _, one = made
+        (again,) = make_episodes.make_episodes(settings(), tmp_path, workers=1)
+        file = "data/main_data.hdf5"
+        assert (again.folder / file).read_bytes() == (one.folder / file).read_bytes()
+        (kept,) = make_episodes.make_episodes(settings(), tmp_path, workers=1)
+        assert kept.kept
+        with pytest.raises(InputError, match=r"holds another data set of this id .*raise the version"):
+            make_episodes.make_episodes(settings(seed=7), tmp_path, workers=1)
+
+    def test_other_places_are_options_of_reset_and_a_policy_sees_what_it_asks_for(self):
+        both = settings(places=[KNOWN, OTHER])
+        plans = list(both.plans(both.sets[0]))
+        assert {plan.place for plan in plans} == {0, 1}
+        stage = Stage(both)
+        there = stage.play(plans[-1]._replace(noise=0.0))
+        assert both.options(plans[-1]) == OTHER
+        assert 240 <= there.infos["speed_kmh"][0] <= 260
+        np.testing.assert_array_equal(there.actions, there.infos["policy_action"][1:].astype(np.float32))
+        agent = Stage(settings()).play(plans[0]._replace(policy="agent-known-line"))
+        assert agent.observations.shape[1] == there.observations.shape[1] == 10
+        assert np.abs(agent.actions).max() > 0.01
+
+    def test_a_policy_whose_run_would_differ_is_refused(self, tmp_path):
+        path = tmp_path / "mine.py"
+        path.write_text(
+            "import numpy as np\nclass Mine:\n    observation = 'estimated'\n"
+            "    def reset(self, context): pass\n"
+            "    def act(self, seen): return np.zeros(1)\n"
+        )
+        plan = next(settings().plans(settings().sets[0]))
+        episode = Stage(settings()).play(plan._replace(policy=f"{path}:Mine"))
+        assert (episode.actions == 0).all()  # the filter changes what is seen, and nothing else
+        path.write_text(path.read_text().replace("np.zeros(1)", "np.full(1, np.nan)"))
+        with pytest.raises(InputError, match="its action must be finite numbers"):
+            Stage(settings()).play(plan._replace(policy=f"{path}:Mine"))
+
+
+class TestParts:
+    def test_killed_in_the_middle_it_goes_on_and_ends_the_same(self, minari, tmp_path, monkeypatch):
+        monkeypatch.setattr(make_episodes, "PER_PART", 1)
+        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz.sha256")
+        (tmp_path / "tiny.toml").write_text(
+            f"""
+            title = "tiny"
+            places = [{{ catenary = "en50318-2002", pantograph = "en50318-2002", speed_kmh = [290, 300] }}]
+            sets = [{{ name = "deadly", policies = ['{mortal}'], episodes = 12 }}]
+            [environment]
+            distance = 60
+            """
+        )
+        command = ("dataset", "episodes", "tiny.toml", "--output", "out", "--workers", 1)
+        killed = panto(*command, cwd=tmp_path)
+        assert killed.returncode == 2
+        assert "A worker process died" in killed.stderr
+        assert (tmp_path / "deadly.dead").exists()
+        kept = tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz"
+        before = kept.stat().st_mtime_ns
+        assert not (tmp_path / "out/pantograph").exists()
+        other = panto(*command, "--episodes", 13, cwd=tmp_path)
+        assert other.returncode == 2
+        assert "holds parts of another work (its sets is" in other.stderr
+        assert kept.stat().st_mtime_ns == before
+        done = panto(*command, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "12" in done.stdout
+        assert not (tmp_path / "out/.parts").exists()
+        whole = panto(*command[:3], "--output", "whole", "--workers", 1, cwd=tmp_path)
+        assert whole.returncode == 0, whole.stderr
+        file = "pantograph/tiny/deadly-v0/data/main_data.hdf5"
+        assert (tmp_path / "out" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+        assert panto("dataset", "verify", "out", cwd=tmp_path).returncode == 0
+
+    def test_the_whole_command_may_be_killed(self, tmp_path):
+        """SIGKILL of the command itself while a table is made: what is whole stays, and is not made again."""
+        (tmp_path / "few.toml").write_text(
+            'title = "few"\ncount = 200\n[ranges]\nspeed_kmh = [200, 300]\n"pantograph.masses.0" = [5, 10]\n'
+        )
+        command = [PANTO, "dataset", "designs", "few.toml", "--output", "out", "--workers", "1"]
+        process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
+        first = tmp_path / "out/.parts/designs/0000000.parquet"
+        while not first.with_name(f"{first.name}.sha256").exists():
+            assert process.poll() is None
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        made = first.stat().st_mtime_ns
+        assert not (tmp_path / "out/designs").exists()
+        shutil.copy(first, tmp_path / "first.parquet")
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        table = pq.read_table(tmp_path / "out/designs/designs.parquet")
+        assert table["design"].to_pylist() == list(range(200))
+        assert table["std"].to_pylist()[:64] == pq.read_table(tmp_path / "first.parquet")["std"].to_pylist()
+        assert made < (tmp_path / "out/designs").stat().st_mtime_ns
+
+    def test_two_processes_do_not_make_data_in_one_folder(self, tmp_path):
+        with (
+            alone_in(tmp_path, "makes data in"),
+            pytest.raises(InputError, match="Another process makes data in"),
+        ):
+            make_designs.make_designs(few_designs(), tmp_path, workers=1)
+
+
+class TestChecksums:
+    def test_files_are_as_listed_until_one_changes(self, made, tmp_path):
+        _, one = made
+        copied = tmp_path / "copy"
+        shutil.copytree(one.folder, copied)
+        assert verify(tmp_path) == [(copied, 3)]
+        listed = dict(reversed(line.split("  ")) for line in (copied / LIST).read_text().splitlines())
+        file = copied / "data/main_data.hdf5"
+        assert listed["data/main_data.hdf5"] == hashlib.sha256(file.read_bytes()).hexdigest()
+        (copied / "more.txt").write_text("mine")
+        with pytest.raises(InputError, match=r"more.txt is not in SHA256SUMS"):
+            verify(copied)
+        (copied / "more.txt").unlink()
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+        with pytest.raises(InputError, match=r"main_data.hdf5 is not what SHA256SUMS says"):
+            verify(copied)
+        file.unlink()
+        with pytest.raises(InputError, match=r"main_data.hdf5 is missing"):
+            verify(copied)
+        with pytest.raises(InputError, match="There is no SHA256SUMS in or below"):
+            verify(tmp_path / "nothing")
+        with pytest.raises(InputError, match="can be no file"):
+            verify(tmp_path / ("x" * 5000))
+
+
+class TestDesigns:
+    def test_a_part_draws_what_the_whole_draws_evenly_over_the_ranges(self):
+        found = few_designs(count=256)
+        values = designs.draw(found, 0, 256)
+        np.testing.assert_array_equal(values[100:130], designs.draw(found, 100, 130))
+        low, high = np.array(list(RANGES.values())).T
+        shares = (values - low) / (high - low)
+        assert ((shares >= 0) & (shares <= 1)).all()
+        for column in shares.T:
+            counts, _ = np.histogram(column, bins=16, range=(0, 1))
+            assert (counts == 16).all()
+
+    def test_a_row_is_what_simulate_says(self):
+        values = {"speed_kmh": 250.0, "catenary.span_length": 60.0, "pantograph.masses.0": 7.2}
+        row = designs.design(few_designs(), 5, values)
+        figures = simulate(speed_kmh=250.0).summary().as_dict()
+        assert {name: row[name] for name in designs.FIGURES} == {
+            name: figures[name] for name in designs.FIGURES
+        }
+        assert (row["design"], row["refused"], row["ending"], row["accuracy_warning"]) == (5, "", "", "")
+
+    def test_a_longer_span_takes_its_droppers_along(self):
+        values = {"speed_kmh": 250.0, "catenary.span_length": 54.0, "pantograph.masses.0": 7.2}
+        line, _ = designs.designed(few_designs(), values)
+        base = few_designs().entries()["catenary"]
+        assert line.span_length == 54.0
+        np.testing.assert_allclose(line.droppers.positions, 0.9 * np.array(base.droppers.positions))
+
+    def test_what_cannot_be_run_or_ends_early_or_is_inaccurate_has_a_row_that_says_so(self, tmp_path):
+        ranges = {"speed_kmh": (200.0, 600.0), "pantograph.static_force": (60.0, 900.0)}
+        found = few_designs(ranges=ranges, count=4)
+        refused = designs.design(found, 0, {"speed_kmh": 590.0, "pantograph.static_force": 120.0})
+        assert "km/h" in refused["refused"]
+        early = designs.design(found, 1, {"speed_kmh": 300.0, "pantograph.static_force": 880.0})
+        assert early["ending"].startswith("The run ended early at ")
+        assert {refused["std"], early["std"]} == {None}
+        assert early["time_step"] > 0
+        hard = few_designs(ranges={"speed_kmh": (200.0, 300.0), "pantograph.contact_stiffness": (5e4, 1e6)})
+        warned = designs.design(hard, 2, {"speed_kmh": 250.0, "pantograph.contact_stiffness": 9e5})
+        assert "A contact stiffer than" in warned["accuracy_warning"]
+        assert warned["std"] > 0
+
+    def test_a_table_tells_what_it_is(self, tmp_path):
+        found = few_designs(ranges=RANGES | {"catenary.encumbrance": (0.5, 1.3)}, count=8)
+        made = make_designs.make_designs(found, tmp_path, workers=1)
+        assert made.designs == 8
+        assert 0 < made.refused < 8
+        table = pq.read_table(made.folder / "designs.parquet")
+        assert table.num_rows == 8
+        assert (
+            sum(text != "" for text in table["refused"].to_pylist())
+            == made.refused
+            == table["std"].null_count
+        )
+        told = json.loads(table.schema.metadata[b"panto_env"])
+        assert told["settings"]["seed"] == 0
+        assert b"(m)" in table.schema.field("max_uplift").metadata[b"description"]
+        assert b"drawn from 200 to 300" in table.schema.field("speed_kmh").metadata[b"description"]
+        card = (made.folder / "card.md").read_text()
+        assert f"- {made.refused} of 8 refused (`refused`):" in card
+        assert verify(tmp_path) == [(made.folder, 2)]
+        assert make_designs.make_designs(found, tmp_path, workers=1).kept
+        with pytest.raises(InputError, match=r"holds another table .*its seed is 0, this is 1"):
+            make_designs.make_designs(found.model_copy(update={"seed": 1}), tmp_path, workers=1)
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"ranges": {"pantograph.masses.0": (5, 10)}}, "ranges must have speed_kmh"),
+            ({"ranges": RANGES | {"pantograph.mases.0": (5, 10)}}, "did you mean 'pantograph.masses.0'"),
+            ({"ranges": RANGES | {"actuator.lag": (0, 0.1)}}, "must be speed_kmh or begin with"),
+            ({"ranges": {"speed_kmh": (300, 200)}}, "must rise"),
+            ({"count": 0}, "count"),
+        ],
+    )
+    def test_nonsense_is_refused(self, changes, message):
+        with pytest.raises(InputError, match=message):
+            few_designs(**changes)
+
+
+def test_without_minari_its_extra_is_named(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "minari", None)
+    with pytest.raises(InputError, match=r"need Minari, which is not installed .*'panto-env\[data\]'"):
+        make_episodes.make_episodes(settings(), tmp_path, workers=1)
+
+
+def test_kept_parts_count_as_done_and_damaged_ones_are_made_again(tmp_path):
+    told, path = [], tmp_path / "0.txt"
+    parts.make_parts({path: partial(_text, "whole")}, workers=1)
+    parts.make_parts({path: _never}, workers=1, progress=lambda *done: told.append(done))
+    assert told == [(1, 1)]
+    for damage in (lambda: path.write_text("Whole"), path.unlink):
+        damage()
+        parts.make_parts({path: partial(_text, "again")}, workers=1)
+        assert path.read_text() == "again"
+
+
+def _text(text, path):
+    path.write_text(text)
+
+
+def _never(path):
+    raise AssertionError("what is there is not made again")

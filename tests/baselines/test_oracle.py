@@ -1,0 +1,459 @@
+"""The oracle: its knots, its responses, its optimum beside SciPy's, what it keeps to, what is stored."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from scipy.integrate import solve_ivp
+from scipy.optimize import lsq_linear
+from scipy.signal import butter, sosfilt
+from typer.testing import CliRunner
+
+from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
+from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.benchmark.single_pass import along
+from panto_baselines.oracle import command, problem, report, search, solver, stored
+from panto_baselines.oracle.knots import Knots
+from panto_baselines.oracle.problem import Problem
+from panto_baselines.oracle.search import find, noise
+from panto_baselines.oracle.settings import oracle_settings
+from panto_baselines.oracle.solver import descend
+from panto_configs import find as find_config
+from panto_env import InputError, simulate
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.actuators import actuator_settings
+
+from ..pages import check_page, tables_of
+
+SHORT: dict[str, Any] = {"line_condition": "fair", "actuator": "realistic", "speed_kmh": 300.0}
+SPANS = (2, 2)
+LINEAR: dict[str, Any] = {
+    "catenary": "periodic-stiffness",
+    "pantograph": "three-mass",
+    "speed_kmh": 250.0,
+    "actuator": "ideal:force_limit=25",
+    "bilateral": True,
+    "time_step": 2.5e-3,
+}
+
+
+@pytest.fixture(scope="module")
+def short() -> Problem:
+    return Problem(SHORT, seed=3, spans=SPANS)
+
+
+@pytest.fixture(scope="module")
+def descent(short: Problem) -> solver.Descent:
+    return descend(short, "zero", np.zeros((short.count, 1)), iterations=4)
+
+
+# --- knots ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("actuator", ["ideal", "realistic:rate_limit=1e8", "realistic"])
+def test_commands_lead_the_force_from_knot_to_knot(actuator: str):
+    chosen = actuator_settings(actuator)
+    time_step, steps = 1e-4, 100
+    knots = Knots(chosen, time_step, steps)
+    wanted = knots.within(np.cumsum(np.random.default_rng(1).normal(0, 30, (60, 1)), axis=0))
+    commands = knots.commands(wanted)[:, 0]
+    assert np.abs(commands).max() <= chosen.force_limit
+    # The actuator's own equation, by SciPy: f' = (u - f) / lag, no faster than the limit of rate.
+    limits = (-chosen.rate_limit, chosen.rate_limit) if chosen.rate_limit else ()
+    force, reached = 0.0, []
+    for asked in commands:
+        if chosen.lag == 0:
+            force = asked
+        else:
+            answer = solve_ivp(
+                lambda _, f, asked=asked: np.clip((asked - f) / chosen.lag, *limits),
+                (0, 0.01), [force], max_step=2e-4, rtol=1e-8, atol=1e-8,
+            )  # fmt: skip
+            force = answer.y[0, -1]
+        reached.append(force)
+    assert np.abs(np.array(reached) - wanted[:, 0]).max() < 0.25
+
+
+def test_limits_are_those_of_the_real_actuator():
+    knots = Knots(actuator_settings("realistic"), 1.25e-3, 8)
+    assert knots.largest_change == pytest.approx(25.0)
+    steepest = np.minimum(25.0 * np.arange(1, 5), 100.0)[:, None]
+    assert knots.at_limits(steepest * 0.5) < 1.0
+    assert np.allclose(knots.within(1000 * steepest).max(), knots.within(2000 * steepest).max())
+    limits = knots.limits(4)
+    assert (limits.matrix @ steepest[:, 0] > limits.high).any()  # near its limit a lag cannot go on so fast
+    assert (np.abs(limits.matrix @ knots.within(steepest)[:, 0]) <= limits.high * (1 + 1e-12)).all()
+
+
+# --- the response --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("given", [SHORT | {"actuator": "ideal"}, LINEAR], ids=["flexible", "massless"])
+def test_response_is_the_difference_of_whole_runs(given: dict[str, Any], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(problem, "MEMORY", 100.0)
+    asked = Problem(given, seed=3, spans=SPANS)
+    knots = asked.knots.within(noise(asked))
+    response = asked.response(knots)
+    some = [0, 1, asked.count // 2, asked.count - 2]
+    pushed = np.repeat(knots[None], len(some) + 1, axis=0)
+    for k, knot in enumerate(some):
+        pushed[k, knot, 0] += problem.PUSH
+    free = asked._filtered(asked._free.forces(pushed))[:, asked.rows]
+    expected = (free[:-1] - free[-1]) / problem.PUSH
+    assert np.abs(expected).max() > 1e-3
+    np.testing.assert_allclose(response[:, some].T, expected, atol=1e-12)
+
+
+# --- the optimum ---------------------------------------------------------------------------------
+
+
+def filtered_forces_by_scipy(asked: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Paper 3's equations solved by SciPy: passive force, filtered, and its change by each knot (N/N)."""
+    line, data = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
+    (m1, m2, m3), (k1, k2, k3), (c1, c2, c3) = data.masses, data.stiffnesses, data.dampings
+    speed = LINEAR["speed_kmh"] / 3.6
+
+    def stiffness(t):
+        turns = speed * t / line.span_length
+        return line.mean_stiffness * (1 + line.stiffness_variation * np.cos(2 * np.pi * turns))
+
+    def rates(t, y, lift):
+        z1, z2, z3, v1, v2, v3 = y.reshape(6, -1)
+        upper, middle = c1 * (v1 - v2) + k1 * (z1 - z2), c2 * (v2 - v3) + k2 * (z2 - z3)
+        push = (lift + middle - c3 * v3 - k3 * z3) / m3
+        return np.concatenate([v1, v2, v3, -(upper + stiffness(t) * z1) / m1, (upper - middle) / m2, push])
+
+    count, step, steps = asked.count, asked.passive.time_step, asked.steps
+    lift = np.zeros(count + 1)  # the last run is the passive one, the others the response to one knot
+    lift[-1] = data.nominal_force(speed)
+    stiff = np.array([[k1, -k1, 0], [-k1, k1 + k2, -k2], [0, -k2, k2 + k3]], dtype=float)
+    stiff[0, 0] += stiffness(0)
+    state = np.zeros((6, count + 1))
+    state[:3, -1] = np.linalg.solve(stiff, [0, 0, lift[-1]])
+    forces = []
+    for interval in range(asked.begin + count):
+        begin, own = interval * steps * step, lift.copy()
+        if interval >= asked.begin:
+            own[interval - asked.begin] = 1.0
+        middles = begin + (np.arange(steps) + 0.5) * step
+        answer = solve_ivp(
+            rates, (begin, begin + steps * step), state.ravel(), t_eval=[*middles, begin + steps * step],
+            args=(own,), rtol=1e-7, atol=1e-10,
+        )  # fmt: skip
+        heights = answer.y.reshape(6, count + 1, -1)
+        forces.append(stiffness(middles)[:, None] * heights[0, :, :-1].T)
+        state = heights[:, :, -1]
+    force = np.concatenate(forces)
+    filtered = sosfilt(butter(6, 20, fs=1 / step, output="sos"), force - lift[-1] * (lift > 0), axis=0)
+    filtered[:, -1] += lift[-1]
+    inside = asked.begin * steps + asked._inside
+    return filtered[inside, -1], filtered[inside, :-1]
+
+
+def test_optimum_of_a_linear_line_is_that_of_scipys_least_squares(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(problem, "LEAD", 0.6)
+    asked = Problem(LINEAR, spans=(3, 3))
+    passive, response = filtered_forces_by_scipy(asked)
+    assert passive.std() == pytest.approx(asked.figures.std, rel=0.01)
+    held = 100 * np.sqrt(len(passive)) * response.mean(axis=0)  # the mean, which is to stay
+    matrix = np.vstack([response - response.mean(axis=0), held])
+    wanted = np.append(passive.mean() - passive, 0.0)
+    best = lsq_linear(matrix, wanted, (-25.0, 25.0), tol=1e-12)
+    std = (passive + response @ best.x).std()
+    assert std < 0.9 * passive.std()
+    reached = descend(asked, "zero", np.zeros((asked.count, 1))).std / asked.figures.std
+    assert reached == pytest.approx(std / passive.std(), abs=0.005)
+
+
+def test_every_iteration_is_better_and_the_mean_stays(short: Problem, descent: solver.Descent):
+    passive = short.figures
+    merits = [each.std + solver.MEAN_WEIGHT * abs(each.mean - passive.mean) for each in descent.iterations]
+    assert all(after <= before for before, after in pairwise(merits))
+    assert descent.iterations[0].std == pytest.approx(passive.std, rel=1e-12)
+    assert descent.std < 0.8 * passive.std
+    assert descent.iterations[-1].mean == pytest.approx(passive.mean, rel=search.MEAN_TOLERANCE)
+
+
+def test_simulate_says_the_same_to_the_digit(short: Problem, descent: solver.Descent):
+    run = short.replay(short.knots.commands(descent.knots))
+    figures = run.summary(SPANS)
+    assert figures.std == pytest.approx(descent.std, rel=1e-12)
+    assert figures.mean == pytest.approx(descent.iterations[-1].mean, rel=1e-12)
+
+
+def test_the_force_keeps_the_actuators_limits(short: Problem, descent: solver.Descent):
+    actuator = short.settings.actuator
+    force = short.replay(short.knots.commands(descent.knots)).frame_force
+    assert 0.5 * actuator.force_limit < np.abs(force).max() <= actuator.force_limit * (1 + 1e-9)
+    largest = actuator.rate_limit * short.passive.time_step
+    # What is recorded is the mean over a step, which may change by a little more than the force itself.
+    assert 0.9 * largest < np.abs(np.diff(force)).max() <= 1.01 * largest
+    assert not force[: short.begin * short.steps].any()
+
+
+def test_a_mean_off_the_passive_one_counts_in_the_merit(short: Problem):
+    force = short.figures.mean + np.array([1.5, -0.5, 1.5, -0.5])
+    assert solver.merit(short, force) == pytest.approx(1.0 + solver.MEAN_WEIGHT * 0.5, rel=1e-9)
+
+
+def test_broydens_correction_meets_what_was_seen():
+    random = np.random.default_rng(0)
+    response, step, change = random.normal(size=(5, 3)), random.normal(size=3), random.normal(size=5)
+    after = solver.corrected(response, step, change)
+    np.testing.assert_allclose(after @ step, change)
+    across = np.cross(step, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(after @ across, response @ across)
+
+
+def test_response_along_directions_is_that_of_their_knots(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(problem, "LEAD", 0.6)
+    monkeypatch.setattr(problem, "MEMORY", 100.0)
+    asked = Problem(LINEAR, spans=(3, 3))
+    knots, basis = asked.knots.within(noise(asked)), search.span_periodic(asked)
+    np.testing.assert_allclose(asked.response_along(knots, basis), asked.response(knots) @ basis, atol=1e-9)
+
+
+def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkeypatch: pytest.MonkeyPatch):
+    begun: list[np.ndarray] = []
+
+    def followed(asked: Problem, start: str, knots: np.ndarray, **more: Any) -> solver.Descent:
+        begun.append(knots)
+        return descend(asked, start, knots, iterations=2, **more)
+
+    monkeypatch.setattr(search, "descend", followed)
+    found = find(short, hops=2)
+    assert [each.start for each in found.searches] == ["zero", "hop 1", "hop 2"]
+    assert found.best.std == min(each.std for each in found.searches)
+    for hop in (1, 2):
+        before = min(found.searches[:hop], key=lambda each: each.std)
+        shaken = np.sqrt(np.mean((begun[hop] - before.knots) ** 2))
+        assert 0.5 * search.HOP_FORCE < shaken < 3 * search.HOP_FORCE  # more, where limits shrink the whole
+
+
+def test_what_repeats_from_span_to_span_does(short: Problem):
+    basis = search.span_periodic(short)
+    per_span = short.passive.span_length / (short.passive.speed_kmh / 3.6 * short.interval)
+    assert per_span == round(per_span)
+    assert basis.shape == (short.count, 2 * search.HARMONICS + 1)
+    np.testing.assert_allclose(basis[round(per_span) :], basis[: -round(per_span)], atol=1e-9)
+
+
+# --- what is stored ------------------------------------------------------------------------------
+
+
+def test_stored_oracles_are_what_simulate_says_today():
+    cells = stored.load()["cells"]
+    assert cells
+    for cell in cells:
+        names = ("catenary", "pantograph", "speed_kmh", "actuator", "line_condition", "control_interval")
+        given, spans = {name: cell[name] for name in names}, tuple(cell["spans"])
+        assert stored.fingerprint(given) == cell["asked"]["fingerprint"]
+        ratios = [each["oracle"]["std"] / each["passive"]["std"] for each in cell["passes"]]
+        assert stored.stored_ratio(given, spans) == pytest.approx(np.mean(ratios), rel=1e-12)
+        kept = cell["passes"][0]
+        asked = Problem(given, kept["seed"], spans)
+        figures = asked.replay(np.array(kept["commands"])).summary(spans)
+        assert asked.begin == kept["first_step"]
+        assert asked.figures.std == pytest.approx(kept["passive"]["std"], rel=1e-6)
+        assert figures.std == pytest.approx(kept["oracle"]["std"], rel=1e-6)
+        assert figures.mean == pytest.approx(asked.figures.mean, rel=search.MEAN_TOLERANCE)
+
+
+def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
+    given, spans = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "fair"}, (10, 19)
+    ratio = stored.stored_ratio(given, spans)
+    assert ratio is not None
+    assert 0.2 < ratio < 0.75
+    assert stored.stored_ratio(given | {"sensors": "realistic", "observation": "full"}, spans) == ratio
+    assert stored.stored_ratio(given, (4, 9)) is None
+    others: list[dict[str, Any]] = [
+        {"speed_kmh": 301},
+        {"actuator": "realistic:delay=0.006"},
+        {"actuator": "realistic:place=head"},
+        {"actuator": "ideal"},
+        {"actuator": {"kind": "motor", "place": "frame"}},
+        {"line_condition": "new"},
+        {"control_interval": 0.02},
+        {"pantograph": "dsa380"},
+        {"mean_force": 120.0},
+        {"time_step": 1e-3},
+    ]
+    for other in others:
+        assert stored.stored_ratio(given | other, spans) is None
+
+
+@pytest.mark.parametrize("track", ["known-line", "head", "high-speed"])
+def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
+    settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
+    (line,) = settings.lines
+    oracles = oracle_settings("oracle", {}, {})
+    known = {each["fingerprint"] for each in stored.asked(oracles)}
+    for speed in line.speeds_kmh:
+        assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
+    assert oracles.spans == evaluated_spans(settings, line)
+
+
+def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
+    settings = load_benchmark(find_config("benchmark/known-line", "benchmark"))
+    kept = {
+        each["speed_kmh"]: 100 * (each["ratio"] - 1)
+        for each in stored.load()["cells"]
+        if (each["catenary"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
+    }
+    assert kept
+    found = stored_bounds(settings, [(10, 19)])
+    assert {speed: bound for (_, _, speed), bound in found.items()} == kept
+    assert stored_bounds(settings, [(4, 9)]) == {}
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def called(*arguments: str) -> Any:
+    app = typer.Typer()
+    app.command()(command.oracle)
+    return CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+
+
+def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(search, "descend", partial(descend, iterations=3))
+    file, picture = tmp_path / "o.json", tmp_path / "o.png"
+    result = called(
+        "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
+        "--start", "random", "--hops", "1", "--output", str(file), "--plot", str(picture),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    for word in ("random", "seed 0", "iteration", "local optimum"):
+        assert word in result.output
+    cell = json.loads(file.read_text())["cells"][0]
+    assert [each["seed"] for each in cell["passes"]] == [0, 1]
+    assert [each["start"] for each in cell["passes"][1]["searches"]] == ["seed 0", "hop 1"]
+    given = {"speed_kmh": 300, "line_condition": "fair"}
+    assert stored.stored_ratio(given, SPANS, file) == cell["ratio"]
+    again = simulate(**given, seed=1, distance=None).summary((2, 2))
+    assert cell["passes"][1]["passive"]["std"] == again.std
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+LIST = """
+import sys, time
+import typer
+from panto_baselines.oracle import command, search, solver
+
+forever = "forever" in sys.argv
+searched = 0
+
+def descend(*given, **more):
+    global searched
+    searched += 1
+    print("searched", flush=True)
+    if forever and searched == 2:
+        time.sleep(600)
+    return solver.descend(*given, **more | {"iterations": 3})
+
+search.descend = descend
+app = typer.Typer()
+app.command()(command.oracle)
+line = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--actuator", "ideal"]
+cells = ["--line-condition", "new", "--speed", "250", "--speed", "300", "--spans", "2-2", "--hops", "0"]
+sys.argv = ["panto", *line, *cells, "--output", sys.argv[1]]
+app()
+"""
+
+
+def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
+    file = tmp_path / "list.json"
+    order = [sys.executable, "-c", LIST, str(file)]
+    with subprocess.Popen([*order, "forever"], cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+        while not file.exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.kill()  # SIGKILL, in the second cell
+    assert process.returncode != 0
+    (first,) = stored.read(file)["cells"]
+
+    def output() -> str:
+        return subprocess.run(order, cwd=tmp_path, text=True, check=True, capture_output=True).stdout
+
+    second_time = output()
+    assert second_time.count("searched") == 1
+    assert "1 of 2 cells are those that were in" in second_time
+    cells = stored.read(file)["cells"]
+    assert cells[0] == first
+    assert [each["speed_kmh"] for each in cells] == [250.0, 300.0]
+    whole = file.read_bytes()
+    assert "searched" not in output()
+    assert file.read_bytes() == whole
+
+
+def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.MonkeyPatch):
+    settings = oracle_settings(None, {}, {})
+    (before,) = stored.asked(settings)
+    assert stored.asked(settings) == [before]
+    others: tuple[dict[str, Any], ...] = (
+        {"seeds": [1]},
+        {"spans": [2, 2]},
+        {"starts": ["random"]},
+        {"hops": 1},
+    )
+    for changes in others:
+        assert stored.asked(oracle_settings(None, changes, {})) != [before]
+    assert stored.asked(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
+    monkeypatch.setattr(stored, "METHOD", search.METHOD + 1)
+    assert stored.asked(settings) != [before]
+
+
+@pytest.mark.filterwarnings("ignore::panto_env.base.errors.UncheckedWarning")
+@pytest.mark.parametrize("text", ["", "[]", '{"cells": [{"fingerprint": "0"}]}'])
+def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
+    file = tmp_path / "o.json"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"holds no oracles of this version; remove it|is not JSON"):
+        stored.read(file)
+    assert isinstance(called("--output", str(file)).exception, InputError)
+    assert file.read_text() == text
+
+
+def test_stored_oracles_are_printed_as_the_page_shows_them():
+    table = report.stored_table(stored.load())
+    assert len(tables_of("oracle.md")[table.title][1]) == len(table.rows)
+    check_page("oracle.md", {table.title: table})
+    assert "Stored oracles" in called("--stored").output
+
+
+def test_a_file_s_cells_are_replaced_by_one_on_the_command_line():
+    whole = oracle_settings("oracle", {}, {})
+    assert len(list(whole.runs())) == sum(len(cell.speeds_kmh) for cell in whole.cells)
+    one = oracle_settings("oracle", {"seeds": [5]}, {"speeds_kmh": [310]})
+    assert [given["speed_kmh"] for given in one.runs()] == [310.0]
+    assert one.seeds == (5,)
+    assert one.spans == whole.spans
+
+
+@pytest.mark.parametrize(
+    ("changes", "cell", "words"),
+    [
+        ({"starts": ["best"]}, {}, "starts"),
+        ({"seeds": [-1]}, {}, "seeds"),
+        ({}, {"actuator": "strong"}, "actuator"),
+        ({}, {"speeds_kmh": []}, "speeds_kmh"),
+    ],
+)
+def test_bad_settings_are_refused(changes: dict[str, Any], cell: dict[str, Any], words: str):
+    with pytest.raises(InputError, match=words):
+        oracle_settings(None, changes, cell)
+
+
+def test_problems_without_an_oracle_are_refused(short: Problem):
+    with pytest.raises(InputError, match="one speed"):
+        Problem({"speed_kmh": (250, 300)})
+    with pytest.raises(InputError, match="start must be one of zero, periodic, random, not 'best'"):
+        find(short, ("best",))

@@ -1,0 +1,218 @@
+"""Work over a Ray cluster of two machines, which here are two nodes of this one; `make ray` runs it.
+
+Workers are killed by a policy, ``deadly``.
+"""
+
+import csv
+import importlib
+import os
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("ray")
+pytest.importorskip("stable_baselines3")
+
+import ray
+from ray.cluster_utils import Cluster
+
+from panto_agents.model_file import read_model
+from panto_agents.settings import Training, parse_training
+from panto_agents.trainings import train_all
+from panto_baselines.benchmark.run import run
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.tuning.parts import tune
+from panto_env import InputError
+from panto_env.cluster import spread, tasks
+from panto_env.control.settings import run_settings
+
+from ..deadly import deadly
+
+NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
+
+
+@pytest.fixture(scope="module")
+def two_nodes():
+    """Address of a cluster of two nodes with one CPU each."""
+    cluster = Cluster(initialize_head=True, head_node_args=NODE)
+    cluster.add_node(**NODE)
+    yield cluster.address
+    cluster.shutdown()
+
+
+def node(mark: Path) -> str:
+    """Node of a job that waits until another one has begun."""
+    mark.touch()
+    begun = time.monotonic()
+    while len(list(mark.parent.iterdir())) < 2 and time.monotonic() < begun + 60:
+        time.sleep(0.05)
+    return ray.get_runtime_context().get_node_id()
+
+
+def later(seconds: float, result: str) -> str:
+    time.sleep(seconds)
+    return result
+
+
+def threads_of_linear_algebra() -> str | None:
+    return os.environ.get("OPENBLAS_NUM_THREADS")
+
+
+def fail() -> None:
+    raise InputError("This job fails.")
+
+
+def divide() -> float:
+    return 1 / 0
+
+
+def die() -> None:
+    os.kill(os.getpid(), 9)
+
+
+class TestJobs:
+    def test_both_nodes_work(self, two_nodes, tmp_path):
+        one, other = spread([partial(node, tmp_path / name) for name in "ab"], ray=two_nodes)
+        assert one != other
+
+    def test_a_job_runs_in_the_folder_of_the_caller(self, two_nodes, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        assert spread([os.getcwd], ray=two_nodes) == [str(tmp_path)]
+
+    def test_a_job_that_a_machine_cannot_load_is_named(self, two_nodes, tmp_path, monkeypatch):
+        (tmp_path / "only_here.py").write_text("def work():\n    return 1\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        job = importlib.import_module("only_here").work
+        monkeypatch.setattr(sys, "path", sys.path[1:])  # which Ray hands to the workers
+        with pytest.raises(InputError, match=r"could not load a job \(.*No module named 'only_here'\)"):
+            spread([job], ray=two_nodes)
+
+    def test_results_are_in_order_and_progress_counts_every_job(self, two_nodes):
+        done = []
+        jobs = [partial(later, 0.5, "first"), partial(later, 0.0, "second"), partial(later, 0.0, "third")]
+        results = spread(jobs, ray=two_nodes, progress=lambda *counts: done.append(counts))
+        assert results == ["first", "second", "third"]
+        assert done == [(1, 3), (2, 3), (3, 3)]
+
+    def test_a_worker_has_one_thread_of_linear_algebra(self, two_nodes):
+        assert spread([threads_of_linear_algebra], ray=two_nodes) == ["1"]
+
+    def test_errors_of_jobs_come_through(self, two_nodes):
+        with pytest.raises(InputError) as caught:
+            spread([fail, partial(later, 0.0, "never mind")], ray=two_nodes)
+        assert str(caught.value) == "This job fails."
+        with pytest.raises(ZeroDivisionError):
+            spread([divide], ray=two_nodes)
+
+    def test_a_job_that_always_kills_its_worker_is_given_up(self, two_nodes, monkeypatch):
+        monkeypatch.setattr(tasks, "RETRIES", 1)
+        with pytest.raises(InputError, match="begun 2 times on the Ray cluster and lost each time") as caught:
+            spread([die], ray=two_nodes)
+        assert "\n" not in str(caught.value)
+
+    def test_a_machine_with_other_sources_is_refused(self, two_nodes, monkeypatch):
+        monkeypatch.setattr(tasks, "source_hash", lambda: "of another version")
+        with pytest.raises(InputError, match="has other sources of panto-env"):
+            spread([partial(later, 0.0, "never")], ray=two_nodes)
+
+    def test_what_cannot_be_joined(self, two_nodes):
+        for address in ("nowhere:at-all", "127.0.0.1:1"):
+            with pytest.raises(InputError, match=f"No Ray cluster could be joined at '{address}'") as caught:
+                spread([fail], ray=address)
+            assert "\n" not in str(caught.value)
+        with pytest.raises(InputError, match="leave out either workers or ray"):
+            spread([fail], ray=two_nodes, workers=2)
+        ray.init(address=two_nodes, logging_level="ERROR")
+        try:
+            with pytest.raises(InputError, match="connected to a Ray cluster already"):
+                spread([fail], ray=two_nodes)
+        finally:
+            ray.shutdown()
+
+    def test_a_cluster_of_this_machine_alone_ends_with_the_jobs(self):
+        assert spread([partial(later, 0.0, "done")] * 2, ray="local") == ["done", "done"]
+        assert not ray.is_initialized()
+
+
+def test_a_benchmark_whose_worker_is_killed_is_that_of_processes(two_nodes, tmp_path):
+    line = Line(catenary="periodic-stiffness", pantograph="three-mass", speeds_kmh=(250.0, 300.0))
+    policy = deadly(tmp_path, wanted=tmp_path)
+    settings = BenchmarkSettings(policies=(policy, "pd"), lines=(line,), seeds=2)
+    spread_out = run(settings, ray=two_nodes)
+    assert (tmp_path / "deadly.dead").exists()
+    assert spread_out.as_dict() == run(settings, workers=2).as_dict()
+    assert len(spread_out.rows) == 2 * 3 * 2
+
+
+def test_a_machine_that_dies_loses_no_job(tmp_path):
+    cluster = Cluster(initialize_head=True, head_node_args=NODE)
+    try:
+        doomed = cluster.add_node(**NODE)
+        jobs = [partial(node, tmp_path / "a"), partial(node, tmp_path / "b")]
+        jobs += [partial(later, 3.0, str(k)) for k in range(4)]
+
+        def kill_after_two(done, count):
+            if done == 2:
+                cluster.remove_node(doomed, allow_graceful=False)
+
+        results = spread(jobs, ray=cluster.address, progress=kill_after_two)
+    finally:
+        cluster.shutdown()
+    assert results[0] != results[1]  # both machines had begun to work
+    assert results[2:] == ["0", "1", "2", "3"]
+
+
+def test_gains_are_those_that_processes_find(two_nodes, tmp_path):
+    settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
+    given = {"speeds_kmh": (250.0, 300.0), "seeds": 1, "passes": 40}
+    on_ray = tune(tmp_path / "ray", "skyhook", settings, **given, ray=two_nodes)
+    assert on_ray == tune(tmp_path / "here", "skyhook", settings, **given, workers=1)
+
+
+def training(seed: int, **changes) -> Training:
+    table = {
+        "algorithm": "ppo",
+        "seed": seed,
+        "total_steps": 768,
+        "lanes": 2,
+        "checkpoint_steps": 128,
+        "environment": {"id": "PantographStiffness-v0", "distance": 80.0},
+        "evaluation": {"interval_steps": 128},
+        "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
+    }
+    return parse_training(table | changes, "test")
+
+
+def weights(folder: Path) -> list[np.ndarray]:
+    _, actor = read_model(folder / "model.zip")
+    return [*actor.weights, *actor.biases]
+
+
+def test_trainings_learn_what_they_learn_in_processes(two_nodes, tmp_path):
+    ways = {"ray": {"ray": two_nodes}, "processes": {"workers": 1}}
+    for way, given in ways.items():
+        outcomes = train_all({tmp_path / way / str(seed): training(seed) for seed in (1, 2)}, **given)
+        assert [outcome.seed for outcome in outcomes] == [1, 2]
+    for seed in ("1", "2"):
+        pairs = zip(weights(tmp_path / "ray" / seed), weights(tmp_path / "processes" / seed), strict=True)
+        for one, other in pairs:
+            np.testing.assert_array_equal(one, other)
+        tables = [(tmp_path / way / seed / "evaluations.csv").read_text() for way in ways]
+        assert tables[0] == tables[1]
+    with pytest.raises(InputError, match="exists already"):
+        train_all({tmp_path / "new": training(3), tmp_path / "ray" / "1": training(1)}, ray=two_nodes)
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, tmp_path):
+    folder = tmp_path / "run"
+    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.zip")
+    train_all({folder: training(1, residual_of=policy), tmp_path / "other": training(2)}, ray=two_nodes)
+    assert (tmp_path / "deadly.dead").exists()
+    assert read_model(folder / "model.zip")[0].steps == 768
+    with (folder / "evaluations.csv").open(newline="") as file:
+        assert [row["steps"] for row in csv.DictReader(file)] == [str(128 * k) for k in range(7)]

@@ -1,0 +1,155 @@
+"""A speed that drifts: the way is its integral, and everything that counts metres agrees with it."""
+
+import gymnasium
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_simpson
+
+from panto_env import InputError, simulate
+from panto_env.backend import python_function
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
+from panto_env.metrics.trajectory import Trajectory
+from panto_env.plant.drift import ahead, draw_drift, largest_drift, largest_lag
+from panto_env.plant.trigonometry import sine_of_turns
+
+from ..lanes import check_lanes_are_singles
+
+NAMES = ("panto_env:Pantograph-v0", "panto_env:PantographStiffness-v0")
+DRIFT = {"speed_drift": 4.0}
+SIMPLE = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
+
+
+def speeds(drift, times, time_step):
+    """Drift of the speed (m/s) at times (s), from its waves."""
+    waves = drift[1:].reshape(-1, 3)
+    turns = np.outer(times / time_step, waves[:, 1]) + waves[:, 2]
+    return (2 * np.pi * waves[:, 0] * waves[:, 1] / time_step * np.cos(2 * np.pi * turns)).sum(axis=1)
+
+
+def test_the_drift_is_of_its_size_slow_and_bounded():
+    rms, time_step = 1.3, 1e-3
+    drawn = [draw_drift(rms, time_step, np.random.default_rng(seed)) for seed in range(400)]
+    assert np.mean([speeds(drift, np.array([2.0]), time_step)[0] ** 2 for drift in drawn]) == pytest.approx(
+        rms**2, rel=0.15
+    )
+    times = np.arange(0, 400, 0.05)
+    for drift in drawn[:20]:
+        speed = speeds(drift, times, time_step)
+        assert np.sqrt(np.mean(speed**2)) == pytest.approx(rms, rel=0.1)
+        assert np.abs(speed).max() <= largest_drift(rms)
+        assert np.abs(np.diff(speed)).max() / 0.05 < 0.85 * rms  # m/s^2
+        assert np.abs(ahead(drift[None], times[None] / time_step)).max() <= largest_lag(rms)
+
+
+def test_the_way_is_the_integral_of_the_speed():
+    time_step = 2e-3
+    drift = draw_drift(1.0, time_step, np.random.default_rng(4))
+    times = np.linspace(0, 60, 6001)
+    way = cumulative_simpson(speeds(drift, times, time_step), x=times, initial=0)
+    np.testing.assert_allclose(ahead(drift[None], times[None] / time_step)[0], way, atol=1e-7)
+
+
+def test_the_kernel_s_train_is_where_python_s_is():
+    env = gymnasium.make(NAMES[1], **DRIFT, speed_kmh=200.0, distance=700.0).unwrapped
+    env.reset(seed=2)
+    positions, observed, ended = [], [], False
+    while not ended:
+        observation, _, *ends, info = env.step(np.zeros(1))
+        positions.append(info["position"])
+        observed.append(env.context.layout.read(observation, "speed"))
+        ended = any(ends)
+    task, run = env.task, env.trajectory
+    steps = task.length.control_steps * np.arange(1, len(positions) + 1)
+    row = task.plant.run.drift[0, :, 0]
+    times = steps * task.plant.time_step
+    expected = 200 / 3.6 * times + ahead(row[None], steps[None])[0]
+    np.testing.assert_allclose(positions, expected, atol=1e-9)
+    np.testing.assert_allclose(observed, 200 / 3.6 + speeds(row, times, task.plant.time_step), rtol=1e-6)
+    assert np.ptp(observed) > 1.0
+    # The last control step is the first that ends beyond the distance.
+    assert positions[-2] < 700.0 <= positions[-1]
+    # Samples are of the middle of their steps.
+    middle = 200 / 3.6 * run.time + ahead(row[None], run.time[None] / run.time_step)[0]
+    np.testing.assert_allclose(run.position, middle, atol=1e-9)
+    assert env.task.length.most_control_steps >= len(positions)
+
+
+@pytest.mark.parametrize("line", [SIMPLE, {}])
+def test_figures_kept_as_it_runs_are_those_of_the_record(line, tmp_path):
+    task = Task(run_settings(line | DRIFT | {"distance": 900.0, "speed_kmh": 250.0}))
+    task.reset(0, np.random.default_rng(1))
+    task.run_passively()
+    run = task.trajectory(0)
+    kept, recorded = task.figures(0).as_dict(), run.summary("all").as_dict()
+    for name, value in recorded.items():
+        if name != "max_uplift":
+            # Of the way, the one takes the mean of a control step, the other each step.
+            assert kept[name] == pytest.approx(value, rel=1e-4, abs=1e-9), name
+    assert kept["distance"] == pytest.approx(run.distance, abs=0.01)  # a tenth of a step
+    assert run.distance != pytest.approx(run.speed_kmh / 3.6 * len(run.time) * run.time_step, abs=1.0)
+    steady = np.trapezoid(np.abs(run.contact_force - run.nominal_force), run.position)
+    assert recorded["cost_function"] == pytest.approx(steady, rel=1e-9)
+    run.save(tmp_path / "run.parquet")
+    loaded = Trajectory.load(tmp_path / "run.parquet").summary("all").as_dict()
+    assert loaded == pytest.approx(recorded, rel=0, abs=0, nan_ok=True)
+
+
+def test_terms_of_an_episode_sum_to_its_figures_after_a_run_in():
+    env = gymnasium.make(NAMES[0], **DRIFT, distance=200.0).unwrapped
+    for seed in range(3):
+        _, info = env.reset(seed=seed)
+        start, terms, ended = info["position"], np.zeros(2), False
+        while not ended:
+            *_, terminated, truncated, info = env.step(np.full(1, 0.1))
+            ended = terminated or truncated
+            told = info["reward_terms"]
+            terms += told["cost_function"], told["contact_loss"]
+        figures = info["figures"]
+        assert terms[0] == pytest.approx(figures["cost_function"], rel=1e-9)
+        assert terms[1] == pytest.approx(figures["contact_loss"], rel=0.02, abs=1e-9)
+        assert figures["distance"] == pytest.approx(info["position"] - start, abs=1e-6)
+        assert 200.0 <= figures["distance"] < 201.0
+
+
+def test_without_drift_nothing_changes_and_nothing_is_drawn():
+    given = SIMPLE | {"distance": 300.0, "line_condition": "fair", "seed": 3}
+    plain, none = simulate(**given), simulate(**given, speed_drift=0.0)
+    np.testing.assert_array_equal(plain.contact_force, none.contact_force)
+    drifting = simulate(**given, speed_drift=3.0)
+    assert np.abs(drifting.contact_force[:200] - plain.contact_force[:200]).max() > 0.01
+    # What else is drawn comes before.
+    tasks = [Task(run_settings(SIMPLE | {"line_condition": "fair"} | more)) for more in ({}, DRIFT)]
+    for task in tasks:
+        task.reset(0, np.random.default_rng(3))
+    np.testing.assert_array_equal(tasks[0].plant.run.waves, tasks[1].plant.run.waves)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lanes_drift_each_on_its_own_as_single_environments_do(name):
+    settings = {**DRIFT, "distance": 25.0, "speed_kmh": (200.0, 300.0)}
+    assert check_lanes_are_singles(name, settings, steps=90).ends >= 5
+
+
+def test_the_same_seed_gives_the_same_drift():
+    given = SIMPLE | DRIFT | {"distance": 300.0}
+    runs = [simulate(**given, seed=seed) for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(runs[0].position, runs[1].position)
+    assert np.abs(runs[0].position - runs[2].position[: len(runs[0].position)]).max() > 0.1 or len(
+        runs[0].position
+    ) != len(runs[2].position)
+
+
+def test_speeds_that_drift_out_of_what_is_possible_are_refused():
+    with pytest.raises(InputError, match="speed must lie above 0"):
+        Task(run_settings({"speed_kmh": 10.0, "speed_drift": 10.0}))
+    with pytest.raises(InputError, match="below the wave speed"):
+        Task(run_settings({"speed_kmh": 420.0, "speed_drift": 10.0}))
+    with pytest.raises(InputError, match="A rig runs its line at one speed"):
+        Task(run_settings({"catenary": "rig", "speed_kmh": 200.0, "speed_drift": 1.0}))
+
+
+def test_sine_of_turns_is_good_enough_for_a_way():
+    turns = np.linspace(0, 100, 7919)
+    ours = [python_function(sine_of_turns)(each) for each in turns]
+    np.testing.assert_allclose(ours, np.sin(2 * np.pi * turns), atol=1e-12)

@@ -1,0 +1,281 @@
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.backend import WIDTH, kernel
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant import interpolation
+from panto_env.plant.catenary.flexible import model
+from panto_env.plant.catenary.flexible.build import at_rest, constants, dropper_positions
+from panto_env.plant.catenary.flexible.grid import spring_levels
+from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.resolution import resolution
+from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
+from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.static_shape import solve
+from panto_env.plant.catenary.flexible.wires import leapfrog
+from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.plant import Plant
+
+from ..finite_element import simulation as finite_element
+
+EN, STIFFNESS = "en50318-2002", 5e5  # N/m, of its messenger supports
+WHOLE = {"window": 0, "precision": "double"}
+
+
+@kernel
+def travel(line, wire, start, stride, force, heights):
+    """Move a constant force along the line; heights of the wire under it in the middle of each step."""
+    for n in range(heights.size):
+        x = start + stride * (n + 0.5)
+        _, heights[n] = place_contact(line, wire, 0, 0, x)
+        advance_wire(line, wire, 0)
+        apply_force(line, wire, 0, 0, x, force)
+        end_step(line, wire, 0)
+
+
+@kernel
+def leap(u, d, inertia, stencil):
+    leapfrog(u, d, inertia, stencil)
+
+
+def constants_of(line, spans, numerics):
+    return constants(line, solve(line), spans, numerics, resolution(line, numerics, Runs()))
+
+
+def undamped(line):
+    return line.model_copy(
+        update={"damping": Rayleigh(alpha=0, beta=0), "support": Support(stiffness=STIFFNESS, damping=0)}
+    )
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_force_travelling_along_a_string_matches_the_closed_form(precision):
+    """From an anchor, d'Alembert and one image give w(vt, t) = F v t / (m c (c + v))."""
+    line = undamped(load_catenary("en50318-2002"))
+    string = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
+    limp = line.droppers.model_copy(update={"stiffness": 1e-6})
+    alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
+    step, speed, force = 1e-3, 300 / 3.6, 100.0
+    built = constants_of(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
+    bare = built._replace(shape=np.zeros_like(built.shape))
+    wire = at_rest(bare, 1)
+    steps = 3000  # before the far anchor's reflection
+    heights = np.zeros(steps)
+    travel(bare, wire, 0.0, speed * step, force, heights)
+    time = step * (np.arange(steps) + 0.5)
+    wave = np.sqrt(string.tension / string.mass)
+    exact = force * speed * time / (string.mass * wave * (wave + speed))
+    assert np.abs(heights - exact).max() < 0.005 * exact.max()
+    assert (along(wire.displacement[0])[:, [PAD, -PAD]] == 0).all()  # the anchors
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (3.0, 0.0), (0.0, 2e-3)])
+@pytest.mark.parametrize("waves", [1, 4])
+def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
+    """Half-waves: omega^2 = (T k^2 + EI k^4) / m less that of the decay, (alpha + beta omega^2) / 2."""
+    data, step = load_catenary("en50318-2002"), 1e-3
+    contact = data.contact_wire.model_copy(update={"bending_stiffness": 5e4})
+    damped = data.model_copy(update={"damping": Rayleigh(alpha=alpha, beta=beta), "contact_wire": contact})
+    line = constants_of(damped, 3, Numerics(spacing=1.1, time_step=step, window=0, precision="double"))
+    wavenumber, stencil = waves * np.pi / data.span_length, line.stencil[0, CONTACT].copy()
+    stencil[4] = 0.0  # the quieting load
+    shape = np.sin(wavenumber * line.spacing * window_nodes(line.rows))
+    u, d, amplitude, inner = shape.copy(), np.zeros(len(shape)), [], slice(PAD, -PAD)
+    inertia = line.inertia[CONTACT][:0]
+
+    def projected(values):
+        """Beyond the ends too, which the leapfrog leaves alone."""
+        return values[inner] @ shape[inner] / (shape[inner] @ shape[inner])
+
+    for _ in range(5):
+        abreast = [lay_out(each, line.rows, float) for each in (u, d)]
+        leap(*abreast, inertia, stencil)
+        u, d = map(along, abreast)
+        amplitude.append(projected(u))
+        u, d = amplitude[-1] * shape, projected(d) * shape
+    a = np.array(amplitude)
+    p, q = np.linalg.lstsq(np.column_stack([a[1:-1], a[:-2]]), a[2:], rcond=None)[0]
+    decay = -np.log(-q) / (2 * step)
+    squared = (contact.tension * wavenumber**2 + contact.bending_stiffness * wavenumber**4) / contact.mass
+    assert decay == pytest.approx((alpha + beta * squared) / 2, rel=0.01, abs=1e-6)
+    frequency = np.arccos(p / (2 * np.sqrt(-q))) / step
+    assert frequency == pytest.approx(np.sqrt(squared - decay**2), rel=1e-3)
+
+
+def test_springs_and_dampers_to_the_ground_take_three_time_levels():
+    """A spring bears displacement, a damper velocity."""
+    step = 1e-3
+    levels = spring_levels(5e5, 800.0, step)
+    assert levels @ np.ones(3) == pytest.approx(5e5)
+    assert levels @ [step, 0.0, -step] == pytest.approx(800.0)  # at 1 m/s
+
+
+def energy(line, wire, step):
+    """Energy (J) of the discrete line at mid-step: kinetic, of the wires, springs and droppers."""
+    now, move = along(wire.displacement[0]), along(wire.increment[0])
+    old, middle = now - move, now - move / 2
+    total = 0.0
+    for w in range(2):
+        mass = step**2 / line.mobility[w, 10, 0]  # of a node; all are alike on this line
+        total += mass * (move[w, 3:-2] ** 2).sum() / (2 * step**2)
+        near, far = line.stencil[0, w, :2]
+        u = old[w]
+        pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
+        total -= (now[w, 2:-2] * pull).sum() * mass / (2 * step**2)
+    masts = PAD + line.rows * WIDTH // line.window * np.arange(1, line.window)
+    total += (STIFFNESS * middle[MESSENGER, masts] ** 2).sum() / 2  # the arms are without stiffness
+    first, weights = interpolation.stencil(dropper_positions(load_catenary(EN), line.spans), line.spacing)
+    lower, upper = (middle[w, PAD + first[:, None] + np.arange(4)] for w in (CONTACT, MESSENGER))
+    extension = (weights * (upper - lower)).sum(axis=1)
+    stiffness, static = line.link_stiffness[line.link_set, line.link_segment], line.link_static[0]
+    taut = stiffness * extension**2 / 2
+    slack = -static * extension - static**2 / stiffness / 2
+    return total + np.where(stiffness * extension > -static, taut, slack).sum()
+
+
+@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
+@pytest.mark.parametrize(("precision", "bar"), [("double", 1e-6), ("single", 2e-3)])
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, precision, bar):
+    step = 1e-3
+    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision=precision)
+    line = constants_of(undamped(load_catenary("en50318-2002")), 10, numerics)
+    wire = at_rest(line, 1)
+    pulse = height * np.exp(-(((line.spacing * window_nodes(line.rows) - 300) / 4) ** 2))
+    wire.displacement[0] = lay_out(pulse, line.rows, float)
+    steps = np.zeros(100)
+    travel(line, wire, 300.0, 0.0, 0.0, steps[:1])
+    first, largest, slack = energy(line, wire, step), 0.0, False
+    for _ in range(100):
+        travel(line, wire, 300.0, 0.0, 0.0, steps)
+        largest = max(largest, abs(energy(line, wire, step) / first - 1))
+        slack |= bool((wire.change[0] <= -wire.static[0]).any())
+    assert largest < bar
+    assert slack == goes_slack
+
+
+@pytest.mark.parametrize("speed", [250.0, 300.0])
+def test_agrees_with_finite_elements(speed):
+    """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""
+    line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
+    fine = {"spacing": 0.125, "time_step": 2.5e-4, "distance": 361.0} | WHOLE
+    run = simulate("en50318-2002", "en50318-2002", speed, **fine)
+    ours = run.summary((5, 6))
+    other = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
+    theirs = finite_element.figures(other, line.span_length)
+    assert ours.std == pytest.approx(theirs.std, rel=0.02)
+    assert ours.mean == pytest.approx(theirs.mean, abs=0.5)
+    assert ours.max == pytest.approx(theirs.maximum, abs=2.0)
+    assert ours.min == pytest.approx(theirs.minimum, abs=2.0)
+    # The finite-element run ends just past span 6: uplift is compared up to there.
+    seen = run.position < other.position[-1]
+    uplift = 1e3 * run.uplift[seen][:, 3:6].max()
+    assert uplift == pytest.approx(1e3 * other.support_uplift[:, 3:6].max(), abs=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "pantograph", "speed"),
+    [
+        ("benchmark-2015", "benchmark-2015", 300.0),
+        ("shinkansen-simple", "identified-2dof", 300.0),
+        ("beijing-tianjin", "dsa380", 300.0),
+    ],
+)
+def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
+    data = load_catenary(line)
+    panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
+    distance = 6.1 * data.span_length
+    fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
+    ours = simulate(line, panto, speed, **fine).summary((5, 6))
+    other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
+    assert ours.std == pytest.approx(finite_element.figures(other, data.span_length).std, rel=0.02)
+
+
+@pytest.mark.parametrize("speed", [250.0, 300.0])
+def test_default_grid_and_step_are_converged(speed):
+    given = ("en50318-2002", "en50318-2002", speed)
+    run = simulate(*given, distance=361.0)
+    fine = simulate(*given, distance=361.0, spacing=0.125, time_step=2.5e-4, **WHOLE)
+    assert run.summary((5, 6)).std == pytest.approx(fine.summary((5, 6)).std, rel=0.01)
+
+
+@pytest.mark.parametrize(("accuracy", "error"), [("full", 0.005), ("fast", 0.03)])
+def test_at_350_kmh_the_default_is_converged_and_the_fast_grid_nearly(accuracy, error):
+    """As docs/validation.md says: waves ahead of the train are short there."""
+    ours, fine = (
+        simulate(speed_kmh=350.0, distance=361.0, **each).summary((5, 6)).std
+        for each in ({"accuracy": accuracy}, {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE)
+    )
+    assert ours == pytest.approx(fine, rel=error)
+
+
+def test_droppers_go_slack_under_the_pantograph(reference_run):
+    assert reference_run.dropper_force.min() == 0.0
+    assert 0.001 < (reference_run.dropper_force == 0).mean() < 0.2
+
+
+def test_slackening_matters(monkeypatch):
+    """With droppers that push, sigma is far off: the model would fail EN 50318."""
+    honest = model.constants
+
+    def never_slack(*arguments):
+        line = honest(*arguments)
+        return line._replace(link_static=line.link_static + np.float32(1e6))
+
+    monkeypatch.setattr(model, "constants", never_slack)
+    assert simulate().summary((5, 6)).std > 45
+
+
+def test_wire_force_balance_in_the_mean(reference_run):
+    """Over the run the mean contact force is the lift less what the lowest spring carries."""
+    spans = slice(len(reference_run.time) // 3, None)
+    carried = 50.0 * reference_run.frame[spans].mean()
+    assert reference_run.contact_force[spans].mean() == pytest.approx(120.0 - carried, abs=1.0)
+
+
+def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
+    line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
+    speeds = [200 / 3.6, 300 / 3.6, 350 / 3.6]
+    batch = Plant(line, pantograph, lanes=3)
+    together = batch.samples(801)
+    for lane, speed in enumerate(speeds):
+        batch.start(lane, speed)
+    batch.advance(np.zeros((3, 1, 2)), 800, together)
+    for lane, speed in enumerate(speeds):
+        alone = Plant(line, pantograph)
+        samples = alone.samples(801)
+        alone.start(0, speed)
+        alone.advance(np.zeros((1, 1, 2)), 300, samples)
+        alone.advance(np.zeros((1, 1, 2)), 500, samples)
+        np.testing.assert_array_equal(samples.rows[0], together.rows[lane])
+
+
+def test_restarted_lane_forgets_the_run_before():
+    plant = Plant(load_catenary("en50318-2002"), load_pantograph("en50318-2002"), numerics=Numerics(window=3))
+    runs = []
+    for _ in range(2):
+        samples = plant.samples(1301)  # the window has begun to travel
+        plant.start(0, 300 / 3.6)
+        plant.advance(np.full((1, 1, 2), 50.0), 1300, samples)
+        runs.append(samples)
+    assert plant.model.wire.first_span[0] > 0
+    np.testing.assert_array_equal(runs[0].rows, runs[1].rows)
+    np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)
+
+
+@pytest.mark.parametrize("spacing", [0.125, 0.05])
+def test_unstable_step_is_refused(spacing):
+    """Also on a grid so fine that only waves of middle length would grow."""
+    with pytest.raises(InputError, match=rf"unstable on a grid of {spacing} m"):
+        simulate(spacing=spacing, time_step=1e-3)
+
+
+def test_irregularity_reaches_the_contact_force():
+    new, worn, other = (
+        simulate(line_condition=condition, seed=seed, time_step=1e-3, record_droppers=False)
+        for condition, seed in (("new", 0), ("worn", 0), ("worn", 1))
+    )
+    assert 2 < (worn.contact_force - new.contact_force).std() < 20
+    assert other.contact_force[-1] != worn.contact_force[-1]

@@ -1,0 +1,219 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies
+from pydantic import ValidationError
+
+from panto_env import InputError, simulate
+from panto_env.base.explanation import explain
+from panto_env.base.ranges import ranges_of
+from panto_env.catalog import available, load_catenary
+from panto_env.plant.catenary.flexible import static_shape
+from panto_env.plant.catenary.flexible.schema import Droppers, FlexibleCatenaryData, Support
+from panto_env.plant.catenary.schema import Wire
+
+from ..finite_element import simulation as finite_element
+
+FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
+
+
+def test_dropper_lengths_of_the_2015_benchmark_within_3_mm():
+    shape = static_shape.solve(load_catenary("benchmark-2015"))
+    half = [1.017, 0.896, 0.810, 0.758, 0.741]
+    assert shape.dropper_length == pytest.approx(half + half[-2::-1], abs=3e-3)
+
+
+@pytest.mark.parametrize("name", FLEXIBLE)
+def test_agrees_with_finite_elements(name):
+    line = load_catenary(name)
+    shape, other = static_shape.solve(line), finite_element.static_shape(line, element=0.1)
+    inner = (other.x >= 0) & (other.x <= line.span_length)
+    # Smooth elements round the kinks at the droppers, at first order.
+    np.testing.assert_allclose(shape.contact.height(other.x[inner]), other.contact[inner], atol=2e-4)
+    np.testing.assert_allclose(shape.dropper_tension, other.dropper_tension, rtol=1e-3, atol=0.2)
+
+
+@pytest.mark.parametrize("name", FLEXIBLE)
+def test_in_equilibrium(name):
+    """Droppers and steady arm carry the contact wire's weight; tensions are positive."""
+    line = load_catenary(name)
+    shape = static_shape.solve(line)
+    weight = line.contact_wire.mass * static_shape.GRAVITY * line.span_length
+    assert shape.contact.forces.sum() == pytest.approx(weight)
+    assert shape.dropper_tension.min() > 0
+    sag = -np.array(line.droppers.sag)
+    assert shape.contact.height(np.array(line.droppers.positions)) == pytest.approx(sag, abs=1e-9)
+
+
+def test_string_hangs_in_a_parabola_between_its_droppers():
+    line = load_catenary("en50318-2002")
+    limp = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
+    shape = static_shape.solve(line.model_copy(update={"contact_wire": limp}))
+    a, b = line.droppers.positions[4:6]
+    deepest = limp.mass * static_shape.GRAVITY * (b - a) ** 2 / (8 * limp.tension)
+    assert shape.contact.height(np.array([(a + b) / 2]))[0] == pytest.approx(-deepest, rel=1e-6)
+
+
+def test_wire_is_level_at_the_support_only_where_the_arm_holds_it():
+    line = load_catenary("en50318-2002")
+    free = line.model_copy(update={"steady_arm": line.steady_arm.model_copy(update={"holds_wire": False})})
+    assert static_shape.solve(line).contact.height(np.zeros(1))[0] == pytest.approx(0, abs=1e-9)
+    assert static_shape.solve(free).contact.height(np.zeros(1))[0] == pytest.approx(-8.0e-3, abs=1e-4)
+
+
+# --- lines that can't hang so ---------------------------------------------------------------------
+
+LINE = load_catenary("en50318-2002")
+TWO = {"positions": (5.0, 55.0), "sag": (0.0, 0.0)}
+
+
+def changed(**tables):
+    """The reference line's table with other values."""
+    given = LINE.model_dump()
+    for key, value in tables.items():
+        given[key] = given[key] | value if isinstance(value, dict) else value
+    return given
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"droppers": {"sag": (0, 0, 0, 0, -0.1, 0, 0, 0, 0)}},
+            "dropper 4 .* at 23.5 m, would carry -231.2 N",
+        ),
+        ({"encumbrance": 0.5}, r"Unloaded, dropper 3 .* at 17 m, would be -0.04186 m long"),
+        (
+            {"droppers": TWO, "contact_wire": {"tension": 60e3}, "messenger_wire": {"tension": 5e3}},
+            "messenger wire .* would hang 0.022 m below",
+        ),
+        (
+            {"droppers": TWO, "encumbrance": 5.0, "contact_wire": {"tension": 7e3}},
+            "differ by 0.59 m in height",
+        ),
+        (
+            {"messenger_wire": {"tension": 3e3}, "encumbrance": 8.0},
+            "messenger wire .* would have a slope of 0.2",
+        ),
+        ({"droppers": {"mass": 5.0}, "messenger_wire": {"tension": 2e3}}, "does not settle in 200 rounds"),
+    ],
+)
+def test_a_line_that_can_t_hang_so_is_refused_however_it_is_made(values, message, tmp_path):
+    """From a table, and past the schema."""
+    table = changed(**values)
+    with pytest.raises(ValidationError, match=message):
+        type(LINE).model_validate(table)
+    parts = {key: getattr(LINE, key).model_copy(update=values[key]) for key in values if key != "encumbrance"}
+    with pytest.raises(InputError, match=message) as caught:
+        simulate(LINE.model_copy(update={key: values[key] for key in values} | parts))
+    assert str(caught.value).count(". ") == 0
+
+
+def test_droppers_too_heavy_for_any_shape_end_the_rounds():
+    heavy = LINE.model_copy(update={"droppers": LINE.droppers.model_copy(update={"mass": 30.0})})
+    with pytest.raises(InputError, match="does not settle in 200 rounds: its droppers"):
+        static_shape.solve(heavy)
+
+
+def test_too_many_unknowns_are_refused_before_any_is_made():
+    with pytest.raises(InputError, match="has 2,000,005 nodes a wire; 1,000,000 at most"):
+        simulate(spans=1000, window=0, spacing=0.03, time_step=1e-6)
+
+
+def test_droppers_keep_apart_from_one_another_and_from_the_support():
+    for positions in ((5.0, 5.05), (5.0, 59.95)):
+        with pytest.raises(ValidationError, match=r"by 0\.1 m or more|0\.1 m or more from"):
+            type(LINE).model_validate(changed(droppers={"positions": positions, "sag": (0.0, 0.0)}))
+
+
+# --- any line -------------------------------------------------------------------------------------
+
+
+def about(value, low, high):
+    """Mostly near a usual value, else anywhere in the range of the schema."""
+    near = strategies.floats(max(low, value / 4), min(high, value * 4))
+    return near if low == high else strategies.one_of(near, near, near, strategies.floats(low, high))
+
+
+def number(schema, key, usual):
+    (between,) = ranges_of(schema.model_fields[key].rebuild_annotation())
+    return about(usual, between.low, between.high)
+
+
+@strategies.composite
+def lines(draw):
+    """Tables of lines, all numbers within the schema's ranges."""
+    span = draw(number(FlexibleCatenaryData, "span_length", 60.0))
+    count = draw(strategies.integers(1, 12))
+    gap = span / count
+    shift = draw(strategies.floats(0.1, 0.9))
+    depth = draw(number(Droppers, "sag", 0.03))
+    level = [depth * (1 - ((2 * k + 1) / count - 1) ** 2) for k in range(count)]  # a parabola
+    errors = strategies.one_of(strategies.just(0.0), strategies.floats(-0.02, 0.02))
+    wires = [
+        {
+            "mass": draw(number(Wire, "mass", 1.2)),
+            "tension": draw(number(Wire, "tension", 20e3)),
+            "bending_stiffness": draw(number(Wire, "bending_stiffness", 150.0)),
+        }
+        for _ in range(2)
+    ]
+    kind = draw(strategies.sampled_from(["stiffness", "axial_stiffness"]))
+    return LINE.model_dump() | {
+        "span_length": span,
+        "encumbrance": draw(number(FlexibleCatenaryData, "encumbrance", 1.4)),
+        "contact_wire": wires[0],
+        "messenger_wire": wires[1],
+        "droppers": {
+            "positions": [gap * (k + shift) for k in range(count)],
+            "sag": [min(max(sag + draw(errors), -0.2), 0.5) for sag in level],
+            kind: draw(number(Droppers, kind, 1e5)),
+            "mass": draw(number(Droppers, "mass", 0.1)),
+            "contact_clamp_mass": draw(number(Droppers, "contact_clamp_mass", 0.2)),
+            "messenger_clamp_mass": draw(number(Droppers, "messenger_clamp_mass", 0.2)),
+        },
+        "support": {"stiffness": draw(number(Support, "stiffness", 5e5)), "damping": 1000.0},
+        "steady_arm": {"mass": 0.0, "stiffness": 0.0, "holds_wire": draw(strategies.booleans())},
+    }
+
+
+def test_any_line_is_refused_in_one_sentence_or_hangs_in_equilibrium():
+    """Random numbers within the ranges; what hangs is judged by finite elements."""
+    hung = refused = 0
+
+    @settings(max_examples=80, derandomize=True, deadline=None, database=None)
+    @given(lines())
+    def check(table):
+        nonlocal hung, refused
+        try:
+            line = FlexibleCatenaryData.model_validate(table)
+        except ValidationError as error:
+            refused += 1
+            message = explain(error, FlexibleCatenaryData)
+            assert not re.search(r"[.?!]\s|\n", message), message
+            return
+        hung += 1
+        shape = static_shape.hang(line)
+        assert shape.dropper_tension.min() > 0
+        assert shape.dropper_length.min() > 0
+        assert np.isfinite([*shape.dropper_tension, *shape.dropper_length, shape.messenger.offset]).all()
+        assert shape.contact.height(np.array(line.droppers.positions)) == pytest.approx(
+            -np.array(line.droppers.sag), abs=1e-9
+        )
+        loaded = shape.messenger.height(np.array(line.droppers.positions)) + np.array(line.droppers.sag)
+        stretched = shape.dropper_tension / shape.dropper_stiffness
+        assert shape.dropper_length + stretched == pytest.approx(loaded, rel=1e-9)
+        other = finite_element.static_shape(line, element=min(0.25, line.span_length / 40))
+        inner = (other.x >= 0) & (other.x <= line.span_length)
+        np.testing.assert_allclose(shape.contact.height(other.x[inner]), other.contact[inner], atol=2e-3)
+        # They take a dropper's mass from its loaded length.
+        extra = static_shape.GRAVITY * line.droppers.mass * stretched.max()
+        weight = line.contact_wire.mass * static_shape.GRAVITY * line.span_length
+        np.testing.assert_allclose(
+            shape.dropper_tension, other.dropper_tension, rtol=1e-2, atol=extra + 2e-3 * weight
+        )
+
+    check()
+    assert hung >= 10
+    assert refused >= 10

@@ -1,0 +1,198 @@
+"""What documents show is what works: their Python is run, their commands are run, shortened or parsed."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from panto_env.catalog import load_pantograph
+from panto_env.identification import FREQUENCY_SWEEP, add_noise, clean_record, parameters_of, write_record
+
+from ..documents import ROOT, check, commands, pages, panto, python, targets
+
+MINUTES = "takes minutes"
+
+
+class Rule(NamedTuple):
+    """How a command is tested that is not run as it stands."""
+
+    begins: str  # what the command begins with; of several rules the longest one counts
+    why: str
+    with_options: str | None = None  # run with these, too; None: parsed, and not run
+    slow: bool = False  # run by `make proofs` alone
+
+
+RULES = (
+    Rule("panto benchmark", "all speeds and seeds", "--speed 300 --seeds 1 --workers 1"),
+    Rule("panto benchmark passive pd runs", "all seeds", "--seeds 1 --workers 1"),
+    Rule("panto dataset episodes dataset-known-line", "a thousand", "--episodes 1 --workers 1", slow=True),
+    Rule("panto dataset episodes dataset-unknown-lines", "600", "--episodes 1 --workers 1", slow=True),
+    Rule("panto dataset designs", MINUTES, "--count 8 --workers 1", slow=True),
+    Rule("panto dataset verify data", "of what the three before made", "", slow=True),
+    Rule("panto evaluate", "all speeds", "--speed 300"),
+    Rule("panto film", "hundreds of frames", "--seconds 0.1 --size 320 240"),
+    Rule("panto film passive runs/demo", "wants an agent of `make demo`, which is run by hand"),
+    Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
+    Rule("panto oracle --stored", "as it stands", ""),
+    Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
+    Rule("panto reproduce paper3-parameters", "ten seconds", "", slow=True),
+    Rule("panto speed --json", f"{MINUTES}, and means nothing on a busy machine"),
+    Rule("panto train agent-ppo", MINUTES, "--steps 1000", slow=True),
+    Rule("panto train agent-clone", "clones a million steps first; tests/agents/test_agents.py clones fewer"),
+    Rule("panto train agent-residual", f"{MINUTES}; tests/agents/test_agents.py has a short one"),
+    Rule("panto train ppo --output runs/ppo", "what follows needs its model", "--steps 1000"),
+    Rule(
+        "panto trainings",
+        "six trainings of minutes, or a cluster; tests/cluster/ has short ones",
+    ),
+    Rule("panto sweep catenary.mean_stiffness=2000:6000:17", "527 passes", "", slow=True),
+    Rule(
+        "panto tune",
+        MINUTES,
+        "--speed 300 --seeds 1 --passes 2 --workers 1 --output gains-$$.toml",
+        slow=True,
+    ),
+)
+"""The only exceptions; whatever has none is run as it stands."""
+BY_HAND = {
+    "bounds": "proofs run its tests",
+    "benchmark": "six minutes; tests run each track shortened",
+    "coverage": "tells what tests do not reach",
+    "demo": "some minutes; its parts are tested",
+    "docs": "tests build the site, too",
+    "films": "a minute; tests make short ones",
+    "fuzz": "half an hour; tests and proofs run some of each",
+    "libraries": "wants an environment of its own",
+    "lint": "part of test",
+    "mutants": "an hour",
+    "notebook": "two minutes; a slow test runs it, too",
+    "nonsense": "any number of lines; proofs run some",
+    "pythons": "wants other versions of Python",
+    "ptx": "wants an environment of its own",
+    "ray": "wants an environment of its own",
+    "rllib": "wants an environment of its own",
+    "same": "wants an earlier commit",
+}
+"""Targets of the Makefile that CI does not run, and why."""
+SHORTENED = {
+    "README.md": {
+        "num_envs=256": "num_envs=2",
+        "batch_size=4096": "batch_size=64",
+        "learn(1_000_000)": "learn(100)",
+    },
+}
+"""Text in the Python of a page, and what runs instead."""
+EPISODE = "panto dataset episodes dataset-known-line --only fitted-fb-ff --episodes 1 --workers 1"
+PREPARED = {"docs/datasets.md": EPISODE}
+"""What the Python of a page takes for granted, made beforehand."""
+CONTROLLER = "from panto_baselines.policies.pd import ProportionalDerivative as Mine\n"
+
+
+def rule_of(command):
+    fitting = [rule for rule in RULES if f"{command.text} ".startswith(rule.begins)]
+    return max(fitting, key=lambda rule: len(rule.begins), default=None)
+
+
+def shown(tool=""):
+    return [command for page in pages() for command in commands(page) if command.text.startswith(tool)]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with what documents take for granted: results, a record of a rig, a controller."""
+    for name in ("benchmark", "speed"):
+        shutil.copytree(ROOT / "docs" / name, tmp_path / "docs" / name)
+    (tmp_path / "docs" / "figures").mkdir()
+    truth = parameters_of(load_pantograph("identified-2dof"))
+    write_record(
+        add_noise(clean_record(FREQUENCY_SWEEP, truth), np.random.default_rng(0)), tmp_path / "rig.csv"
+    )
+    (tmp_path / "my_controller.py").write_text(CONTROLLER)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
+    return tmp_path
+
+
+def run(page, folder, slow):
+    """Run the commands of a page in order."""
+    ran = 0
+    for command in commands(page):
+        rule = rule_of(command)
+        if not (command.whole and command.words[0] == "panto") or (rule and rule.with_options is None):
+            continue
+        if rule and rule.slow and not slow:
+            continue
+        line = f"{command.text} {rule.with_options}" if rule else command.text
+        done = subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{command.place}\nwas run as {line}\n{done.stdout}{done.stderr}"
+        ran += 1
+    return ran
+
+
+@pytest.mark.parametrize("command", shown(), ids=lambda command: command.place)
+def test_a_command_can_be_given(command):
+    check(command)
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if commands(page)])
+def test_commands_of_a_page_run(page, folder):
+    run(page, folder, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page", sorted({each.page for each in shown() if each.whole and (rule := rule_of(each)) and rule.slow})
+)
+def test_long_commands_of_a_page_run_shortened(page, folder):
+    assert run(page, folder, slow=True)
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if python(page)])
+def test_python_of_a_page_runs(page, folder):
+    names = {"__name__": page}
+    if page in PREPARED:
+        subprocess.run(PREPARED[page].split(), cwd=folder, check=True, capture_output=True)
+    for block in python(page):
+        text = block.text
+        for long, short in SHORTENED.get(page, {}).items():
+            text = text.replace(long, short)
+        exec(compile("\n" * (block.line - 1) + text, ROOT / page, "exec"), names)
+
+
+def test_no_exception_is_left_of_a_document_that_has_changed():
+    used = {rule_of(command) for command in shown() if command.whole}
+    assert [rule.begins for rule in RULES if rule not in used] == []
+    for page, changes in SHORTENED.items():
+        text = "".join(block.text for block in python(page))
+        assert [long for long in changes if long not in text] == []
+
+
+def test_targets_that_documents_name_are_run_by_ci_or_by_hand():
+    ci = set(re.findall(r"^make (\w+)", (ROOT / ".ci" / "run").read_text(), re.MULTILINE))
+    named = {word for each in shown("make ") for word in each.words[1:] if "=" not in word}
+    assert named <= ci | set(BY_HAND)
+    assert [target for target in BY_HAND if target not in named or target in ci] == []
+    assert set(BY_HAND) <= set(targets())
+
+
+def test_every_command_has_its_row_in_the_readme():
+    section = (ROOT / "README.md").read_text().partition("## The command `panto`")[2].partition("\n## ")[0]
+    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+    assert sorted(name.strip(" `") for row in rows for name in row.split(",")) == sorted(panto().commands)
+    without = {name for name, command in panto().commands.items() if not takes_json(command)}
+    told = re.search(r"All but (.*?) take `--json`", " ".join(section.split()))[1]
+    assert sorted(re.findall(r"`(\w+)`", told)) == sorted(without)
+
+
+def takes_json(command):
+    """Whether it does, or each of its own commands."""
+    if hasattr(command, "commands"):
+        return any(takes_json(own) for own in command.commands.values())
+    return any("--json" in parameter.opts for parameter in command.params)

@@ -1,0 +1,227 @@
+"""A report for engineers: it says what the run says, holds all it needs, and knows what it was made of."""
+
+import html
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from panto_baselines.report.command import report as report_command
+from panto_env import InputError, Trajectory, simulate
+from panto_env.catalog import load_catenary
+from panto_env.cli import make_app
+from panto_env.plant.catenary.flexible.elasticity import elasticity, unevenness
+from panto_env.report import save
+from panto_env.report.findings import Findings
+from panto_env.report.page import page
+from panto_env.report.words import LEFT_OUT
+
+from ..catalog.test_catalog import STEP, wire_stiffness
+from ..pages import DOCS
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+HOSTILE = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate("en50318-2002", speed_kmh=300.0)
+
+
+@pytest.fixture(scope="module")
+def found(run):
+    return Findings(run, "run.parquet")
+
+
+@pytest.fixture(scope="module")
+def file(run, tmp_path_factory):
+    path = tmp_path_factory.mktemp("runs") / "run.parquet"
+    run.save(path)
+    return path
+
+
+def linear_elasticity(line, spans):
+    """Of the middle span, by finite elements of Hermite's, droppers never slack."""
+    length = spans * line.span_length
+    contact, messenger = (
+        wire_stiffness(length, wire.tension, wire.bending_stiffness)
+        for wire in (line.contact_wire, line.messenger_wire)
+    )
+    size = len(contact)
+    whole = np.block([[contact, np.zeros_like(contact)], [np.zeros_like(contact), messenger]])
+    for wire in range(2):
+        for end in (0, size - 2):
+            whole[wire * size + end, wire * size + end] += 1e12  # anchored
+    for mast in range(1, spans):
+        node = 2 * round(mast * line.span_length / STEP)
+        whole[node, node] += line.steady_arm.stiffness
+        whole[size + node, size + node] += line.support.stiffness
+    for place in (k * line.span_length + x for k in range(spans) for x in line.droppers.positions):
+        upper, lower = size + 2 * round(place / STEP), 2 * round(place / STEP)
+        spring = line.droppers.stiffness * np.array([[1, -1], [-1, 1]])
+        whole[np.ix_([upper, lower], [upper, lower])] += spring
+    first = spans // 2 * line.span_length
+    nodes = 2 * np.arange(round(first / STEP), round((first + line.span_length) / STEP) + 1)
+    return STEP * np.arange(len(nodes)), np.linalg.inv(whole)[nodes, nodes]
+
+
+def test_elasticity_is_that_of_finite_elements():
+    line = load_catenary("en50318-2002")
+    places, lifts = elasticity(line, 1.0)  # a force under which no dropper goes slack
+    at, expected = linear_elasticity(line, 3)
+    np.testing.assert_allclose(lifts, np.interp(places, at, expected), rtol=0.015)
+
+
+def test_a_dropper_that_goes_slack_lets_the_wire_rise_further():
+    line = load_catenary("en50318-2002")
+    places, small = elasticity(line, 1.0)
+    _, large = elasticity(line, 200.0)
+    assert (large >= small - 1e-9).all()
+    dropper = np.abs(places - line.droppers.positions[0]).argmin()
+    assert large[dropper] > 1.1 * small[dropper]
+    assert unevenness(np.array([0.2, 0.6])) == pytest.approx(50.0)
+
+
+def test_what_is_found_is_what_the_run_says(run, found):
+    figures = run.summary()
+    assert found.figures == figures
+    assert max(uplift for _, _, uplift in found.uplifts) == pytest.approx(figures.max_uplift)
+    assert [number for number, _, _ in found.uplifts] == list(range(9, 20))
+    lost = sum(loss.duration for loss in found.losses) / (run.inside().sum() * run.time_step)
+    assert 100 * lost == pytest.approx(figures.contact_loss)
+    folded = found.folded
+    assert np.all((folded.low <= folded.median) & (folded.median <= folded.high))
+    assert folded.median.mean() == pytest.approx(figures.mean, rel=0.01)
+    slack = next(each.value for each in run.compliance() if each.key == "slack")
+    assert np.mean([dropper.slack for dropper in found.droppers]) == pytest.approx(slack, rel=0.02)
+    assert [dropper.position for dropper in found.droppers] == pytest.approx(found.line.droppers.positions)
+
+
+def test_losses_of_contact_are_counted_with_their_length(run, found):
+    force = run.contact_force.copy()
+    begin = int(np.flatnonzero(run.inside())[0]) + 100
+    force[begin : begin + 7] = 0.0
+    force[begin + 50 : begin + 53] = 0.0
+    losses = Findings(replace(run, contact_force=force), "it").losses
+    assert len(losses) == 2 + len(found.losses)
+    assert losses[0].duration == pytest.approx(7 * run.time_step)
+    assert losses[0].position == pytest.approx(run.position[begin])
+
+
+def test_the_page_says_it_and_is_the_same_twice(found):
+    text = page([found])
+    assert page([Findings(found.run, "run.parquet")]) == text
+    words = html.unescape(re.sub(r"<[^>]+>", " ", text))
+    for value in ("span_length", "60.0", "own choice", "Reference line of EN 50318:2002", "20000.0"):
+        assert value in words
+    for criterion in found.run.compliance():
+        assert criterion.name in words
+    assert LEFT_OUT in words
+    assert not re.findall(r"(?:src|href)=\"https?:", text)
+
+
+def test_the_words_on_what_is_left_out_are_those_of_the_documents():
+    section = (
+        (DOCS / "validation.md").read_text(encoding="utf-8").split("## What the model leaves out\n\n")[1]
+    )
+    assert section.split() == LEFT_OUT.split()
+
+
+@pytest.mark.skipif(BROWSER is None and "CI" not in os.environ, reason="no browser; CI has one")
+def test_a_browser_shows_the_values(file, found, tmp_path):
+    path = tmp_path / "report.html"
+    save([file], path)
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+    command += ["--no-first-run", "--disable-background-networking", "--dump-dom", f"file://{path}"]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    row = re.search(r'<tr data-key="std">(.*?)</tr>', shown, re.DOTALL)[1]
+    value = float(re.search(r'class="value">([\d.]+)', row)[1])
+    margin = float(re.search(r'class="margin">([-\d.]+)', row)[1])
+    figures = found.run.summary()
+    assert value == pytest.approx(figures.std, abs=0.05)
+    assert margin == pytest.approx(0.3 * figures.mean - figures.std, abs=0.05)
+    assert ("NOT KEPT" in row) == (figures.std > 0.3 * figures.mean)
+    assert float(re.search(r'id="unevenness">([\d.]+)', shown)[1]) == pytest.approx(
+        found.elasticity[2], abs=0.05
+    )
+    assert shown.count("<svg") == 5
+
+
+def test_several_runs_stand_side_by_side(run, file, tmp_path):
+    slow = simulate("en50318-2002", speed_kmh=250.0)
+    slow.save(tmp_path / "slow.parquet")
+    result = CliRunner().invoke(make_app(), ["report", str(tmp_path / "slow.parquet"), str(file)])
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "slow.html").read_text(encoding="utf-8")
+    assert "250 km/h</th><th>300 km/h" in text
+    row = re.search(r'<tr data-key="mean"><th scope="row">mean force F_m</th>(.*?)</tr>', text, re.DOTALL)[1]
+    shown = [float(each) for each in re.findall(r"<td>([\d.]+)</td>", row)]
+    assert shown == pytest.approx([slow.summary().mean, run.summary().mean], abs=0.005)
+
+
+def test_a_run_that_ended_early_is_reported_as_such(run):
+    ended = replace(run, terminated=True, ending="The run ended early at 10 m: it was bad.")
+    text = page([Findings(ended, "run.parquet")])
+    assert "The run ended early at 10 m: it was bad. It has no figures." in text
+    assert "None: no run has figures." in text
+
+
+def test_a_line_without_wires_has_a_report_too():
+    run = simulate("periodic-stiffness", "three-mass", 200.0)
+    text = page([Findings(run, "run.parquet")])
+    assert "mean_stiffness" in text
+    assert "Elasticity" not in text
+
+
+def test_the_report_is_of_the_line_that_was_run_whatever_its_file_says_now(tmp_path):
+    source = (DOCS.parent / "panto_env/catalog/catenaries/en50318-2002.toml").read_text(encoding="utf-8")
+    mine = tmp_path / "mine.toml"
+    mine.write_text(source, encoding="utf-8")
+    simulate(str(mine), speed_kmh=300.0, distance=300.0).save(tmp_path / "run.parquet")
+    mine.unlink()
+    found = Findings(Trajectory.load(tmp_path / "run.parquet"), "run.parquet")
+    assert found.line.span_length == 60.0
+    assert found.line.name == "mine"
+    assert "contact_wire.tension" in page([found])
+
+
+def test_names_and_descriptions_are_escaped(run):
+    design = {part: {**values, "description": HOSTILE} for part, values in run.design.items()}
+    text = page([Findings(replace(run, design=design, policy=HOSTILE), HOSTILE)])
+    assert HOSTILE not in text
+    assert html.escape(HOSTILE) in text
+
+
+def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
+    old = replace(run, design={})
+    with pytest.raises(InputError, match="was written by an older version, without its line"):
+        page([Findings(old, "old.parquet")])
+    with pytest.raises(InputError, match="1 to 8 runs, not 9"):
+        page([Findings(run, "run.parquet")] * 9)
+    odd = tmp_path / "odd.json"
+    for files, words in (
+        ([file, odd], "runs (.parquet) alone or of the benchmark's results (.json) alone"),
+        ([tmp_path / "run.txt"], "run.txt: a report is of runs"),
+        ([tmp_path / "gone.parquet"], "does not exist"),
+    ):
+        with pytest.raises(InputError, match=re.escape(words)):
+            report_command(files, None)
+
+
+def test_runs_that_share_a_name_stay_apart(run):
+    """A line's file edited between two runs, and runs that differ in what their names do not tell."""
+    softer = {**run.design["catenary"], "span_length": 61.0}
+    edited = replace(run, design={**run.design, "catenary": softer})
+    without = replace(run, dropper_position=run.dropper_position[:0], dropper_force=run.dropper_force[:, :0])
+    text = html.unescape(page([Findings(run, "a"), Findings(without, "b"), Findings(edited, "c")]))
+    headings = re.findall(r"<h3>(.*?)</h3>", text)
+    assert headings == ["en50318-2002 (a, b)", "en50318-2002 (c)", "en50318-2002"]
+    captions = re.findall(r"<caption>(.*?): forces while", text)
+    assert captions == ["300 km/h (a)", "300 km/h (c)"]
+    values = re.findall(r"<code>span_length</code></th><td[^>]*>([\d.]+)<", text)
+    assert values == ["60.0", "61.0"]
