@@ -70,7 +70,6 @@ BY_HAND = {
     "fuzz": "half an hour; tests and proofs run some of each",
     "libraries": "wants an environment of its own",
     "lint": "part of test",
-    "mutants": "an hour",
     "notebook": "two minutes; a slow test runs it, too",
     "nonsense": "any number of lines; proofs run some",
     "pythons": "wants other versions of Python",
