@@ -15,6 +15,7 @@ from panto_env.base.files import read_toml
 from panto_env.base.names import suggest
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.base.shown import shown
+from panto_env.base.units import to_kmh
 from panto_env.control import Task
 from panto_env.control.settings import fields, run_settings
 from panto_env.envs import IDS
@@ -101,7 +102,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
     """Ends and middle of an environment's range of speeds, or its one speed (km/h)."""
     low, high = Task(run_settings(arguments(environment))).length.speed_range
-    return tuple(sorted({round(3.6 * v, 6) for v in (low, (low + high) / 2, high)}))
+    return tuple(sorted({round(to_kmh(v), 6) for v in (low, (low + high) / 2, high)}))
 
 
 def load_training(path: str | Path, **changes: Any) -> Training:

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_env.base.units import from_kmh
 from panto_env.control import Context
 from panto_env.envs import IDS
 
@@ -190,7 +191,7 @@ def ratios(columns: dict[str, Array]) -> Array:
 
     The share that a dropper sends back and the Doppler factor are those of the usual theory of two strings.
     """
-    speed, span = columns["speed_kmh"] / 3.6, columns["catenary.span_length"]
+    speed, span = from_kmh(columns["speed_kmh"]), columns["catenary.span_length"]
     (contact, contact_mass), (messenger, messenger_mass) = (
         (columns[f"catenary.{wire}_wire.tension"], columns[f"catenary.{wire}_wire.mass"])
         for wire in ("contact", "messenger")

@@ -18,6 +18,7 @@ import time
 
 import numpy as np
 
+from panto_env.base.units import from_kmh
 from panto_env.catalog import load_pantograph
 from panto_env.rig import RigComputer
 from panto_env.rig.computer import load_rig
@@ -34,9 +35,9 @@ def compute(port: int, seconds: float, ready: multiprocessing.synchronize.Event)
     data = load_rig(RIG)
     cell = data.load_cell.model_copy(update={"filter_frequency": 1e4})  # the stand-in has no filter
     data = data.model_copy(update={"load_cell": cell})
-    speed = SPEED_KMH / 3.6
+    speed = from_kmh(SPEED_KMH)
     force, spans = load_pantograph(PANTOGRAPH).nominal_force(speed), data.spans
-    spans = max(spans, math.ceil(seconds * speed / data.span_length) + 2)
+    spans = max(spans, math.ceil(data.alignment().in_spans(seconds * speed)) + 2)
     computer = RigComputer(data, SPEED_KMH, force=force, spans=spans)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
         channel.bind(("127.0.0.1", port))
@@ -56,7 +57,7 @@ def stand_in(port: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     dt, omega, ratio = step / substeps, 2 * math.pi * 60.0, 0.7
     (head_mass, frame_mass), (k_head, k_frame) = panto.masses, panto.stiffnesses
     c_head, c_frame = panto.dampings
-    lift, strip = panto.nominal_force(SPEED_KMH / 3.6), panto.contact_stiffness
+    lift, strip = panto.nominal_force(from_kmh(SPEED_KMH)), panto.contact_stiffness
     cylinder = velocity = head = frame = head_velocity = frame_velocity = 0.0
     head = lift / strip  # at rest, pressed against the cylinder
     frame = head + lift / k_head

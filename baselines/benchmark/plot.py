@@ -8,10 +8,11 @@ import numpy as np
 
 from panto_env.analysis.plots import SUPPORTS, mark_supports
 from panto_env.base.colours import LIMIT, series_colour
+from panto_env.base.units import from_kmh
 from panto_env.metrics import en50367
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import low_pass_in_place
-from panto_env.metrics.spans import in_words, limits, within
+from panto_env.metrics.spans import in_words
 
 from .run import Benchmark
 from .settings import Line
@@ -63,11 +64,11 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
     shown = max(first, last - 1), last
     for policy, colour in colours.items():
         run, _ = drive(settings, line, policy, speed, seed)
-        inside = within(run.position, shown, run.span_length)
+        inside = run.alignment.within(run.position, shown)
         force = low_pass_in_place(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    limit = en50367.maximum_limit(speed / 3.6)
+    limit = en50367.maximum_limit(from_kmh(speed))
     axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label="limit of EN 50367")
     axes.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
     mark_supports(axes, run)
@@ -75,7 +76,7 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
         xlabel=SUPPORTS,
         ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
-        xlim=limits(shown, run.span_length),
+        xlim=run.alignment.limits(shown),
     )
 
 

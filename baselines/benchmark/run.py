@@ -17,7 +17,7 @@ from panto_env.base.version import __version__
 from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.spans import FIRST_SETTLED, last_whole_span
+from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.policies import find_policy
 
 from ..oracle.stored import stored_ratio
@@ -121,7 +121,7 @@ def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     task = Task(far_enough(run_settings(given)))
-    last = last_whole_span(task.length.distance, task.plant.catenary.span_length)
+    last = task.plant.alignment.last_whole_span(task.length.distance)
     first, last = line.spans or (FIRST_SETTLED, last)
     where = f"on line '{line.catenary}', where every run covers {task.length.distance:g} m"
     if not 1 <= first <= last:
@@ -129,6 +129,6 @@ def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
             f"There are no spans {first} to {last} to evaluate {where}; "
             "give a longer distance, or spans of your own."
         )
-    if last * task.plant.catenary.span_length > task.length.distance:
+    if task.plant.alignment.support(last) > task.length.distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
     return first, last

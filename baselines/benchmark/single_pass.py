@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.base.units import from_kmh
 from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
-from panto_env.metrics.spans import within
 from panto_env.policies import Policy, find_policy, wishes
 
 from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
@@ -82,8 +82,8 @@ def run_pass(
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        position = np.arange(len(force)) * settings.control_interval * speed_kmh / 3.6
-        asked = force[within(position, spans, run.span_length)]
+        position = np.arange(len(force)) * settings.control_interval * from_kmh(speed_kmh)
+        asked = force[run.alignment.within(position, spans)]
         changes = np.diff(asked, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(asked) >= FULL * settings.actuator.force_limit))

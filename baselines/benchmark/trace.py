@@ -9,8 +9,8 @@ import numpy as np
 from panto_env import Trajectory
 from panto_env.base.arrays import Array
 from panto_env.metrics.low_pass import CUTOFF, low_pass_in_place
-from panto_env.metrics.spans import Spans, limits
 from panto_env.metrics.spectrum import amplitudes
+from panto_env.plant.alignment import Spans
 
 from .settings import Line
 
@@ -41,8 +41,8 @@ def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
     policy, line: as the benchmark calls them; a run has the names of the entries themselves.
     """
     first, last = spans
-    begin, end = limits((max(first, last - 1), last), run.span_length)
-    stride = min(STRIDE, run.speed_kmh / 3.6 / (PER_PERIOD * CUTOFF))
+    begin, end = run.alignment.limits((max(first, last - 1), last))
+    stride = min(STRIDE, run.speed / (PER_PERIOD * CUTOFF))
     position = np.linspace(begin, end, round((end - begin) / stride) + 1)
     force = low_pass_in_place(run.contact_force, run.time_step)
     frequency, amplitude = amplitudes(run.contact_force[run.inside(spans)], run.time_step)

@@ -14,7 +14,7 @@ from panto_env.control import passive_mean, trim_of_pass
 from panto_env.control.extent import whole_steps
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.low_pass import low_pass_sections
-from panto_env.metrics.spans import SpanChoice, limits
+from panto_env.metrics.spans import SpanChoice
 
 from ..benchmark.controls import Tape
 from .knots import Knots, without_limits
@@ -53,7 +53,7 @@ class Problem:
         self.places = len(settings.actuator.places)
         self.interval = settings.control_interval
         self.steps = whole_steps(self.interval, passive.time_step)
-        start = 0.0 if covered is None else limits(covered, passive.span_length)[0] / passive.stride
+        start = 0.0 if covered is None else passive.alignment.limits(covered)[0] / passive.stride
         self.begin = max(0, int(start * passive.time_step / self.interval - LEAD / self.interval))
         self.count = int(inside[-1]) // self.steps + 1 - self.begin
         """Knots of one place."""

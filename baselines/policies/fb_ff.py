@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.base.shown import shown
+from panto_env.base.units import METRES_PER_SECOND, to_kmh
 from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number
@@ -17,7 +18,7 @@ from .force_law import ForceLaw, number
 FORCE_RANGE = (0.0, 300.0)
 """Range (N) to which the feedback clips the contact force (paper 1)."""
 READINGS = ("span", "printed")
-SPEED_UNITS = {"km/h": 3.6, "m/s": 1.0}
+SPEED_UNITS = {"km/h": METRES_PER_SECOND, "m/s": 1.0}
 
 
 class FeedbackFeedforward(ForceLaw):
@@ -79,13 +80,14 @@ class FeedbackFeedforward(ForceLaw):
         super().reset(context)
         speeds = sorted(self.gains)
         values = [self.gains[speed] for speed in speeds]
-        self._gain = float(np.interp(3.6 * context.speed, speeds, values))
+        self._gain = float(np.interp(to_kmh(context.speed), speeds, values))
+        length = context.alignment.mean_length
         if self.reading == "span":
-            self._wavenumber = 2 * math.pi / context.span_length
+            self._wavenumber = 2 * math.pi / length
         else:
             speed = context.speed * SPEED_UNITS[self.speed_unit]
-            w = 2 * speed / context.span_length  # Eq. 12
-            self._wavenumber = w * math.pi / (2 * context.span_length)  # Eq. 11
+            w = 2 * speed / length  # Eq. 12
+            self._wavenumber = w * math.pi / (2 * length)  # Eq. 11
         self._share: float | None = None  # of a span, when last seen
         self._spans = 0  # begun since the start
 
@@ -105,7 +107,7 @@ class FeedbackFeedforward(ForceLaw):
         return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
-        """Distance (m) from the support behind the start of the run."""
+        """Distance (m) from the support behind the start of the run, were all spans of their mean length."""
         sine = self.read(observation, "sine of span position")
         cosine = self.read(observation, "cosine of span position")
         if sine**2 + cosine**2 < 0.5:
@@ -116,4 +118,4 @@ class FeedbackFeedforward(ForceLaw):
         if self._share is not None:
             self._spans -= round(share - self._share)  # nearly a span back: the next has begun
         self._share = share
-        return (self._spans + share) * self.context.span_length
+        return (self._spans + share) * self.context.alignment.mean_length

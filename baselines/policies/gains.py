@@ -16,6 +16,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.remember import remembered
 from panto_env.base.settings import Settings, parse
+from panto_env.base.units import to_kmh
 from panto_env.control.context import Context
 from panto_env.plant.state import Place
 
@@ -94,7 +95,7 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
     place = place_of(context.channels)
     for tuning in load_gains(path).tunings:
         if (tuning.catenary, tuning.pantograph, tuning.place) == (line, pantograph, place):
-            return _at_speed(tuning, names, 3.6 * context.speed, path)
+            return _at_speed(tuning, names, to_kmh(context.speed), path)
     raise InputError(
         f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
         f"at {place}: make them with `panto tune`, or take a policy that needs none."

@@ -65,7 +65,7 @@ class LanesLaw(ABC):
                 "It needs the place within the span, which these sensors do not tell; take skyhook, "
                 "h-infinity, or repetitive:place='counted'."
             )
-        ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.span_length
+        ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.alignment.mean_length
         angle: Array = np.arctan2(sine, cosine) + ahead
         return angle
 

@@ -105,7 +105,7 @@ class Disturbed:
     """A sampled model and more states: the wire's height (oscillators, one that wanders), commands' sum."""
 
     def __init__(self, sampled: Sampled, context: Context, harmonics: float, wandering: float) -> None:
-        interval, span_rate = context.control_interval, context.speed / context.span_length
+        interval, span_rate = context.control_interval, context.speed / context.alignment.mean_length
         count = max(1, int(HIGHEST / span_rate))
         size, own = sampled.size, 2 * count + 1
         self.a = np.zeros((size + own, size + own))

@@ -74,7 +74,7 @@ class PredictiveControl(TunableLaw):
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         contact = self._from_average(self.read(observations, "contact force"))
-        position = self.span_angle(observations) / (2 * np.pi) * self.context.span_length
+        position = self.span_angle(observations) / (2 * np.pi) * self.context.alignment.mean_length
         step = self._preview.step(position)
         passive = self._preview.passive
         own = np.arange(self.lanes)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.base.remember import remembered
+from panto_env.base.units import to_kmh
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
@@ -46,8 +47,8 @@ class Preview(NamedTuple):
 def preview(context: Context, length: int, delay: float, lag: float) -> Preview:
     """Preview for an episode. length: steps of the responses; delay, lag: of the actuator (s)."""
     place = Place(context.channels[0]).name.lower()
-    whole = round(3.6 * context.speed, 6), context.control_interval
-    return _preview(context.catenary, context.pantograph, place, *whole, length, delay, lag)
+    speed, interval = context.speed, context.control_interval
+    return _preview(context.catenary, context.pantograph, place, speed, interval, length, delay, lag)
 
 
 @remembered
@@ -55,25 +56,25 @@ def _preview(
     catenary: CatenaryData,
     pantograph: PantographData,
     place: str,
-    speed_kmh: float,
+    speed: float,
     interval: float,
     length: int,
     delay: float,
     lag: float,
 ) -> Preview:
-    stride = speed_kmh / 3.6 * interval
-    first = math.ceil(SETTLED * catenary.span_length / stride)
-    steps = max(1, round(catenary.span_length / stride))
+    stride, alignment = speed * interval, catenary.alignment()
+    first = math.ceil(alignment.support(SETTLED) / stride)
+    steps = max(1, round(alignment.mean_length / stride))
     last = first + steps + length
-    spans = math.ceil(last * stride / catenary.span_length)
+    spans = math.ceil(alignment.in_spans(last * stride))
     settings = run_settings(
         {
             "catenary": catenary,
             "pantograph": pantograph,
-            "speed_kmh": speed_kmh,
+            "speed_kmh": to_kmh(speed),
             "actuator": LaggedActuator(place=place, delay=delay, lag=lag, force_limit=PULSE),
             "accuracy": "fast",
-            "distance": spans * catenary.span_length,
+            "distance": alignment.support(spans),
             "spans": spans + CLEAR,
             "control_interval": interval,
         }
@@ -100,5 +101,5 @@ def _preview(
             for i in range(steps)
         ]
     )
-    start = first * stride - SETTLED * catenary.span_length
+    start = first * stride - alignment.support(SETTLED)
     return Preview(start, stride, passive - passive.mean(), response / PULSE)

@@ -48,7 +48,7 @@ class Repetitive(TunableLaw):
         """Prepare for episodes in so many lanes."""
         super().begin(context, lanes)
         model = line_model(context, mean_line(context), *self._delays)
-        span_rate, interval = context.speed / context.span_length, context.control_interval
+        span_rate, interval = context.speed / context.alignment.mean_length, context.control_interval
         numbers, limit = harmonics(span_rate), context.force_limit
         answers = self.answers(model, numbers * span_rate)
         pace = Pace(*self.gains[-len(Pace._fields) :])

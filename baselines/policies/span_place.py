@@ -33,5 +33,5 @@ class SpanPlace:
         if not self._counts:
             return law.span_angle(observations)
         way = law.read(observations, "speed") * law.context.control_interval
-        self._counted = self._counted + 2 * np.pi * way / law.context.span_length
+        self._counted = self._counted + 2 * np.pi * way / law.context.alignment.mean_length
         return self._counted

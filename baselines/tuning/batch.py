@@ -13,7 +13,7 @@ from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import RunSettings, far_enough
 from panto_env.metrics.low_pass import low_pass_sections
-from panto_env.metrics.spans import chosen_spans, within
+from panto_env.metrics.spans import chosen_spans
 from panto_env.plant.state import Row
 
 from ..policies.lanes_law import LanesLaw, Observations
@@ -95,13 +95,13 @@ def _low_passed(task: Task, settings: RunSettings) -> Array:
     """Low-passed contact force over the evaluated spans, (lanes, samples), (N)."""
     from scipy.signal import sosfilt
 
-    time_step, span = task.plant.time_step, task.plant.catenary.span_length
+    time_step, alignment = task.plant.time_step, task.plant.alignment
     force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
     sections, settled = low_pass_sections(time_step)
     start = settled[:, None, :] * force[None, :, :1]
     filtered, _ = sosfilt(sections, force, axis=1, zi=start)
     position = (np.arange(force.shape[1]) + 0.5) * time_step * float(task.speed[0])
-    spans = chosen_spans(None, task.length.distance, span)
+    spans = chosen_spans(None, task.length.distance, alignment)
     assert spans is not None  # of a choice that is not "all"
-    inside = filtered[:, within(position, spans, span)]
+    inside = filtered[:, alignment.within(position, spans)]
     return np.asarray(inside[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

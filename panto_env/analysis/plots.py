@@ -15,8 +15,9 @@ from ..base.files import PICTURES, check_output, write_whole
 from ..base.legend import legend_above
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass_in_place
-from ..metrics.spans import SpanChoice, Spans, in_words, limits, within
+from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
+from ..plant.alignment import Spans
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +73,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
     for axis in figure.axes:
         mark_supports(axis, run)
         legend_above(axis)
-    begin, end = (0.0, run.distance) if covered is None else limits(covered, run.span_length)
+    begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
     figure.axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(run, covered)}", xlim=(begin, end))
     where = f"pantograph {run.pantograph}, line {run.catenary}, {run.speed_kmh:g} km/h"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
@@ -87,21 +88,20 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
     figure = Figure(figsize=(10, 1.6 + 2.1 * len(runs)), layout="constrained")
     axes = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, run, label in zip(axes, runs, labels, strict=True):
-        _draw_force(axis, run, within(run.position, spans, run.span_length), raw="0.8")
+        _draw_force(axis, run, run.alignment.within(run.position, spans), raw="0.8")
         note = ", ended early" if run.terminated else ""
         axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
         mark_supports(axis, run)
     legend_above(axes[0])
-    axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(runs[0], spans)}", xlim=limits(spans, runs[0].span_length))
+    axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans))
     figure.suptitle(title)
     return figure
 
 
 def mark_supports(axis: Axes, run: Trajectory) -> None:
     """Thin lines where the supports stand."""
-    count = int(run.position[-1] // run.span_length) + 2
-    for k in range(count):
-        axis.axvline(k * run.span_length, color="0.85", linewidth=0.8, zorder=0)
+    for number in range(run.alignment.span_of(run.position[-1]) + 1):
+        axis.axvline(run.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
 
 
 def say_what_is_hidden(axis: Axes) -> None:
@@ -123,7 +123,7 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     """The contact force and its limits, where shown, (n,); raw: the colour of what is not filtered."""
     position = run.position[shown]
     filtered = low_pass_in_place(run.contact_force, run.time_step)[shown]
-    limit = en50367.maximum_limit(run.speed_kmh / 3.6)
+    limit = en50367.maximum_limit(run.speed)
     words = f"EN 50367: at most {limit:g} N"
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
     axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")

@@ -157,7 +157,7 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
 def _seconds(one_pass: _Pass) -> float:
     """About how long a train is under way (s)."""
     line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
-    length = distance or line.span_length * line.spans
+    length = distance or line.alignment().length
     return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
 
 

@@ -8,6 +8,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..base.units import from_kmh
 from ..metrics import en50367
 from ..metrics.labels import LABELS
 
@@ -100,7 +101,7 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
     """No contact, and EN 50367's largest force and σ, the latter at the mean force of the first policy."""
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
-    limits = [en50367.maximum_limit(row["speed_kmh"] / 3.6) for row in rows]
+    limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]
     force.plot(values, limits, drawstyle="steps-pre", **style)
     std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
@@ -114,7 +115,7 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
 
     first, second = (np.array(sorted({row[name] for row in rows})) for name in parameters)
     by_policy = _by_policy(rows)
-    figure = Figure(figsize=(13, 1.2 + 3.6 * len(by_policy)), layout="constrained")
+    figure = Figure(figsize=(13, 1.2 + 3.5 * len(by_policy)), layout="constrained")
     axes = figure.subplots(len(by_policy), len(MAPPED), sharex=True, sharey=True, squeeze=False)
     for (key, colours), column in zip(MAPPED.items(), axes.T, strict=True):
         values = [row[key] for row in rows if not isnan(row[key])]

@@ -11,6 +11,7 @@ import typer
 from ..base.errors import InputError
 from ..base.files import TABLES, write_rows
 from ..base.table import Alarm, Table
+from ..base.units import from_kmh
 from ..terminal import (
     Json,
     Plot,
@@ -102,7 +103,7 @@ def estimate(
     from ..estimation.settings import EstimatorSettings
 
     known = load_pantograph(pantograph)
-    metres = None if speed is None else speed / 3.6
+    metres = None if speed is None else from_kmh(speed)
     motion = read_motion(file, 0.0, speed=metres, span_length=span, units=pairs(unit or []))
     motion = dataclasses.replace(motion, lift=_lift(known, metres, lift, motion))
     if free_zero:

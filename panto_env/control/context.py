@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..plant.alignment import Alignment
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from .observation import Layout
@@ -19,7 +20,7 @@ class Context:
     force_limit: float  # force of an action of 1 (N)
     control_interval: float  # s
     speed: float  # of the train (m/s)
-    span_length: float  # m
+    alignment: Alignment  # of the line
     nominal_force: float  # static and aerodynamic uplift (N)
     catenary: CatenaryData
     pantograph: PantographData

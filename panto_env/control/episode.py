@@ -69,7 +69,7 @@ def new_episode(
         slope=layout.slope / plant.time_step,
         per_unit=1 / layout.scale,
         odometer=odometer,
-        spans_per_metre=1.0 / float(plant.catenary.span_length),
+        spans_per_metre=plant.alignment.arrays.per_metre,
         time_step=plant.time_step,
         control_steps=control_steps,
         mean_share=1 - math.exp(-settings.control_interval / MEAN_TIME),

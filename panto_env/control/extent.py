@@ -17,16 +17,10 @@ from .settings import RunSettings
 
 def runs(settings: RunSettings) -> Runs:
     """What the plant must be good for."""
-    slow, quick = settings.speed_kmh
-    drift = largest_drift(settings.speed_drift)
+    slow, quick = settings.speeds
+    drift = largest_drift(settings.drift)
     pantograph, interval = settings.pantograph, settings.control_interval
-    speeds = (slow - drift) / 3.6, (quick + drift) / 3.6
-    return Runs(
-        speeds,
-        interval,
-        settings.line_condition,
-        pantograph.hard_contact,
-    )
+    return Runs((slow - drift, quick + drift), interval, settings.line_condition, pantograph.hard_contact)
 
 
 def spans(settings: RunSettings) -> int | None:
@@ -34,10 +28,10 @@ def spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
-    last = math.ceil(settings.distance / line.span_length + settings.run_in)
+    last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in)
     wanted = last + (CLEAR if last >= line.spans else 1)
     if wanted > MOST_SPANS:
-        longest = (MOST_SPANS - CLEAR) * line.span_length
+        longest = line.alignment().support(MOST_SPANS - CLEAR)
         raise InputError(
             f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
         )

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import from_kmh
 from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
 from .extent import whole_steps
@@ -20,7 +21,7 @@ class EpisodeLength:
 
     def __init__(self, settings: RunSettings, plant: Plant) -> None:
         """Raises InputError for a distance, a control interval or speeds that the plant is not good for."""
-        self._drift, self._plant = settings.speed_drift, plant
+        self._drift, self._plant = settings.drift, plant
         self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
         if self.distance > plant.model.length:
             raise InputError(
@@ -38,13 +39,13 @@ class EpisodeLength:
             )
         # In the slowest run, after the longest run-in.
         slow = self.speed_range[0]
-        run_in = np.ceil(settings.run_in * plant.catenary.span_length / (slow * self.control_interval))
+        run_in = np.ceil(plant.alignment.support(settings.run_in) / (slow * self.control_interval))
         self.most_plant_steps = float(self.plant_steps(slow, run_in)) + self._late
 
     def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
         """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
-        low, high = (speed / 3.6 for speed in speed_range(speed_kmh))
-        drift = largest_drift(self._drift) / 3.6
+        low, high = map(from_kmh, speed_range(speed_kmh))
+        drift = largest_drift(self._drift)
         for speed in (low - drift, high + drift):
             self._plant.check_speed(speed)
         return low, high
@@ -64,7 +65,7 @@ class EpisodeLength:
 
     def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
         """The same of one train that drifts about this stride of a control step (m)."""
-        lag = largest_lag(self._drift / 3.6)
+        lag = largest_lag(self._drift)
         most = min(self._plant.model.length, stride * run_in + lag + self.distance) + lag
         steps = np.arange(math.ceil(most / stride) + 1.0)
         position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # it rises
@@ -75,7 +76,7 @@ class EpisodeLength:
     @property
     def _late(self) -> int:
         """Plant steps by which a train may fall back."""
-        lag = largest_lag(self._drift / 3.6)
+        lag = largest_lag(self._drift)
         return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
 
     @property

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from ..plant.line_condition import LineCondition
@@ -64,7 +65,7 @@ def trim_of_pass(
 
     None where none is to be met, or the speed is yet to be drawn. Raises InputError where it cannot be met.
     """
-    low, high = (speed / 3.6 for speed in settings.speed_kmh)
+    low, high = settings.speeds
     if low != high or target_mean(settings, low) is None:
         return None
     file = _file(settings, seed, spans)
@@ -80,7 +81,7 @@ def trim_as_designed(
 ) -> Trim:
     """Trim over a range of speeds (m/s), of line and pantograph as designed, over the usual spans."""
     low, high = speeds
-    count = 1 if low == high else 2 + int(3.6 * (high - low) / KNOT_DISTANCE)
+    count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
     as_designed = {
         "line_condition": (LineCondition(),),
         "pantograph_scatter": 0.0,
@@ -91,7 +92,7 @@ def trim_as_designed(
     found: list[float] = np.linspace(low, high, count).tolist()
     forces: list[float] = []
     for speed in found:
-        at_speed = {"speed_kmh": (3.6 * speed, 3.6 * speed)}
+        at_speed = {"speed_kmh": (to_kmh(speed), to_kmh(speed))}
         designed = far_enough(settings.model_copy(update=as_designed | at_speed))
         trim = trim_of_pass(designed, 0, None, passive_mean)
         assert trim is not None  # a mean force is to be met at every speed or at none
@@ -100,7 +101,7 @@ def trim_as_designed(
 
 
 def _solve(settings: RunSettings, mean: PassiveMean) -> float:
-    speed = settings.speed_kmh[0] / 3.6
+    speed = settings.speeds[0]
     target = target_mean(settings, speed)
     assert target is not None  # else there is nothing to trim
     aerodynamic = settings.pantograph.nominal_force(speed) - settings.pantograph.static_force
@@ -127,7 +128,7 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
 
 
 def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path | None:
-    speed = settings.speed_kmh[0] / 3.6
+    speed = settings.speeds[0]
     inputs = {
         # As any: of a line all values, not those alone that every kind has.
         "settings": settings.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True),

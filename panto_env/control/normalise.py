@@ -18,14 +18,13 @@ from .passive_run import PassiveRun
 _ROWS = {name: row for row, (name, _, _) in enumerate(READING_ENTRIES)}
 
 
-def normalised(layout: Layout, run: PassiveRun) -> Layout:
+def normalised(layout: Layout, run: PassiveRun, speed_kmh: tuple[float, float]) -> Layout:
     """The layout with readings, present and earlier ones, and speed counted from a passive run.
 
-    Raises InputError where a reading has no spread.
+    speed_kmh: range of speeds that was given for it (km/h). Raises InputError where a reading has no spread.
     """
-    low, high = float(run.speeds[0]), float(run.speeds[-1])
     entries = tuple(_normalised(entry, run) for entry in layout.entries)
-    return replace(layout, entries=entries, normalise=(round(3.6 * low, 9), round(3.6 * high, 9)))
+    return replace(layout, entries=entries, normalise=speed_kmh)
 
 
 def _normalised(entry: Entry, run: PassiveRun) -> Entry:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.line_condition import LineCondition
@@ -62,7 +63,7 @@ class PassiveRun:
 def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> PassiveRun:
     """Passive runs over a range of speeds (m/s). Raises InputError where one leaves the valid range."""
     low, high = speeds
-    count = 1 if low == high else 2 + int(3.6 * (high - low) / KNOT_DISTANCE)
+    count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
     knots = np.linspace(low, high, count)
     table = np.array([_at_speed(settings, speed, run) for speed in knots.tolist()])
     return PassiveRun(knots, table[:, 0], table[:, 1])
@@ -72,7 +73,7 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
     """Means and spreads at one speed (m/s), from the disk where they are kept."""
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
-    own |= AS_DESIGNED | {"speed_kmh": (3.6 * speed, 3.6 * speed)}
+    own |= AS_DESIGNED | {"speed_kmh": (to_kmh(speed), to_kmh(speed))}
     designed = far_enough(RunSettings.model_construct(**own))
     file = _file(designed)
     kept: list[list[float]] | None = read_kept(file, "values")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..backend import of_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
@@ -39,7 +40,7 @@ def divergence(task: Task, lane: int) -> str:
     plant = task.plant
     return (
         f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
-        f"{3.6 * task.speed[lane]:g} km/h diverged, so it has no result; {_way_out(plant)}."
+        f"{to_kmh(task.speed[lane]):g} km/h diverged, so it has no result; {_way_out(plant)}."
     )
 
 
@@ -69,10 +70,9 @@ def trajectory(
         if diverged(task, np.array([lane]), deviation[None], highest[None])[0]:
             raise InputError(divergence(task, lane))
     uplift, tension = (each[lane, 1 : steps + 1] for each in (task.samples.uplift, task.samples.tension))
-    middle = (np.arange(steps) + 0.5) * plant.time_step
     return Trajectory(
-        time=middle,
-        position=middle * task.speed[lane] + plant.ahead(np.array([lane]), np.arange(steps)[None] + 0.5)[0],
+        time=(np.arange(steps) + 0.5) * plant.time_step,
+        position=plant.position(lane, np.arange(steps) + 0.5),
         contact_force=rows[:, Row.CONTACT_FORCE].copy(),
         head=rows[:, Row.HEAD_HEIGHT].copy(),
         frame=rows[:, Row.FRAME_HEIGHT].copy(),
@@ -87,8 +87,8 @@ def trajectory(
         dropper_position=plant.model.droppers if task.record_droppers else np.zeros(0),
         catenary=plant.catenary.name,
         pantograph=plant.pantograph.name,
-        speed_kmh=3.6 * float(task.speed[lane]),
-        span_length=plant.catenary.span_length,
+        speed=float(task.speed[lane]),
+        alignment=plant.alignment,
         time_step=plant.time_step,
         nominal_force=nominal_force,
         target_mean=task.target_mean(lane),
@@ -112,10 +112,9 @@ def ending(task: Task, lane: int) -> str:
         return ""
     plant = task.plant
     steps, line = plant.of(lane, Row.STEP), plant.catenary
-    time = steps * plant.time_step
-    position = time * float(task.speed[lane]) + plant.ahead(np.array([lane]), np.array([[steps]]))[0, 0]
+    time, position = steps * plant.time_step, float(plant.position(lane, steps)[0])
     return (
-        f"The run ended early at {position:.1f} m (span {int(position // line.span_length) + 1}, "
+        f"The run ended early at {position:.1f} m (span {plant.alignment.span_of(position)}, "
         f"{time:.2f} s): {reason(which, line.free_uplift)}."
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..backend import of_lanes, set_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..plant.state import SAMPLE_ROWS, Row
 from ..plant.valid_range import Ending
 from .episode import Results
@@ -26,14 +27,20 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     of_lane = random if callable(random) else lambda _: random
     droppers, supports = len(plant.model.droppers), len(plant.model.supports)
     drawn = draw_starts(
-        task.settings, task.length.speed_range, droppers, supports, lanes, of_lane, plant.time_step
+        task.settings,
+        task.length.speed_range,
+        droppers,
+        supports,
+        lanes,
+        of_lane,
+        plant.time_step,
+        plant.alignment,
     )
     forces = task.static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
     end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
     run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
-    task.speed[lanes] = drawn.speed
     _begin(task, lanes, end)
     plant.clear(task.samples, lanes)
     samples = of_lanes(plant.run.table[0], lanes)[:, :SAMPLE_ROWS]
@@ -61,7 +68,7 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     low = nominal.argmin()
     if not nominal[low] > 0:  # the reward is told in shares of it
         raise InputError(
-            f"At {3.6 * task.speed[lanes[low]]:g} km/h nothing presses '{task.plant.pantograph.name}' "
+            f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
             f"against the wire, its lift is {nominal[low]:g} N; give it a static_force or an "
             "aerodynamic_coefficient, or ask for a mean_force."
         )

@@ -19,6 +19,7 @@ from ..base.names import suggest
 from ..base.ranges import Between
 from ..base.settings import parse, plain
 from ..base.shown import shown
+from ..base.units import from_kmh
 from ..catalog import load_catenary, load_pantograph
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import CLEAR, LAST_USUAL
@@ -215,6 +216,17 @@ class RunSettings(Numerics):
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property
+    def speeds(self) -> tuple[float, float]:
+        """Lowest and highest mean speed of the train (m/s)."""
+        low, high = self.speed_kmh
+        return from_kmh(low), from_kmh(high)
+
+    @property
+    def drift(self) -> float:
+        """Rms of the drift of the speed about its mean (m/s)."""
+        return from_kmh(self.speed_drift)
+
+    @property
     def numerics(self) -> Numerics:
         """How the plant is computed."""
         return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
@@ -229,7 +241,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
     if settings.distance is not None or settings.spans is not None:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
-    return settings.model_copy(update={"distance": last * line.span_length, "spans": last + CLEAR})
+    return settings.model_copy(update={"distance": line.alignment(last).length, "spans": last + CLEAR})
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:

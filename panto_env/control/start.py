@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..plant.alignment import Alignment
 from ..plant.drift import draw_drift
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.build import with_scatter
@@ -39,16 +40,17 @@ def draw_starts(
     lanes: Any,
     random: Callable[[int], np.random.Generator],
     time_step: float,
+    alignment: Alignment,
 ) -> Starts:
     """Draw the starts of lanes, (n,), each from its own generator, asked for only where something is random.
 
-    speeds: lowest and highest (m/s). droppers, supports: of the line. time_step: of the plant (s).
+    speeds: minimum and maximum (m/s). droppers, supports, alignment: of the line. time_step: s.
     """
     low, high = speeds
     conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way = np.full(len(lanes), low), np.zeros(len(lanes))
-    rms = settings.speed_drift / 3.6
+    rms = settings.drift
     if not (low < high or lines_differ or scatter or run_in or rms):
         return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way, None)
     line, pantograph, drift = [], [], []
@@ -60,7 +62,7 @@ def draw_starts(
         if scatter:
             pantograph.append(with_scatter(settings.pantograph, scatter, own))
         if run_in > 0:
-            way[k] = own.uniform(0, run_in) * settings.catenary.span_length
+            way[k] = alignment.support(own.uniform(0, run_in))
         if rms > 0:
             drift.append(draw_drift(rms, time_step, own))
     return Starts(speed, line, pantograph, way, np.array(drift) if drift else None)

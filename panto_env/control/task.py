@@ -70,12 +70,13 @@ class Task(Stepping):
         if settings.normalise is not None:
             known = settings.model_copy(update={"pantograph": self.known_pantograph})
             speeds = length.check_speeds(settings.normalise)
-            self.layout = normalised(self.layout, passive_run(known, speeds, passive_pass))
+            run = passive_run(known, speeds, passive_pass)
+            self.layout = normalised(self.layout, run, settings.normalise)
         self.passive: PassiveRun | None = None  # that the reward counts from
         if settings.reward.target == "passive":
             self.passive = passive_run(settings, length.speed_range, passive_pass)
-        self.speed = np.zeros(lanes)  # m/s
-        odometers = Odometers(settings.sensors.odometer, lanes, plant.catenary.span_length)
+        self.speed = plant.speed  # of each lane (m/s)
+        odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment.mean_length)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
         super().__init__(
@@ -111,7 +112,7 @@ class Task(Stepping):
         from ..estimation.readings import estimating  # slow: it imports SciPy
 
         speed = 0.5 * sum(self.length.speed_range)
-        span_length = settings.catenary.span_length
+        span_length = plant.alignment.mean_length
         return estimating(
             settings.sensors, settings.estimator, self.known_pantograph, speed, span_length, *form
         )
@@ -157,7 +158,7 @@ class Task(Stepping):
             force_limit=self.actuator.force_limit,
             control_interval=self.length.control_interval,
             speed=float(self.speed[lane]),
-            span_length=self.plant.catenary.span_length,
+            alignment=self.plant.alignment,
             nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),
             catenary=self.plant.catenary,
             pantograph=self.known_pantograph,

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
+from ..base.units import to_kmh
 from ..catalog import load_pantograph
 from ..estimation.estimate import filter_motion, gains_of, model_of
 from ..estimation.motion import Motion, measure
@@ -55,7 +56,7 @@ def check_clock(run: Trajectory) -> None:
     if not np.isfinite(run.position).all():
         raise InputError("Its position is no number somewhere; leave the run out.")
     if not np.abs(np.diff(run.position) / run.stride - 1).max() <= EVEN:
-        mean = float(np.ptp(run.position) / np.ptp(run.time)) * 3.6
+        mean = to_kmh(float(np.ptp(run.position) / np.ptp(run.time)))
         raise InputError(
             f"Its positions go at {mean:.4g} km/h in the mean, not evenly at the {run.speed_kmh:.4g} km/h "
             "that it states; leave the run out."
@@ -91,7 +92,7 @@ def _as_recorded(run: Trajectory) -> Motion:
         frame_force=run.frame_force,
         head_force=run.head_force,
         lift=run.nominal_force,
-        speed=run.speed_kmh / 3.6,
-        span_length=run.span_length,
+        speed=run.speed,
+        span_length=run.alignment.mean_length,
         start=float(run.time[0]),
     )

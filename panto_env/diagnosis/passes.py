@@ -11,8 +11,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import from_kmh
 from ..metrics.low_pass import CUTOFF
-from ..metrics.spans import FIRST_SETTLED, last_whole_span
+from ..metrics.spans import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from .force import check_clock, estimated_force
@@ -95,15 +96,15 @@ def side_by_side(
     for k, run in enumerate(everything):
         if any(np.array_equal(run.head, other.head) for other in everything[:k]):
             raise InputError("One run stands there twice, which says nothing new; give each once.")
-    span = first.span_length
-    last = min(last_whole_span(run.distance - END, span) for run in everything)
+    alignment, span = first.alignment, first.alignment.mean_length
+    last = min(alignment.last_whole_span(run.distance - END) for run in everything)
     if last < FIRST_SETTLED:
         raise InputError(
             f"The shortest run ends at {min(run.distance for run in everything):.4g} m, but a run's start is "
             f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
             f"{FIRST_SETTLED * span + END:g} m or more."
         )
-    per_span = math.ceil(span / min(STEP, speed / 3.6 / CUTOFF / PER_WAVE) - 1e-9)
+    per_span = math.ceil(span / min(STEP, from_kmh(speed) / CUTOFF / PER_WAVE) - 1e-9)
     step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
     places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
     force = np.zeros((len(everything), len(places)))
@@ -117,7 +118,7 @@ def side_by_side(
         raise InputError(
             "No run says where the line's droppers are; record one run with them, as `panto simulate` does."
         )
-    facts = (start, step, per_span, droppers, first.catenary, speed / 3.6, first.line.wave_speed)
+    facts = (start, step, per_span, droppers, first.catenary, from_kmh(speed), first.line.wave_speed)
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
 
 
@@ -132,7 +133,7 @@ def _named(run: str) -> Iterator[None]:
 
 def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:
     """Raise InputError for a run that can't be compared with the others, whose mean speed is given (km/h)."""
-    if run.catenary != first.catenary or run.span_length != first.span_length:
+    if run.catenary != first.catenary or run.alignment.lengths[0] != first.alignment.lengths[0]:
         raise InputError(
             f"Passes of different lines, '{run.catenary}' and '{first.catenary}', cannot be compared; give "
             "healthy passes of the line that is judged."

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.units import to_kmh
 from ..control import Task
 from ..control.episode import Flags
 from ..control.state import Result
@@ -88,5 +89,5 @@ def first_info(task: Task) -> dict[str, Any]:
         plain = {key: value for key, value in infos.items() if not key.startswith("_")}
         return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
 
-    answer = Answer(task.results, 3.6 * task.speed, np.ones(1, dtype=np.bool_))
+    answer = Answer(task.results, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
     return of_lane(lane_infos(answer)) | {"figures": FIGURES_TO_COME.copy()}

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..base.errors import AccuracyWarning
+from ..base.units import to_kmh
 from ..control import Task
 from ..control.episode import Flags, Results
 from ..control.start import LaneGenerators
@@ -74,7 +75,7 @@ class Lanes:
             own = task.results
         task.reset(np.flatnonzero(lanes), random, own)
         self._take(own, lanes)
-        self._speed_kmh[lanes] = 3.6 * task.speed[lanes]
+        self._speed_kmh[lanes] = to_kmh(task.speed[lanes])
 
     def _take(self, results: Results, lanes: Flags) -> None:
         """Take over the results of some lanes."""

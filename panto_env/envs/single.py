@@ -10,6 +10,7 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..control import Context, Task
 from ..control.action import checked
 from ..control.arguments import takes
@@ -151,7 +152,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if task is not self.task:
             self._watch(task)
         task.reset(0, self.np_random)
-        self._speed_kmh = 3.6 * float(task.speed[0])
+        self._speed_kmh = to_kmh(float(task.speed[0]))
         self._running = True
         self._reward_so_far = 0.0
         if self.render_mode == "human":

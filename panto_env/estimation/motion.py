@@ -88,8 +88,8 @@ def measure(
         frame_force=mean(run.frame_force, time, time + step),
         head_force=mean(run.head_force, time, time + step),
         lift=run.nominal_force,
-        speed=run.speed_kmh / 3.6,
-        span_length=run.span_length,
+        speed=run.speed,
+        span_length=run.alignment.mean_length,
         start=float(time[0]),
         contact_force=mean(run.contact_force, time - step / 2, time + step / 2),
     )

@@ -31,7 +31,7 @@ class LineFacts:
     @classmethod
     def of(cls, line: CatenaryData, wave_speed: float, speed: float) -> LineFacts:
         """Of a line and a train on it; both speeds in m/s."""
-        dropper, support = line.reflections(speed / line.span_length)
+        dropper, support = line.reflections(speed / line.alignment().mean_length)
         return cls(
             system=line.system,
             wave_speed=wave_speed,
@@ -47,19 +47,20 @@ def compliance(
     arcing: float,
     line: LineFacts,
     speed: float,
-    span_length: float,
+    mean_span: float,
     tension: Array,
     tension_near: Array,
 ) -> list[Criterion]:
     """All criteria of a run, then what is told beside them.
 
-    arcing: NQ (%); speed: of the train (m/s); span_length: m; tension, tension_near: all samples of all
-    droppers, and those of the span that the train is in (N), empty where they were not recorded.
+    arcing: NQ (%); speed: of the train (m/s); mean_span: mean length of a span (m); tension,
+    tension_near: all samples of all droppers, and those of the span that the train is in (N), empty where
+    they were not recorded.
     """
     return [
         *en50367.criteria(figures, arcing, speed, line.system),
         *_uplift(figures, line),
-        *_waves(line, speed, speed / span_length),
+        *_waves(line, speed, speed / mean_span),
         *_droppers(tension, tension_near),
     ]
 

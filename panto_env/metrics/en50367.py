@@ -5,6 +5,7 @@ The standard itself was not at hand: formulas are recalled, those for AC seen in
 
 from __future__ import annotations
 
+from ..base.units import to_kmh
 from .criterion import Criterion
 from .figures import ARC, Figures
 from .labels import LABELS
@@ -26,8 +27,8 @@ SOURCE = "EN 50367, recalled"
 
 def largest_mean(speed: float, system: str = "AC") -> float:
     """Largest mean force (N), which is also the one to aim at, under a system of ``LARGEST_MEAN``."""
-    a, b = LARGEST_MEAN[system][3.6 * speed > FAST]
-    return a * (3.6 * speed) ** 2 + b
+    a, b = LARGEST_MEAN[system][to_kmh(speed) > FAST]
+    return a * to_kmh(speed) ** 2 + b
 
 
 def smallest_mean(speed: float, system: str = "AC") -> float | None:
@@ -35,17 +36,17 @@ def smallest_mean(speed: float, system: str = "AC") -> float | None:
     if system not in SMALLEST_MEAN:
         return None
     a, b = SMALLEST_MEAN[system]
-    return a * (3.6 * speed) ** 2 + b
+    return a * to_kmh(speed) ** 2 + b
 
 
 def maximum_limit(speed: float) -> float:
     """Largest contact force (N)."""
-    return 350.0 if 3.6 * speed > FAST else 300.0
+    return 350.0 if to_kmh(speed) > FAST else 300.0
 
 
 def arcing_limit(speed: float) -> float:
     """Largest NQ (%)."""
-    return 0.2 if 3.6 * speed > 250 else 0.1
+    return 0.2 if to_kmh(speed) > 250 else 0.1
 
 
 def criteria(figures: Figures, arcing: float, speed: float, system: str = "AC") -> list[Criterion]:

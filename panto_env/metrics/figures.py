@@ -43,7 +43,7 @@ class Figures:
 def cost_function(force: Array, nominal_force: float, stride: float | Array) -> float:
     """CF (N m), Eq. 14 of paper 1: |F - F_N| over the distance, by trapezoids.
 
-    stride: distance between samples (m), which is v/3.6 times the time step, or (n - 1,) where the speed
+    stride: distance between samples (m), the speed times the time step, or (n - 1,) where the speed
     drifts.
     """
     deviation = np.abs(force - nominal_force)

@@ -1,25 +1,17 @@
-"""Stretches of a line in whole spans, counted from 1: their limits, and which positions lie inside.
+"""Which spans the figures of a run cover: first to last, both included (EN 50318 takes 5 and 6).
 
-The figures of a run cover the spans first to last, both included (EN 50318 takes 5 and 6), by default those
-after the start has died out. Span 1 begins at the start of the line; a support belongs to the span that
-begins at it.
+By default these are the spans after the start has died out. Where they lie, the line's alignment says.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.shown import shortly
+from ..plant.alignment import Alignment, Spans
 from ..plant.catenary.schema import MOST_SPANS
 
-Spans: TypeAlias = tuple[int, int]
-"""The first and the last span."""
 SpanChoice: TypeAlias = Spans | Literal["all"] | None
 """The first and the last span, "all" for the whole run, or None for those after the start has died out."""
 FIRST_SETTLED = 10
@@ -48,19 +40,7 @@ def in_words(spans: Spans | None) -> str:
     return "all" if spans is None else f"{spans[0]}-{spans[1]}"
 
 
-def limits(spans: Spans, span_length: float) -> tuple[float, float]:
-    """Positions (m) at which the first span begins and the last one ends."""
-    first, last = spans
-    return (first - 1) * span_length, last * span_length
-
-
-def within(position: Array, spans: Spans, span_length: float) -> NDArray[np.bool_]:
-    """Which positions (m), (n,), lie inside the spans."""
-    begin, end = limits(spans, span_length)
-    return np.asarray((position >= begin) & (position < end))
-
-
-def chosen_spans(choice: SpanChoice, distance: float, span_length: float) -> Spans | None:
+def chosen_spans(choice: SpanChoice, distance: float, alignment: Alignment) -> Spans | None:
     """The spans that a choice means for a run of this distance (m); None for the whole run.
 
     Raises InputError where it is none, or the run ends before its start has died out.
@@ -70,19 +50,11 @@ def chosen_spans(choice: SpanChoice, distance: float, span_length: float) -> Spa
     if choice is not None:
         check_spans(choice)
         return choice
-    last = last_whole_span(distance, span_length, tolerance=1e-9)
+    last = alignment.last_whole_span(distance, tolerance=1e-9)
     if last < FIRST_SETTLED:
         raise InputError(
             f"A run of {distance:g} m ends before its start has died out, which takes "
-            f"{FIRST_SETTLED - 1} spans ({(FIRST_SETTLED - 1) * span_length:g} m); run further, or name the "
-            'spans to evaluate, as (5, 6), or "all".'
+            f"{FIRST_SETTLED - 1} spans ({alignment.support(FIRST_SETTLED - 1):g} m); run further, or name "
+            'the spans to evaluate, as (5, 6), or "all".'
         )
     return FIRST_SETTLED, last
-
-
-def last_whole_span(distance: float, span_length: float, tolerance: float = 0.0) -> int:
-    """The last span that a run of this distance (m) covers whole; 0 if there is none.
-
-    tolerance: what may be missing from the span (spans), for a distance that is a rounded sum of steps.
-    """
-    return math.floor(distance / span_length + tolerance)

@@ -20,13 +20,15 @@ from ..base.arrays import Array
 from ..base.checked_json import NOT_AS_WRITTEN, warn_unchecked
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
+from ..base.units import to_kmh
+from ..plant.alignment import Alignment, Spans
 from .compliance import LineFacts, compliance
 from .criterion import Criterion
 from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
-from .spans import SpanChoice, Spans, chosen_spans, limits, within
+from .spans import SpanChoice, chosen_spans
 
-FORMAT = 2
+FORMAT = 3
 KEY, CHECKSUM = b"panto_env", b"panto_env.sha256"
 """Of the file's own table of texts: the facts as JSON, and the checksum of them and all columns."""
 LARGEST = 0.5
@@ -78,8 +80,8 @@ class Trajectory:
     dropper_position: Array  # (droppers,): m
     catenary: str
     pantograph: str
-    speed_kmh: float
-    span_length: float  # m
+    speed: float  # of the train, its mean where it drifts (m/s)
+    alignment: Alignment  # of the line
     time_step: float  # s
     nominal_force: float  # static force and aerodynamic uplift, as applied (N)
     target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
@@ -100,7 +102,7 @@ class Trajectory:
         """
         covered = self.spans(spans)
         inside = self.inside(spans)
-        begin, end = (0.0, float(self.position[-1])) if covered is None else limits(covered, self.span_length)
+        begin, end = (0.0, float(self.position[-1])) if covered is None else self.alignment.limits(covered)
         force = self.contact_force[inside]
         filtered = low_pass(self.contact_force, self.time_step)[inside]
         mean, std = float(filtered.mean()), float(filtered.std())
@@ -132,21 +134,26 @@ class Trajectory:
         """
         inside = self.inside(spans)
         tension = self.dropper_force[inside]
-        train, dropper = (x // self.span_length for x in (self.position[inside], self.dropper_position))
+        train, dropper = map(self.alignment.span_of, (self.position[inside], self.dropper_position))
         return compliance(
             self.summary(spans),
             arcing(self.contact_force[inside], self.time_step),
             self.line,
-            self.speed_kmh / 3.6,
-            self.span_length,
+            self.speed,
+            self.alignment.mean_length,
             tension,
             tension[train[:, None] == dropper] if tension.size else tension,
         )
 
     @property
+    def speed_kmh(self) -> float:
+        """Speed of the train, its mean where it drifts (km/h)."""
+        return to_kmh(self.speed)
+
+    @property
     def stride(self) -> float:
         """Distance from one sample to the next (m), the mean where the speed drifts."""
-        return self.speed_kmh / 3.6 * self.time_step
+        return self.speed * self.time_step
 
     @property
     def distance(self) -> float:
@@ -160,10 +167,10 @@ class Trajectory:
         """
         if choice is None and self.terminated:
             raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
-        spans = chosen_spans(choice, self.distance, self.span_length)
+        spans = chosen_spans(choice, self.distance, self.alignment)
         if spans is None:
             return None
-        _, end = limits(spans, self.span_length)
+        _, end = self.alignment.limits(spans)
         if self.position[-1] + self.stride < end:
             first, last = spans
             if self.terminated:
@@ -179,7 +186,7 @@ class Trajectory:
         covered = self.spans(spans)
         if covered is None:
             return np.ones(len(self.time), dtype=bool)
-        return within(self.position, covered, self.span_length)
+        return self.alignment.within(self.position, covered)
 
     def save(self, path: str | Path) -> None:
         """Write a Parquet file, whole or not at all. Raises InputError for a name that is not such a file's.
@@ -199,6 +206,7 @@ class Trajectory:
             for name in _facts()
         }
         facts["line"] = vars(self.line)
+        facts["alignment"] = self.alignment.supports, self.alignment.pitch
         told, table = json.dumps(facts).encode(), pa.table(columns)
         table = table.replace_schema_metadata({KEY: told, CHECKSUM: _checksum(table, told)})
         with write_whole(path) as temporary:
@@ -228,6 +236,8 @@ class Trajectory:
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
             facts["line"] = LineFacts(**facts["line"])
+            supports, pitch = facts["alignment"]
+            facts["alignment"] = Alignment(tuple(supports), pitch)
             series = {name: table[name].to_numpy() for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),

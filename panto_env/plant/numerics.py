@@ -11,6 +11,7 @@ from pydantic import Field, field_validator
 from ..base.errors import InputError
 from ..base.ranges import Between
 from ..base.settings import Settings
+from ..base.units import from_kmh, to_kmh
 from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
@@ -56,7 +57,7 @@ class Numerics(Settings):
 class Runs(NamedTuple):
     """The runs for which a plant is built."""
 
-    speeds: tuple[float, float] = (250 / 3.6, 300 / 3.6)  # lowest and highest (m/s)
+    speeds: tuple[float, float] = (from_kmh(250), from_kmh(300))  # lowest and highest (m/s)
     control_interval: float = 0.01  # s, of which a time step is a whole part unless given
     conditions: Sequence[LineCondition] = (LineCondition(),)
     hard_contact: bool = False  # whether stiffer, or more damped, than a collector strip's
@@ -83,7 +84,7 @@ class Runs(NamedTuple):
         if time_step > self.wave_step(2):
             raise InputError(
                 f"A time step of {1e3 * time_step:g} ms cannot carry waves of {self.shortest_wave:g} m at "
-                f"{3.6 * self.speeds[1]:g} km/h, of which a train passes one in "
+                f"{to_kmh(self.speeds[1]):g} km/h, of which a train passes one in "
                 f"{1e3 * self.wave_step(1):.3g} ms; take one below {1e3 * self.wave_step(2):.2g} ms."
             )
 

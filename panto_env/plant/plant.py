@@ -59,6 +59,7 @@ class Plant:
         """
         self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
+        self.alignment = catenary.alignment(self.spans)
         self.runs = runs
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
@@ -68,6 +69,7 @@ class Plant:
             runs=runs,
         )
         self.time_step = self.model.time_step
+        self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         size = 2 * len(pantograph.masses)
         self.lanes_abreast = abreast = lanes_abreast(self.model.line)
         self.pantographs = pantographs(size, lanes if varied else 1, abreast)
@@ -107,6 +109,12 @@ class Plant:
         """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
         return ahead(of_lanes(self.run.drift, lanes), steps)
 
+    def position(self, lane: int, steps: Any) -> Array:
+        """Where the train of a lane is (m), (n,), after numbers of steps, (n,), which may be fractions."""
+        steps = np.atleast_1d(steps)
+        steady = steps * self.time_step * self.speed[lane]
+        return np.asarray(steady + self.ahead(np.array([lane]), steps[None])[0])
+
     @property
     def arrays(self) -> tuple[Any, ...]:
         """The named tuples that every kernel takes first: line, wire, pantographs, actuators, run."""
@@ -135,6 +143,7 @@ class Plant:
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
         check_speeds(self.catenary.name, self.model.wave_speed, (speeds.min(), speeds.max()))
+        self.speed[lanes] = speeds
         drawn = drawn or [DrawnLine(self.runs.conditions[0])] * len(lanes)
         for lane, own in zip(lanes, pantographs, strict=False):
             self.pantographs.set_lanes(lane, own, self.model, self._reflected)

@@ -59,9 +59,13 @@ def check_together(filmed: Sequence[Filmed]) -> None:
     """Raise InputError unless passes can stand above each other: in step, the same spans at the same time."""
     first = filmed[0]
     for other in filmed[1:]:
+        if other.run.alignment != first.run.alignment:
+            raise InputError(
+                f"Passes above each other must have the same spans, but those of {first.title} and "
+                f"{other.title} differ in number or length; make a film of each."
+            )
         pairs = {
             "speed (km/h)": (first.run.speed_kmh, other.run.speed_kmh),
-            "span length (m)": (first.run.span_length, other.run.span_length),
             "control_interval (s)": (first.control_interval, other.control_interval),
         }
         for name, (one, two) in pairs.items():

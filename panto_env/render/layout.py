@@ -30,7 +30,7 @@ class Layout:
 
     width: int  # px
     height: int  # px
-    span_length: float  # m
+    span: float  # mean length of a span of the line (m)
     exaggeration: int  # of heights against lengths
     rest: tuple[float, ...]  # heights of the masses above the head's in the first frame (m)
 
@@ -39,21 +39,22 @@ class Layout:
         """Of all frames of a line: the exaggeration is the largest round one by which its wires fit in."""
         wires = moment.line.messenger if moment.line.messenger.size else moment.line.contact
         tallest = max(LEAST_HEIGHT, float(wires.max()) if wires.size else 0.0)
-        per_metre = width / ((BEHIND + AHEAD) * moment.span_length)
+        span = moment.alignment.mean_length
+        per_metre = width / ((BEHIND + AHEAD) * span)
         room = (1 - TITLE - CHART - ROOF - PANTOGRAPH) * height
         fitting = [each for each in ROUND_TO if each * per_metre * tallest <= room]
         rest = tuple((moment.heights - moment.heights[0]).tolist())
-        return cls(width, height, moment.span_length, max(fitting, default=1), rest)
+        return cls(width, height, span, max(fitting, default=1), rest)
 
     @property
     def per_metre(self) -> float:
         """Pixels of a metre along the line."""
-        return self.width / ((BEHIND + AHEAD) * self.span_length)
+        return self.width / ((BEHIND + AHEAD) * self.span)
 
     @property
     def pantograph(self) -> float:
         """Where the pantograph stands (px from the left)."""
-        return self.per_metre * BEHIND * self.span_length
+        return self.per_metre * BEHIND * self.span
 
     @property
     def wire(self) -> float:

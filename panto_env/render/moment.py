@@ -12,6 +12,7 @@ from ..base.arrays import Array
 from ..control import Task
 from ..metrics import en50367
 from ..metrics.low_pass import low_pass
+from ..plant.alignment import Alignment
 from ..plant.catenary.view import LineView
 from ..plant.state import Place, Row
 
@@ -29,7 +30,7 @@ class Moment:
     time: float  # since the start (s)
     speed: float  # of the train (m/s)
     position: float  # of the pantograph (m)
-    span_length: float  # m
+    alignment: Alignment  # of the line
     line: LineView
     masses: Array  # (masses,): head first (kg)
     heights: Array  # (masses,): of each (m), 0 where no spring is strained and the head at height 0
@@ -56,19 +57,16 @@ class Felt(NamedTuple):
 def position_of(task: Task, lane: int) -> float:
     """Where a lane's pantograph is (m)."""
     plant = task.plant
-    steps = int(plant.of(lane, Row.STEP))
-    drifted = float(plant.ahead(np.array([lane]), np.array([[steps]]))[0, 0])
-    return steps * plant.time_step * float(task.speed[lane]) + drifted
+    return float(plant.position(lane, int(plant.of(lane, Row.STEP)))[0])
 
 
 def felt(task: Task, lane: int, behind: float) -> Felt:
     """The contact of a lane of a task that keeps its samples, up to so many spans behind it."""
     plant = task.plant
     steps, speed, step = int(plant.of(lane, Row.STEP)), float(task.speed[lane]), plant.time_step
-    length = behind * plant.catenary.span_length
+    length = behind * plant.alignment.mean_length
     count = min(steps, int((length / speed + SETTLING) / step) + 1)
-    at = np.arange(steps - count, steps) + 0.5
-    places = at * step * speed + plant.ahead(np.array([lane]), at[None])[0]
+    places = plant.position(lane, np.arange(steps - count, steps) + 0.5)
     rows = task.samples.rows[lane, steps - count + 1 : steps + 1, 0]
     force = rows[:, Row.CONTACT_FORCE].copy()
     shown = places >= position_of(task, lane) - length
@@ -80,7 +78,8 @@ def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Mom
     """What a lane of a task that keeps its samples is doing now."""
     plant = task.plant
     own = of_lanes(plant.run.table[0], lane)
-    span, speed, position = plant.catenary.span_length, float(task.speed[lane]), position_of(task, lane)
+    speed, position = float(task.speed[lane]), position_of(task, lane)
+    span = plant.alignment.mean_length
     contact = felt(task, lane, BEHIND)
     size = len(plant.pantograph.masses)
     return Moment(
@@ -88,7 +87,7 @@ def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Mom
         time=int(own[Row.STEP]) * plant.time_step,
         speed=speed,
         position=position,
-        span_length=span,
+        alignment=plant.alignment,
         line=plant.model.view(lane, position - BEHIND * span, position + AHEAD * span),
         masses=np.array(plant.pantograph.masses),
         heights=own[Row.STATE : Row.STATE + size].copy(),

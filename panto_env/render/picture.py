@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.colours import BLUE, ORANGE, VERMILION
+from ..base.units import to_kmh
 from ..plant.state import Place
 from .canvas import Canvas, rgb, zigzag
 from .layout import Layout, lost
@@ -36,7 +37,7 @@ class Picture:
     def draw(self, moment: Moment) -> NDArray[np.uint8]:
         """The frame of a moment, (height, width, 3)."""
         layout = self._layout
-        if layout is None or layout.span_length != moment.span_length or moment.time == 0:
+        if layout is None or layout.span != moment.alignment.mean_length or moment.time == 0:
             layout = self._layout = Layout.of(moment, *self._size)
         rows = _rows(moment)
         what = (layout, moment.title, moment.largest_force, moment.nominal_force, *rows)
@@ -163,9 +164,9 @@ def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
     canvas.line([(x - 34, y), (x + 34, y)], INK, 3)
     words = "no wire: a spring, stiff at the ends of a span and soft in its middle"
     canvas.words(x - 80, ceiling + 0.9 * _size(layout), words, QUIET, 0.9 * _size(layout), anchor="right")
-    first = np.ceil((moment.position - layout.pantograph / layout.per_metre) / moment.span_length)
-    for number in np.arange(first, first + 4):
-        at = float(layout.across(np.array(number * moment.span_length), moment.position))
+    begin = moment.position - layout.pantograph / layout.per_metre
+    for number in moment.alignment.supports_within(begin, begin + layout.width / layout.per_metre):
+        at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
         if at < layout.width:
             canvas.line([(at, layout.roof - 26), (at, layout.roof)], QUIET, 2)
 
@@ -225,10 +226,10 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 def _rows(moment: Moment) -> dict[str, str]:
     """Numbers that stand to the right of the chart, by name."""
-    span = int(moment.position // moment.span_length) + 1
+    span = moment.alignment.span_of(moment.position)
     force = f"{moment.filtered[-1]:.0f} N" if moment.filtered.size else "–"
     return {
-        "speed": f"{3.6 * moment.speed:.0f} km/h",
+        "speed": f"{to_kmh(moment.speed):.0f} km/h",
         "place": f"{moment.position:.0f} m, span {span}",
         "time": f"{moment.time:.2f} s",
         "contact force": force,

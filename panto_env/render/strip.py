@@ -8,10 +8,11 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from ..base.arrays import Array
+from ..base.units import to_kmh
 from ..control import Task
 from ..metrics import en50367
 from ..plant.state import Row
-from .moment import Felt, felt, position_of
+from .moment import felt, position_of
 
 SPANS = 3.0
 """How much of the line is shown (spans)."""
@@ -31,18 +32,18 @@ class Strip:
     def __init__(self, task: Task, policy: str) -> None:
         """policy: its name. The task must keep its samples."""
         plant = task.plant
-        where = f"{plant.pantograph.name} on {plant.catenary.name} at {3.6 * task.speed[0]:.4g} km/h"
+        where = f"{plant.pantograph.name} on {plant.catenary.name} at {to_kmh(task.speed[0]):.4g} km/h"
         self._title = f"{where}, policy {policy}"
         self._share = plant.of(0, Row.STEP) / task.end(0)
         self._felt, self._position = felt(task, 0, SPANS), position_of(task, 0)
-        self._span = plant.catenary.span_length
+        self._alignment = plant.alignment
         self._time = plant.of(0, Row.STEP) * plant.time_step
         self._limit = en50367.maximum_limit(float(task.speed[0]))
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = max(NARROW, min(options.max_width, WIDE))
         columns = width - AXIS
-        seen, length = self._felt, SPANS * self._span
+        seen, length = self._felt, SPANS * self._alignment.mean_length
         begin = max(0.0, self._position - length)
         across = (seen.places - begin) / length * columns  # columns from the left
         yield Text(self._title, style="bold", no_wrap=True, overflow="ellipsis")
@@ -54,7 +55,16 @@ class Strip:
         yield from chart(across, 1e3 * seen.head, _round(1e3 * seen.head), HEIGHT_ROWS, columns)
         ends = f"{begin:.0f} m", f"{begin + length:.0f} m"
         yield Text(" " * AXIS + ends[0] + ends[1].rjust(columns - len(ends[0])), style="dim")
-        yield Text(_in_words(seen, self._time, self._position, self._span))
+        yield Text(self._in_words())
+
+    def _in_words(self) -> str:
+        where, force = f"{self._time:.2f} s  {self._position:.0f} m", self._felt.filtered
+        if not force.size:
+            return where
+        return (
+            f"{where}, span {self._alignment.span_of(self._felt.places[-1])}  force {force[-1]:.0f} N  "
+            f"of what is shown: mean {force.mean():.0f} N, σ {force.std():.0f} N"
+        )
 
     def _force_chart(self, across: Array, columns: int) -> list[Text]:
         """The low-passed force from 0 to beyond its limit, and where contact was lost."""
@@ -122,13 +132,3 @@ def _round(heights: Array) -> tuple[float, float]:
         return 0.0, 10.0
     low, high = 10 * np.floor(heights.min() / 10), 10 * np.ceil(heights.max() / 10)
     return float(low), float(max(high, low + 10))
-
-
-def _in_words(seen: Felt, time: float, position: float, span_length: float) -> str:
-    if not seen.filtered.size:
-        return f"{time:.2f} s  {position:.0f} m"
-    force, span = seen.filtered, int(seen.places[-1] // span_length) + 1
-    return (
-        f"{time:.2f} s  {position:.0f} m, span {span}  force {force[-1]:.0f} N  "
-        f"of what is shown: mean {force.mean():.0f} N, σ {force.std():.0f} N"
-    )

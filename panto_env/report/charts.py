@@ -47,13 +47,13 @@ def force_along(one: Findings) -> str:
         position, smooth = run.position[inside], low_pass_in_place(run.contact_force, run.time_step)[inside]
         axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
         axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
-        limit = en50367.maximum_limit(run.speed_kmh / 3.6)
+        limit = en50367.maximum_limit(run.speed)
         axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=f"EN 50367: {limit:.0f} N")
         axes.axhline(0, color=LIMIT, linewidth=0.9)
         for loss in one.losses:
             axes.plot(loss.position, 0, "v", color=LIMIT, markersize=5)
-        for support in np.arange(np.ceil(position[0] / run.span_length), position[-1] // run.span_length + 1):
-            axes.axvline(support * run.span_length, color="0.85", linewidth=0.8, zorder=0)
+        for number in run.alignment.supports_within(position[0], position[-1]):
+            axes.axvline(run.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
         axes.set(xlabel="position (m); grey lines: supports", ylabel="contact force (N)")
         axes.set_xlim(position[0], position[-1])
         legend_above(axes, 4)
@@ -62,7 +62,7 @@ def force_along(one: Findings) -> str:
 
 
 def force_folded(names: Mapping[Findings, str]) -> str:
-    """Contact force over the place within the span: median of all spans, and from least to largest.
+    """Contact force over the place within the span: median, minimum and maximum of all spans.
 
     names: runs, and what each is called.
     """
@@ -72,9 +72,9 @@ def force_folded(names: Mapping[Findings, str]) -> str:
             folded = one.folded
             if folded is None:
                 continue
-            share = folded.place / one.run.span_length
-            axes.fill_between(share, folded.low, folded.high, color=series_colour(k), alpha=0.2, linewidth=0)
-            axes.plot(share, folded.median, color=series_colour(k), label=f"{names[one]}: median")
+            colour = series_colour(k)
+            axes.fill_between(folded.share, folded.low, folded.high, color=colour, alpha=0.2, linewidth=0)
+            axes.plot(folded.share, folded.median, color=colour, label=f"{names[one]}: median")
         axes.set(
             xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1)
         )
@@ -95,10 +95,10 @@ def spectrum(names: Mapping[Findings, str]) -> str:
             shown = frequency <= HIGHEST
             axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=names[one])
         run = first.run
-        passing = {f"per span{of}": run.speed_kmh / 3.6 / run.span_length}
+        passing = {f"per span{of}": run.speed / run.alignment.mean_length}
         places = np.diff([dropper.position for dropper in first.droppers])
         if places.size:
-            passing[f"per dropper{of}"] = run.speed_kmh / 3.6 / float(np.median(places))
+            passing[f"per dropper{of}"] = run.speed / float(np.median(places))
         for words, at in passing.items():
             axes.axvline(at, color="0.5", linestyle=":", linewidth=1)
             axes.annotate(f"{words}: {at:.2f} Hz", (at, 0.98), xycoords=("data", "axes fraction"),

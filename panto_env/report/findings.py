@@ -13,8 +13,8 @@ from ..base.errors import InputError
 from ..metrics.criterion import Criterion
 from ..metrics.figures import Figures
 from ..metrics.low_pass import low_pass
-from ..metrics.spans import Spans
 from ..metrics.trajectory import Trajectory
+from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.flexible.elasticity import elasticity, unevenness
@@ -43,10 +43,10 @@ class Loss(NamedTuple):
 class Folded(NamedTuple):
     """The low-passed force of all evaluated spans over the place within the span."""
 
-    place: Array  # (n,): m
+    share: Array  # (n,): of the span, 0 at the support where it begins (-)
     median: Array  # (n,): N
-    low: Array  # (n,): least of all spans (N)
-    high: Array  # (n,): largest of all spans (N)
+    low: Array  # (n,): minimum of all spans (N)
+    high: Array  # (n,): maximum of all spans (N)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +107,13 @@ class Findings:
         """The force folded over the span."""
         if self.covered is None:
             return None
-        place = np.linspace(0.0, self.run.span_length, FOLDS, endpoint=False)
+        share = np.linspace(0.0, 1.0, FOLDS, endpoint=False)
         first, last = self.covered
         spans = [
-            np.interp(place + (k - 1) * self.run.span_length, self.run.position, self.filtered)
+            np.interp(self.run.alignment.support(k - 1 + share), self.run.position, self.filtered)
             for k in range(first, last + 1)
         ]
-        return Folded(place, np.median(spans, axis=0), np.min(spans, axis=0), np.max(spans, axis=0))
+        return Folded(share, np.median(spans, axis=0), np.min(spans, axis=0), np.max(spans, axis=0))
 
     @cached_property
     def uplifts(self) -> list[tuple[int, float, float]]:
@@ -122,7 +122,7 @@ class Findings:
         begin, end = run.position[self.inside][[0, -1]]
         stride = 1.5 * run.stride
         return [
-            (round(place / run.span_length), float(place), float(run.uplift[:, k].max()))
+            (round(run.alignment.in_spans(place)), float(place), float(run.uplift[:, k].max()))
             for k, place in enumerate(run.support_position)
             if begin - stride <= place <= end + stride and k < run.uplift.shape[1]
         ]
@@ -133,9 +133,9 @@ class Findings:
         run = self.run
         if not run.dropper_force.size:
             return []
-        train = run.position[self.inside] // run.span_length
+        train = run.alignment.span_of(run.position[self.inside])
         tension = run.dropper_force[self.inside]
-        own, places = run.dropper_position // run.span_length, run.dropper_position % run.span_length
+        own, places = run.alignment.span_of(run.dropper_position), run.alignment.place(run.dropper_position)
         found = []
         for place in np.unique(places.round(6)):
             which = np.flatnonzero(np.abs(places - place) < 1e-5)

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..backend import bind, pack
 from ..base.errors import InputError
+from ..base.units import from_kmh
 from ..catalog import load_catenary
 from ..plant.catenary.protocol import check_speeds
 from ..plant.catenary.rig import Rig, RigData
@@ -53,7 +54,7 @@ class RigComputer:
             raise InputError(
                 f"The computer of a rig wants a rig, such as 'rig', and '{data.name}' is a line."
             )
-        speed = speed_kmh / 3.6
+        speed = from_kmh(speed_kmh)
         self.interval = data.computer.interval
         """Between two calls of ``step`` (s)."""
         condition = line_condition or LineCondition()

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.units import from_kmh
 from ..plant.catenary.rig import RigData
 from ..plant.numerics import Numerics
 from ..plant.pantograph.build import STRIP_STIFFNESS, matrices
@@ -149,7 +150,7 @@ def computer_response(
 
     The line is linearised about its shape under the pantograph's mean force.
     """
-    mean = pantograph.nominal_force(speed_kmh / 3.6)
+    mean = pantograph.nominal_force(from_kmh(speed_kmh))
     time = rig.computer.interval * np.arange(round(SECONDS / rig.computer.interval))
     impulse = np.zeros(len(time))
     computer = RigComputer(rig, speed_kmh, force=mean, numerics=Numerics(precision="double"))

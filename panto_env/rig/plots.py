@@ -34,7 +34,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
     first = pairs[0].reference
     inside = first.inside(pairs[0].spans)
     begin = first.position[inside][0]
-    end = begin + SHOWN_SPANS * first.span_length
+    end = begin + SHOWN_SPANS * first.alignment.mean_length
     drawn = {f"on {pair.rig.catenary}": pair.rig for pair in pairs}
     drawn |= {f"under line {pair.reference.catenary}": pair.reference for pair in pairs}
     for axis, (name, scale, label, unit) in zip(axes, PANELS, strict=False):

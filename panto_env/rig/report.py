@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.table import Table
+from ..base.units import from_kmh
 from ..plant.catenary.rig import RigData
 from ..plant.pantograph.schema import PantographData
 from . import growth
@@ -57,7 +58,7 @@ def clocked(
     report: Callable[[float], None] = lambda share: None,
 ) -> Timing:
     """The rig's computer against the wall clock, for so long (s)."""
-    computer = RigComputer(rig, speed_kmh, force=pantograph.nominal_force(speed_kmh / 3.6))
+    computer = RigComputer(rig, speed_kmh, force=pantograph.nominal_force(from_kmh(speed_kmh)))
     return against_the_clock(computer, seconds, report)
 
 

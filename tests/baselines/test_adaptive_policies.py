@@ -54,7 +54,7 @@ def seen(**values: float) -> NDArray[np.float32]:
 
 def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array]:
     """Sigma of each span of the model under a force that repeats with the span, with control and without."""
-    rate = CONTEXT.speed / CONTEXT.span_length * CONTEXT.control_interval
+    rate = CONTEXT.speed / CONTEXT.alignment.mean_length * CONTEXT.control_interval
     sampled = MODEL.sampled(CONTEXT.control_interval)
     policy.begin(CONTEXT, 1)
     state = np.zeros(sampled.size)

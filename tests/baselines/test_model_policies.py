@@ -74,7 +74,7 @@ def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says() -> No
         laws.append(Periodic(gains=gains.tolist()))
     force = run_batch(settings, laws, [0]).values[:, 0]
     turns = np.linspace(0, 10, force.shape[1], endpoint=False)  # ten spans
-    rate = CONTEXT.speed / CONTEXT.span_length
+    rate = CONTEXT.speed / CONTEXT.alignment.mean_length
     model = line_model(CONTEXT, mean_line(CONTEXT), delay=0.005)
     for row, k in enumerate(harmonics):
         answer = force[1 + 2 * row] - force[0] + 1j * (force[2 + 2 * row] - force[0])
@@ -146,7 +146,7 @@ def repeated(
     blind: the place is not told. speed_error: share by which the speed is read too high.
     """
     context = CONTEXT
-    rate = context.speed / context.span_length * context.control_interval
+    rate = context.speed / context.alignment.mean_length * context.control_interval
     sampled = MODEL.sampled(context.control_interval)
     policy.begin(context, 1)
     state = np.zeros(sampled.size)
@@ -306,7 +306,7 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
         if k >= first:
             readings = 100 * task.results.observation[:, entry].astype(float)
             answer.append(readings[1] - readings[0])
-            position = np.array([k * line.stride % context.span_length])
+            position = np.array([k * line.stride % context.alignment.mean_length])
             begin = k - first + 1
             predicted[begin : begin + length] += force * line.response[line.step(position)[0]]
         task.step(np.array([[0.0], [force / context.force_limit]]))

@@ -241,7 +241,7 @@ def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkey
 
 def test_what_repeats_from_span_to_span_does(short: Problem):
     basis = search.span_periodic(short)
-    per_span = short.passive.span_length / (short.passive.speed_kmh / 3.6 * short.interval)
+    per_span = short.passive.alignment.mean_length / (short.passive.speed_kmh / 3.6 * short.interval)
     assert per_span == round(per_span)
     assert basis.shape == (short.count, 2 * search.HARMONICS + 1)
     np.testing.assert_allclose(basis[round(per_span) :], basis[: -round(per_span)], atol=1e-9)

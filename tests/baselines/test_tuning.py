@@ -68,7 +68,7 @@ def test_periodic_force_is_its_fourier_series_ahead_by_the_lead() -> None:
     policy = Periodic(gains=gains.tolist())
     policy.reset(CONTEXT)
     for angle in (0.0, 1.3, 5.9):
-        ahead = angle + 2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.span_length
+        ahead = angle + 2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.alignment.mean_length
         expected = sum(
             gains[k - 1] * np.cos(k * ahead) + gains[HARMONICS + k - 1] * np.sin(k * ahead)
             for k in range(1, HARMONICS + 1)
@@ -92,7 +92,7 @@ def test_fitted_feedback_adds_past_signals_and_commands_to_the_series() -> None:
     gains[-1] = 3.0  # of the command two steps ago, in units of 10 N
     policy = FittedFeedback(gains=gains.tolist())
     policy.begin(CONTEXT, 1)
-    angle = -2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.span_length  # where the series' angle is zero
+    angle = -2 * np.pi * LEAD * CONTEXT.speed / CONTEXT.alignment.mean_length
     forces = [policy.forces(seen(angle=angle, frame_velocity=each))[0] for each in (0.0, 0.2, 0.0, 0.0)]
     assert forces[:2] == pytest.approx([7.0, 7.0], abs=1e-4)
     # All but a hundredth of a signal is left of it after its slow average has taken its share.

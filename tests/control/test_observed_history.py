@@ -29,7 +29,7 @@ def play(env, steps, seed=0):
 def test_harmonics_are_sines_and_cosines_of_the_place_in_the_span(name):
     env = gymnasium.make(name, harmonics=14, run_in=0.0, speed_kmh=287.0, sensors="ideal").unwrapped
     seen, _ = play(env, 40)
-    layout, turns = env.context.layout, np.arange(41) * 0.01 * 287 / 3.6 / env.context.span_length
+    layout, turns = env.context.layout, np.arange(41) * 0.01 * 287 / 3.6 / env.context.alignment.mean_length
     for k in range(1, 15):
         for wave, function in (("sine", np.sin), ("cosine", np.cos)):
             entry = f"{wave} of span position" + (f", harmonic {k}" if k > 1 else "")

@@ -78,7 +78,7 @@ def test_reward_is_the_weighted_sum_by_hand(actions):
     stride = run.speed_kmh / 3.6 * run.time_step
     assert terms["cost_function"] == pytest.approx(stride * intervals.sum(axis=1), rel=1e-9)
     # Of the whole episode's distance, so that the sum is the share of it.
-    distance = env.context.catenary.spans * run.span_length
+    distance = env.context.catenary.spans * run.alignment.mean_length
     control_steps = np.ceil(distance / (run.speed_kmh / 3.6 * 0.01))
     share = 100 * lost.sum(axis=1) / (control_steps * steps)
     assert terms["contact_loss"] == pytest.approx(share, rel=1e-9)

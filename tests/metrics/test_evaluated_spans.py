@@ -12,10 +12,12 @@ from panto_env import InputError, Trajectory, simulate
 from panto_env.analysis.options import parse_spans
 from panto_env.analysis.sweep import sweep
 from panto_env.metrics.spans import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
+from panto_env.plant.alignment import Alignment
 from panto_env.studies.en50318 import start
 
 PANTO = Path(sys.executable).with_name("panto")
 USUAL = (FIRST_SETTLED, LAST_USUAL)
+LINE = Alignment.equal(60.0, 20)
 
 
 @pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")])
@@ -23,8 +25,8 @@ def test_a_pass_goes_on_until_ten_spans_after_its_start_are_covered(line):
     run = simulate(*line, record_droppers=False)
     assert run.spans() == USUAL == (10, 19)
     assert run.summary() == run.summary(USUAL) != run.summary("all")
-    assert run.summary().distance == pytest.approx(10 * run.span_length, abs=2 * run.stride)
-    assert run.distance == pytest.approx(LAST_USUAL * run.span_length, abs=1.0)
+    assert run.summary().distance == pytest.approx(10 * run.alignment.mean_length, abs=2 * run.stride)
+    assert run.distance == pytest.approx(LAST_USUAL * run.alignment.mean_length, abs=1.0)
 
 
 def test_what_was_asked_for_is_kept():
@@ -62,10 +64,10 @@ def test_a_saved_run_covers_the_same_spans(tmp_path, reference_run):
 
 
 def test_choices():
-    assert chosen_spans(None, 600.0, 60.0) == (10, 10)
-    assert chosen_spans(None, 600.0 * (1 - 1e-12), 60.0) == (10, 10)
-    assert chosen_spans((5, 6), 120.0, 60.0) == (5, 6)
-    assert chosen_spans("all", 120.0, 60.0) is None
+    assert chosen_spans(None, 600.0, LINE) == (10, 10)
+    assert chosen_spans(None, 600.0 * (1 - 1e-12), LINE) == (10, 10)
+    assert chosen_spans((5, 6), 120.0, LINE) == (5, 6)
+    assert chosen_spans("all", 120.0, LINE) is None
     assert (in_words((5, 6)), in_words(None)) == ("5-6", "all")
     assert (parse_spans("5-6"), parse_spans("all"), parse_spans(None)) == ((5, 6), "all", None)
     for text in ("0-3", "6-5", "5", "last"):

@@ -8,7 +8,7 @@ from panto_env import InputError
 from panto_env.metrics.figures import Figures, contact_loss, cost_function
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import low_pass, low_pass_sections
-from panto_env.metrics.spans import last_whole_span, limits, within
+from panto_env.plant.alignment import Alignment
 
 
 @pytest.mark.parametrize("step", [1e-4, 1.25e-3, 5e-3, 0.02])
@@ -63,13 +63,15 @@ def test_every_figure_has_its_label():
 
 def test_spans_begin_at_a_support_and_end_before_the_next():
     position = np.array([0.0, 49.9, 50.0, 99.9, 100.0, 149.9, 150.0])
-    assert limits((2, 3), 50.0) == (50.0, 150.0)
-    assert within(position, (2, 3), 50.0).tolist() == [False, False, True, True, True, True, False]
-    assert within(position, (1, 1), 50.0).sum() == 2
+    line = Alignment.equal(50.0, 20)
+    assert line.limits((2, 3)) == (50.0, 150.0)
+    assert line.within(position, (2, 3)).tolist() == [False, False, True, True, True, True, False]
+    assert line.within(position, (1, 1)).sum() == 2
 
 
 def test_last_whole_span_takes_nearly_whole_ones_only_where_asked():
-    assert last_whole_span(539.9, 60.0) == 8
-    assert last_whole_span(540.0, 60.0) == 9
+    line = Alignment.equal(60.0, 20)
+    assert line.last_whole_span(539.9) == 8
+    assert line.last_whole_span(540.0) == 9
     nearly = 540.0 * (1 - 1e-12)
-    assert (last_whole_span(nearly, 60.0), last_whole_span(nearly, 60.0, tolerance=1e-9)) == (8, 9)
+    assert (line.last_whole_span(nearly), line.last_whole_span(nearly, tolerance=1e-9)) == (8, 9)

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from panto_env import InputError, Trajectory
+from panto_env.plant.alignment import Alignment
 
 STEP, SPEED_KMH, SPAN, NOMINAL = 0.01, 180.0, 5.0, 100.0
 STRIDE = 0.5  # m: ten samples in a span
@@ -40,8 +41,8 @@ def trajectory():
         dropper_position=np.zeros(0),
         catenary="made up",
         pantograph="made up",
-        speed_kmh=SPEED_KMH,
-        span_length=SPAN,
+        speed=SPEED_KMH / 3.6,
+        alignment=Alignment.equal(SPAN, 4),
         time_step=STEP,
         nominal_force=NOMINAL,
     )

@@ -19,7 +19,7 @@ SPAN, SPEED = 50.0, 200 / 3.6
 def runs(sensors, seeds=1, distance=600.0, **settings):
     """True positions (m), errors of the position read (m) and of the speed (m/s) of an episode per seed."""
     env = gymnasium.make(NAME, sensors=sensors, speed_kmh=200.0, distance=distance, **settings).unwrapped
-    layout, span = env.context.layout, env.context.span_length
+    layout, span = env.context.layout, env.context.alignment.mean_length
     for seed in range(seeds):
         seen, info = env.reset(seed=seed)
         told, ended = [(info["position"], seen)], False
@@ -37,7 +37,7 @@ def runs(sensors, seeds=1, distance=600.0, **settings):
 
 
 def span_length():
-    return gymnasium.make(NAME).unwrapped.context.span_length
+    return gymnasium.make(NAME).unwrapped.context.alignment.mean_length
 
 
 def test_a_wrong_wheel_makes_a_saw_tooth_and_a_wrong_speed():

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, Protocol
 from ...backend import operation
 from ...base.arrays import Array
 from ...base.errors import InputError
+from ...base.units import to_kmh
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from .schema import CatenaryData
@@ -92,10 +93,10 @@ def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
             bound = (
                 ""
                 if math.isinf(wave_speed)
-                else f" and below the wave speed of the contact wire, {3.6 * wave_speed:.0f} km/h"
+                else f" and below the wave speed of the contact wire, {to_kmh(wave_speed):.0f} km/h"
             )
             raise InputError(
-                f"The speed must lie above 0{bound} on line '{line}', not at {3.6 * speed:g} km/h."
+                f"The speed must lie above 0{bound} on line '{line}', not at {to_kmh(speed):g} km/h."
             )
 
 

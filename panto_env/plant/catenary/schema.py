@@ -11,6 +11,7 @@ from ...base.errors import InputError
 from ...base.ranges import Between
 from ...base.settings import Settings
 from ...base.shown import shown
+from ..alignment import Alignment
 from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
@@ -51,6 +52,10 @@ class CatenaryData(Settings):
     def __hash__(self) -> int:
         """Of all that a line is made of: what is computed from it can be kept."""
         return hash(tuple(getattr(self, name) for name in type(self).model_fields if name != "sources"))
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans lie; spans: their number, by default the line's own."""
+        return Alignment.equal(self.span_length, self.spans if spans is None else spans)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave of this frequency (Hz) that a dropper and a support send back; nan if none does."""

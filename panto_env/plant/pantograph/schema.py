@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ...base.ranges import Between
 from ...base.settings import Settings
+from ...base.units import to_kmh
 
 Mass = Annotated[float, Between(0.1, 200, "kg")]
 Spring = Annotated[float, Between(0, 1e7, "N/m")]
@@ -81,4 +82,4 @@ class PantographData(Settings):
 
     def nominal_force(self, speed: Any) -> Any:
         """Force that lifts the pantograph (N) at a train speed (m/s), or at each of an array."""
-        return self.static_force + self.aerodynamic_coefficient * (3.6 * speed) ** 2
+        return self.static_force + self.aerodynamic_coefficient * to_kmh(speed) ** 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
+from ...base.units import from_kmh
 from ...catalog import load_catenary
 from ...plant.catenary.flexible.resolution import resolution
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -40,7 +41,7 @@ def in_use(
     """The same with grid, time step and window as a line takes them at a speed, where they are None."""
     line = load_catenary(name)
     assert isinstance(line, FlexibleCatenaryData)  # others have no grid
-    speed = speed_kmh / 3.6
+    speed = from_kmh(speed_kmh)
     with warnings.catch_warnings(action="ignore"):  # of coarse grids: what they cost is the question here
         chosen = resolution(line, numerics, Runs((speed, speed), conditions=(condition,)))
     return numerics.model_copy(update=chosen._asdict())

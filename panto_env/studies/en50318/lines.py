@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
+from ...base.units import to_kmh
 from ...catalog import load_catenary
 from ...catalog.loader import available
 from ...metrics.figures import Figures
@@ -50,7 +51,7 @@ def cases() -> Iterator[tuple[str, float]]:
         line = load_catenary(name)
         if not isinstance(line, FlexibleCatenaryData):
             continue
-        wave_speed = 3.6 * float(np.sqrt(line.contact_wire.tension / line.contact_wire.mass))
+        wave_speed = to_kmh(float(np.sqrt(line.contact_wire.tension / line.contact_wire.mass)))
         for speed in SPEEDS_KMH:
             if speed < HIGHEST * wave_speed:
                 yield name, speed

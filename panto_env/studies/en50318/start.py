@@ -9,6 +9,7 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
+from ...base.units import from_kmh
 from ...catalog import available, load_catenary
 from ...metrics.spans import FIRST_SETTLED, LAST_USUAL
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -63,5 +64,5 @@ def _lines(speed_kmh: float) -> list[FlexibleCatenaryData]:
     """Flexible lines that bear this speed."""
     entries = [load_catenary(name) for name in available("catenary")]
     flexible = [entry for entry in entries if isinstance(entry, FlexibleCatenaryData)]
-    limit = speed_kmh / 3.6 / FASTEST
+    limit = from_kmh(speed_kmh) / FASTEST
     return [line for line in flexible if line.contact_wire.tension / line.contact_wire.mass > limit**2]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
+from ...base.units import from_kmh
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
 from .convergence import in_use
@@ -71,6 +72,6 @@ def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
         condition.wear_depth,
         used.spacing,
         run.time_step,
-        condition.wear_wavelength / (SPEED_KMH / 3.6 * run.time_step),
+        condition.wear_wavelength / (from_kmh(SPEED_KMH) * run.time_step),
         *zip(means, deviations, strict=True),
     )

@@ -110,7 +110,7 @@ def passive_at_mean(speed_kmh: int, mean: float) -> Result:
 def result_of(case: Case, record: Trajectory) -> Result:
     """What is kept of a record."""
     inside = record.inside(SPANS)
-    force, turns = record.contact_force[inside], record.position[inside] / record.span_length
+    force, turns = record.contact_force[inside], record.alignment.in_spans(record.position[inside])
     return Result(
         case,
         record.summary(SPANS),

@@ -10,7 +10,6 @@ from ...analysis.plots import mark_supports, say_what_is_hidden
 from ...base.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, series_colour
 from ...base.legend import legend_above
 from ...metrics.labels import LABELS
-from ...metrics.spans import limits
 from .angles import cost_over_angle
 from .cases import (
     ANGLE_SPEEDS,
@@ -93,7 +92,7 @@ def forces_along_line(speed: int) -> Figure:
     for axis in (upper, lower):
         mark_supports(axis, active)
         legend_above(axis, 3)
-    lower.set_xlim(limits(SHOWN_SPANS, active.span_length))
+    lower.set_xlim(active.alignment.limits(SHOWN_SPANS))
     for axis in (upper, lower):
         say_what_is_hidden(axis)
     shown = f"spans {SHOWN_SPANS[0]} to {SHOWN_SPANS[1]}"

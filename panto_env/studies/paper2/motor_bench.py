@@ -67,11 +67,11 @@ def line_pass(speed_kmh: float) -> Trajectory:
 def motion_of_line(record: Trajectory) -> Array:
     """The harmonics of greatest velocity: amplitude (m), turns per metre, phase (turns), (HARMONICS, 3)."""
     inside = record.inside(SPANS)
-    spans, height = record.position[inside] / record.span_length, record.wire[inside]
+    spans, height = record.alignment.in_spans(record.position[inside]), record.wire[inside]
     orders = np.arange(1, HIGHEST + 1)
     parts = 2 * np.mean((height - height.mean()) * np.exp(-2j * np.pi * np.outer(orders, spans)), axis=1)
     chosen = np.sort(np.argsort(-orders * np.abs(parts))[:HARMONICS])
-    turns = orders[chosen] / record.span_length
+    turns = orders[chosen] / record.alignment.mean_length
     return np.column_stack([np.abs(parts[chosen]), turns, np.angle(parts[chosen]) / (2 * np.pi)])
 
 
@@ -82,7 +82,7 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
     """
     wanted = 0.5 * float(record.contact_force[record.inside(SPANS)].mean())
     plant, waves = _bench(record, wanted, gain is not None)
-    span_time, steps = 3.6 * record.span_length / record.speed_kmh, round(CONTROL_INTERVAL / TIME_STEP)
+    span_time, steps = record.alignment.mean_length / record.speed, round(CONTROL_INTERVAL / TIME_STEP)
     controls, command = round(RUN_SPANS * span_time / CONTROL_INTERVAL), np.zeros((1, 1, 2))
     samples = plant.samples(steps * controls + 1)
     for _ in range(controls):
@@ -91,7 +91,7 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
     time = TIME_STEP * (np.arange(steps * controls) + 0.5)
     shown = time > time[-1] - SHOWN_SPANS * span_time
     rows = samples.rows[0, 1:, 0][shown]
-    turns = np.outer(time[shown] * record.speed_kmh / 3.6, waves[:, 1]) + waves[:, 2]
+    turns = np.outer(time[shown] * record.speed, waves[:, 1]) + waves[:, 2]
     motors = plant.actuators
     supplied = motors.energy(0)[Place.HEAD, 0] if isinstance(motors, MotorArrays) else 0.0
     return BenchRun(
@@ -135,5 +135,5 @@ def _bench(record: Trajectory, wanted: float, driven: bool) -> tuple[Plant, Arra
         runs=Runs(conditions=(room,)),
     )
     waves = motion_of_line(record)
-    plant.start(0, record.speed_kmh / 3.6, [DrawnLine(room, waves)])
+    plant.start(0, record.speed, [DrawnLine(room, waves)])
     return plant, waves

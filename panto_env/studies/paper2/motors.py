@@ -23,7 +23,6 @@ from ...control import Task
 from ...control.context import Context
 from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
-from ...metrics.spans import limits
 from ...metrics.spectrum import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
@@ -130,7 +129,7 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
     policy, results, plant = ForceFeedback(gain, mean), task.results, task.plant
     policy.reset(task.context(0))
     motors = cast(MotorArrays, plant.actuators)
-    begin, end = limits(SPANS, plant.catenary.span_length)
+    begin, end = plant.alignment.limits(SPANS)
     taken: list[tuple[float, Array]] = []  # time (s) and energy (J) at each of the two ends of SPANS
     while not (results.truncated[0] or results.terminated[0]):
         task.step(policy.act(results.observation[0])[None])

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.table import Table
+from ...base.units import from_kmh
 from ...catalog import load_pantograph
 from ...metrics.spectrum import amplitudes
 from ...rig.comparison import Pair, compare, rms
@@ -162,7 +163,7 @@ def variants_table() -> Table:
 def harmonics_table(pairs: Mapping[str, Pair], count: int = 12) -> Table:
     """Amplitudes of the first harmonics of the span, as Fig. 8 shows them."""
     first = next(iter(pairs.values())).reference
-    once = SPEED_KMH / 3.6 / first.span_length
+    once = from_kmh(SPEED_KMH) / first.alignment.mean_length
     found = {LINE: _harmonics(first, once, count)}
     found |= {name: _harmonics(pair.rig, once, count) for name, pair in pairs.items()}
     rows = [

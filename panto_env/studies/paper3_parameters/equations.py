@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ...base.arrays import Array
+from ...base.units import from_kmh
 from ...catalog import load_catenary, load_pantograph
 from .passes import CATENARY, PANTOGRAPH, SPANS
 
@@ -26,7 +27,7 @@ class Equations:
         line, data = load_catenary(CATENARY), load_pantograph(PANTOGRAPH)
         self._mean: float = line.mean_stiffness  # type: ignore[attr-defined]
         self._variation: float = line.stiffness_variation  # type: ignore[attr-defined]
-        speed = speed_kmh / 3.6
+        speed = from_kmh(speed_kmh)
         self.span_length = line.span_length
         self.span_time = self.span_length / speed
         self.shown = np.linspace(SPANS[0] - 1, SPANS[1], POINTS) * self.span_time

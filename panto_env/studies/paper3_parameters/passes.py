@@ -11,6 +11,7 @@ import numpy as np
 from ...analysis.parameters import change
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
+from ...base.units import from_kmh
 from ...catalog import load_catenary, load_pantograph
 from ...metrics import en50367
 from ...metrics.criterion import Criterion
@@ -85,7 +86,7 @@ class Pass:
             "nominal_force_n": self.nominal_force,
             "contact_lost_percent": contact_loss(self.force),
             "low_passed": self.figures.as_dict(),
-            "en50367_largest_mean_n": en50367.largest_mean(self.speed_kmh / 3.6),
+            "en50367_largest_mean_n": en50367.largest_mean(from_kmh(self.speed_kmh)),
             "en50367": self.within_en50367,
         }
 
@@ -128,13 +129,13 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     nq = arcing(run.contact_force[shown], run.time_step)
     return Pass(
         speed_kmh=speed_kmh,
-        span_length=run.span_length,
+        span_length=run.alignment.mean_length,
         position=run.position[shown],
         force=run.contact_force[shown],
         displacement=run.head[shown],
         nominal_force=run.nominal_force,
         figures=figures,
-        compliance=tuple(en50367.criteria(figures, nq, speed_kmh / 3.6)),
+        compliance=tuple(en50367.criteria(figures, nq, from_kmh(speed_kmh))),
     )
 
 
@@ -144,7 +145,7 @@ def largest_static_force(one_pass: Pass) -> float:
     Every force scales with F(v) = F_S + alpha v^2, in either reading of the contact.
     """
     aerodynamic = one_pass.nominal_force - load_pantograph(PANTOGRAPH).static_force
-    limit = en50367.maximum_limit(one_pass.speed_kmh / 3.6)
+    limit = en50367.maximum_limit(from_kmh(one_pass.speed_kmh))
     return limit / float(one_pass.force.max() / one_pass.nominal_force) - aerodynamic
 
 

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from ...base.table import Table
+from ...base.units import from_kmh, to_kmh
 from ...metrics import en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison
@@ -119,7 +120,7 @@ def static_force_table(passes: Sequence[Pass]) -> Table:
             f"{one_pass.speed_kmh:g}",
             f"{one_pass.force.max() / one_pass.nominal_force:.3f}",
             f"{one_pass.force.std() / one_pass.nominal_force:.3f}",
-            f"{en50367.maximum_limit(one_pass.speed_kmh / 3.6):g}",
+            f"{en50367.maximum_limit(from_kmh(one_pass.speed_kmh)):g}",
             f"{largest_static_force(one_pass):.0f}",
         )
         for one_pass in passes
@@ -156,12 +157,12 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     shares = [row["std"] / row["nominal_force"] for row in rows]
     period = 1 / equations.natural_frequency()
     # Length of a span over the natural period, km/h.
-    resonant = 3.6 * equations.span_length / period
+    resonant = to_kmh(equations.span_length) / period
     high = [row["speed_kmh"] > 200 for row in rows]
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),
         "maximum above its limit from": first(
-            [row["max"] > en50367.maximum_limit(row["speed_kmh"] / 3.6) for row in rows]
+            [row["max"] > en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]
         ),
         "contact lost from": first([row["contact_loss"] > 0 for row in rows]),
         "sigma over F(v) greatest at": rows[int(np.argmax(shares))]["speed_kmh"],
@@ -170,7 +171,7 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
         "sigma least above 200 km/h at": min(
             (row["std"], row["speed_kmh"]) for row, fast in zip(rows, high, strict=True) if fast
         )[1],
-        "reach of 600 m in 12 s from": 600 / RUN_TIME * 3.6,
+        "reach of 600 m in 12 s from": to_kmh(600 / RUN_TIME),
     }
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
+from ....base.units import from_kmh, to_kmh
 from ...numerics import SAMPLES_PER_WAVE, WINDOW, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
@@ -37,10 +38,10 @@ SLOWEST_HZ = 22.0
 FINEST_GRID = 0.1
 """Grid (m) that the slowest trains get."""
 SLOW = (
-    (50 / 3.6, 0.12, 0.125e-3),
-    (100 / 3.6, 0.2, 0.25e-3),
-    (150 / 3.6, 0.2, 0.5e-3),
-    (200 / 3.6, 0.3, 1e-3),
+    (from_kmh(50), 0.12, 0.125e-3),
+    (from_kmh(100), 0.2, 0.25e-3),
+    (from_kmh(150), 0.2, 0.5e-3),
+    (from_kmh(200), 0.3, 1e-3),
     (np.inf, np.inf, np.inf),
 )
 """Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
@@ -104,9 +105,9 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
     passed = runs.speeds[0] / found.spacing
     if passed < SLOWEST_HZ:
         warnings.warn(
-            f"At {3.6 * runs.speeds[0]:.3g} km/h a train passes the nodes of a grid of {found.spacing:.3g} m "
-            f"{passed:.2g} times a second: a ripple of about 1 N at this frequency, which no line has, is in "
-            "the contact force.",
+            f"At {to_kmh(runs.speeds[0]):.3g} km/h a train passes the nodes of a grid of "
+            f"{found.spacing:.3g} m {passed:.2g} times a second: a ripple of about 1 N at this frequency, "
+            "which no line has, is in the contact force.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -202,7 +203,7 @@ def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, wanted: Resol
     if max(grid, step) < 1.01:
         return
     error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
-    slow, quick = (3.6 * speed for speed in runs.speeds)
+    slow, quick = (to_kmh(speed) for speed in runs.speeds)
     speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
     warnings.warn(
         f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "

@@ -1,0 +1,22 @@
+"""Speeds: m/s inside, km/h where people give and read them. The one place that knows the factor."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from .arrays import Array
+
+T = TypeVar("T", float, Array)
+
+METRES_PER_SECOND = 3.6
+"""One of them in km/h."""
+
+
+def from_kmh(speed: T) -> T:
+    """Speed (m/s), or speeds, from km/h."""
+    return speed / METRES_PER_SECOND
+
+
+def to_kmh(speed: T) -> T:
+    """Speed (km/h), or speeds, from m/s."""
+    return METRES_PER_SECOND * speed

@@ -1,0 +1,156 @@
+"""The alignment: where supports stand along the track, and so where each span begins and ends.
+
+Every place along the line is looked up here, from Python and, through ``AlignmentArrays``, from kernels.
+Span k lies between supports k - 1 and k: spans are counted from 1, supports from 0, which stands at 0 m. A
+support belongs to the span that begins at it. Beyond its ends a line continues with spans as long as its
+outermost ones, as models without anchors do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..backend import NOT_NEGATIVE, inlined
+from ..base.arrays import Array, Index
+
+Spans = tuple[int, int]
+"""First and last span of a stretch, both included, counted from 1."""
+
+
+class AlignmentArrays(NamedTuple):
+    """An alignment, for kernels."""
+
+    supports: Array  # (spans + 1,): positions (m)
+    per_metre: float  # spans per metre where all have one length, else 0 (1/m)
+    mean_length: float  # of a span (m)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Supports along the track."""
+
+    supports: tuple[float, ...]  # (spans + 1,): positions (m), rising from 0
+    pitch: float | None = None  # length of a span (m) where all have the same
+
+    @classmethod
+    def of_spans(cls, lengths: Sequence[float]) -> Self:
+        """The alignment of spans with these lengths (m), in their order."""
+        if len(set(lengths)) == 1:
+            return cls.equal(lengths[0], len(lengths))
+        return cls((0.0, *np.cumsum(lengths).tolist()))
+
+    @classmethod
+    def equal(cls, length: float, spans: int) -> Self:
+        """The alignment of so many spans of one length (m)."""
+        return cls(tuple((length * np.arange(spans + 1)).tolist()), length)
+
+    @property
+    def spans(self) -> int:
+        """Number of spans."""
+        return len(self.supports) - 1
+
+    @property
+    def length(self) -> float:
+        """Position of the last support (m)."""
+        return self.supports[-1]
+
+    @property
+    def mean_length(self) -> float:
+        """Mean length of a span (m)."""
+        return self.length / self.spans if self.pitch is None else self.pitch
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Length of each span, (spans,), m."""
+        return np.diff(self.supports) if self.pitch is None else np.full(self.spans, self.pitch)
+
+    @cached_property
+    def arrays(self) -> AlignmentArrays:
+        """The same for kernels."""
+        per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
+        return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
+
+    def span_of(self, x: Any) -> Any:
+        """Number of the span at positions (m), an integer or an array of them."""
+        index = np.floor_divide(x, self.pitch) if self.pitch is not None else np.floor(self.in_spans(x))
+        number = np.asarray(index).astype(np.int64) + 1
+        return int(number) if number.ndim == 0 else number
+
+    def place(self, x: Any) -> Any:
+        """Distance of positions (m) from the support at which their span begins (m)."""
+        return np.mod(x, self.pitch) if self.pitch is not None else x - self.support(self.span_of(x) - 1)
+
+    def length_at(self, x: Any) -> Any:
+        """Length of the span at positions (m)."""
+        if self.pitch is not None:
+            return self.pitch + 0.0 * x
+        return self.lengths[np.clip(np.asarray(self.span_of(x)) - 1, 0, self.spans - 1)]
+
+    def in_spans(self, x: Any) -> Any:
+        """Positions (m) counted in spans: 3.25 lies a quarter into the fourth one."""
+        if self.pitch is not None:
+            return x / self.pitch
+        supports, x = np.array(self.supports), np.asarray(x, dtype=float)
+        first = np.clip(np.searchsorted(supports, x, side="right") - 1, 0, self.spans - 1)
+        counted = first + (x - supports[first]) / self.lengths[first]
+        return float(counted) if counted.ndim == 0 else counted
+
+    def support(self, number: Any) -> Any:
+        """Position (m) of the support with a number, counted from 0, or of a place ``in_spans``."""
+        if self.pitch is not None:
+            return number * self.pitch
+        number = np.asarray(number, dtype=float)
+        first = np.clip(np.floor(number), 0, self.spans - 1).astype(np.int64)
+        position = np.array(self.supports)[first] + (number - first) * self.lengths[first]
+        return float(position) if position.ndim == 0 else position
+
+    def supports_within(self, begin: float, end: float) -> Index:
+        """Numbers of the supports from begin to end (m), both included."""
+        first, last = math.ceil(self.in_spans(begin)), math.floor(self.in_spans(end))
+        return np.arange(max(first, 0), last + 1)
+
+    def limits(self, spans: Spans) -> tuple[float, float]:
+        """Positions (m) at which the first span begins and the last one ends."""
+        first, last = spans
+        return self.support(first - 1), self.support(last)
+
+    def within(self, x: Array, spans: Spans) -> NDArray[np.bool_]:
+        """Which positions (m), (n,), lie inside the spans."""
+        begin, end = self.limits(spans)
+        return np.asarray((x >= begin) & (x < end))
+
+    def last_whole_span(self, distance: float, tolerance: float = 0.0) -> int:
+        """Number of the last span that a run of this distance (m) covers whole; 0 if there is none.
+
+        tolerance: what may be missing from the span (spans), for a distance that is a rounded sum of steps.
+        """
+        return int(np.floor(self.in_spans(distance) + tolerance))
+
+
+@inlined
+def in_spans(alignment, x):
+    """A position (m) counted in spans, as ``Alignment.in_spans`` gives it."""
+    if alignment.per_metre > 0.0:
+        return x * alignment.per_metre
+    k = span_index(alignment, x)
+    begin = alignment.supports[k]
+    return k + (x - begin) / (alignment.supports[k + 1] - begin)
+
+
+@inlined
+def span_index(alignment, x):
+    """Number, counted from 0, of the span at a position (m) of a line whose spans differ in length."""
+    last = alignment.supports.size - 2
+    k = min(max(int(x / alignment.mean_length), 0), last)
+    while k > 0 and x < alignment.supports[k & NOT_NEGATIVE]:
+        k -= 1
+    while k < last and x >= alignment.supports[(k + 1) & NOT_NEGATIVE]:
+        k += 1
+    return k & NOT_NEGATIVE
