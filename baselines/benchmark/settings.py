@@ -15,7 +15,13 @@ from panto_env.base.files import read_toml
 from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.base.shown import shown
-from panto_env.control.settings import default, description
+from panto_env.control.settings import (
+    ControlInterval,
+    PantographScatter,
+    SpeedDrift,
+    default,
+    description,
+)
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
@@ -94,13 +100,11 @@ class BenchmarkSettings(Settings):
     line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
     )
-    pantograph_scatter: Annotated[float, Field(ge=0, le=0.3)] = Field(
+    pantograph_scatter: PantographScatter = Field(
         default("pantograph_scatter"), description=description("pantograph_scatter")
     )
-    speed_drift: Annotated[float, Field(ge=0, le=10)] = Field(
-        default("speed_drift"), description=description("speed_drift")
-    )
-    control_interval: Positive = Field(
+    speed_drift: SpeedDrift = Field(default("speed_drift"), description=description("speed_drift"))
+    control_interval: ControlInterval = Field(
         default("control_interval"), description=description("control_interval")
     )
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
-from panto_env.base.units import from_kmh
 from panto_env.control.context import Context
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, find_policy, wishes
@@ -82,8 +81,9 @@ def run_pass(
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        position = np.arange(len(force)) * settings.control_interval * from_kmh(speed_kmh)
-        asked = force[run.alignment.within(position, spans)]
+        # A command counts where the first time step under it does, as the figures of the run count steps.
+        steps = round(settings.control_interval / run.time_step)
+        asked = force[run.inside(spans)[::steps]]
         changes = np.diff(asked, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(asked) >= FULL * settings.actuator.force_limit))

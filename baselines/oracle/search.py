@@ -130,7 +130,7 @@ def span_periodic(problem: Problem) -> Array:
     """
     passive = problem.passive
     time = (problem.begin + 1.0 + np.arange(problem.count)) * problem.interval
-    turns = passive.alignment.in_spans(time * passive.speed)
+    turns = passive.alignment.in_spans(np.interp(time, passive.time, passive.position))
     waves = [np.ones_like(turns)]
     for harmonic in range(1, HARMONICS + 1):
         waves += [np.cos(2 * np.pi * harmonic * turns), np.sin(2 * np.pi * harmonic * turns)]

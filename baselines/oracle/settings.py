@@ -12,7 +12,7 @@ from panto_configs import find
 from panto_env.base.files import read_toml
 from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.control.settings import default, description
+from panto_env.control.settings import ControlInterval, default, description
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
@@ -59,7 +59,7 @@ class OracleSettings(Settings):
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
     )
-    control_interval: Positive = Field(
+    control_interval: ControlInterval = Field(
         default("control_interval"), description=description("control_interval")
     )
 

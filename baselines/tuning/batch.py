@@ -92,7 +92,11 @@ def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
 
 
 def _low_passed(task: Task, settings: RunSettings) -> Array:
-    """Low-passed contact force over the evaluated spans, (lanes, samples), (N)."""
+    """Low-passed contact force over the evaluated spans, (lanes, samples), (N).
+
+    Each lane's samples are those in which its own train is inside. Where speeds drift, trains stay there
+    for different times: of each as many samples are taken as the fastest has, evenly in time.
+    """
     from scipy.signal import sosfilt
 
     time_step, alignment = task.plant.time_step, task.plant.alignment
@@ -100,8 +104,11 @@ def _low_passed(task: Task, settings: RunSettings) -> Array:
     sections, settled = low_pass_sections(time_step)
     start = settled[:, None, :] * force[None, :, :1]
     filtered, _ = sosfilt(sections, force, axis=1, zi=start)
-    position = (np.arange(force.shape[1]) + 0.5) * time_step * float(task.speed[0])
+    middle = np.arange(force.shape[1]) + 0.5
     spans = chosen_spans(None, task.length.distance, alignment)
     assert spans is not None  # of a choice that is not "all"
-    inside = filtered[:, alignment.within(position, spans)]
-    return np.asarray(inside[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])
+    inside = [alignment.within(task.plant.position(lane, middle), spans) for lane in range(task.lanes)]
+    count = min(int(own.sum()) for own in inside)
+    chosen = [own[where] for own, where in zip(filtered, inside, strict=True)]
+    kept = np.array([own[np.rint(np.linspace(0, len(own) - 1, count)).astype(int)] for own in chosen])
+    return np.asarray(kept[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

@@ -16,10 +16,9 @@ from ..base.errors import InputError
 from ..base.units import to_kmh
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
-from ..plant.line_condition import LineCondition
 from .kept import keep, kept_file, read_kept
 from .observation import OBSERVATION_SETTINGS
-from .settings import RunSettings, far_enough
+from .settings import RunSettings, as_designed
 
 TOLERANCE = 0.05
 """Largest difference (N) between the mean force and its target."""
@@ -82,19 +81,10 @@ def trim_as_designed(
     """Trim over a range of speeds (m/s), of line and pantograph as designed, over the usual spans."""
     low, high = speeds
     count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
-    as_designed = {
-        "line_condition": (LineCondition(),),
-        "pantograph_scatter": 0.0,
-        "speed_drift": 0.0,
-        "distance": None,
-        "spans": None,
-    }
     found: list[float] = np.linspace(low, high, count).tolist()
     forces: list[float] = []
     for speed in found:
-        at_speed = {"speed_kmh": (to_kmh(speed), to_kmh(speed))}
-        designed = far_enough(settings.model_copy(update=as_designed | at_speed))
-        trim = trim_of_pass(designed, 0, None, passive_mean)
+        trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
         assert trim is not None  # a mean force is to be met at every speed or at none
         forces += trim.static_forces
     return Trim(tuple(found), tuple(forces))

@@ -18,24 +18,15 @@ from ..base.errors import InputError
 from ..base.units import to_kmh
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
-from ..plant.line_condition import LineCondition
 from ..plant.sensors import Reading
 from .kept import keep, kept_file, read_kept
 from .observation import OBSERVATION_SETTINGS
-from .settings import RunSettings, far_enough
+from .settings import RunSettings, as_designed
 
 KNOT_DISTANCE = 25.0
 """Largest distance (km/h) of the speeds that are run; between them it is interpolated."""
 LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
-AS_DESIGNED = {
-    "line_condition": (LineCondition(),),
-    "pantograph_scatter": 0.0,
-    "run_in": 0.0,
-    "distance": None,
-    "spans": None,
-}
-"""Of a line and a pantograph that nothing was drawn for."""
 NO_MATTER = (*OBSERVATION_SETTINGS, "estimator", "known_pantograph", "reward", "actuator", "sensors")
 """Settings on which a passive run does not depend."""
 
@@ -73,8 +64,7 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
     """Means and spreads at one speed (m/s), from the disk where they are kept."""
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
-    own |= AS_DESIGNED | {"speed_kmh": (to_kmh(speed), to_kmh(speed))}
-    designed = far_enough(RunSettings.model_construct(**own))
+    designed = as_designed(RunSettings.model_construct(**own), speed)
     file = _file(designed)
     kept: list[list[float]] | None = read_kept(file, "values")
     if kept is None:

@@ -19,7 +19,7 @@ from ..base.names import suggest
 from ..base.ranges import Between
 from ..base.settings import parse, plain
 from ..base.shown import shown
-from ..base.units import from_kmh
+from ..base.units import from_kmh, to_kmh
 from ..catalog import load_catenary, load_pantograph
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import CLEAR, LAST_USUAL
@@ -37,6 +37,12 @@ R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9
 """Distance (m) beyond which no line goes, whatever it is made of."""
 _Speed = Annotated[float, Field(allow_inf_nan=True)]  # a line says itself which speeds it bears
+# Ranges of settings that tables of benchmarks and oracles have as well.
+PantographScatter = Annotated[float, Between(0, 0.3)]
+# Own choice: a driver, or cruise control, keeps within some km/h.
+SpeedDrift = Annotated[float, Between(0, 20, "km/h")]
+# Published active pantographs are controlled at 50-100 Hz.
+ControlInterval = Annotated[float, Between(1e-4, 10, "s")]
 
 
 def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
@@ -71,12 +77,6 @@ def _spans(value: Any) -> int | None:
 def _distance(value: Any) -> float | None:
     if value is not None and not (isinstance(value, int | float) and 0 < value <= FARTHEST):
         raise InputError(f"distance must be a positive number (m), not {shown(value)}.")
-    return value
-
-
-def _scatter(value: Any) -> float:
-    if not (isinstance(value, int | float) and 0 <= value <= 0.3):
-        raise InputError(f"pantograph_scatter must lie in 0 to 0.3, not {shown(value)}.")
     return value
 
 
@@ -130,8 +130,7 @@ class RunSettings(Numerics):
         validate_default=True,
         description="train speed (km/h): a number, or a range of two to draw from",
     )
-    # Own choice: a driver, or cruise control, keeps within some km/h.
-    speed_drift: Annotated[float, Between(0, 20, "km/h")] = Field(
+    speed_drift: SpeedDrift = Field(
         0.0,
         description="rms of a slow drift of the speed about its mean, of periods of 7 to 29 s, drawn per run "
         "(km/h)",
@@ -164,7 +163,7 @@ class RunSettings(Numerics):
         description="spans that the train runs without control before the episode begins: drawn per run from "
         "0 up to this",
     )
-    pantograph_scatter: Annotated[float, BeforeValidator(_scatter)] = Field(
+    pantograph_scatter: PantographScatter = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
     )
     observation: Annotated[str, BeforeValidator(_observation)] = Field(
@@ -209,10 +208,7 @@ class RunSettings(Numerics):
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
     )
-    # Published active pantographs are controlled at 50-100 Hz.
-    control_interval: Annotated[float, Between(1e-4, 10, "s")] = Field(
-        0.01, description="time between two actions (s)"
-    )
+    control_interval: ControlInterval = Field(0.01, description="time between two actions (s)")
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property
@@ -242,6 +238,20 @@ def far_enough(settings: RunSettings) -> RunSettings:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
     return settings.model_copy(update={"distance": line.alignment(last).length, "spans": last + CLEAR})
+
+
+def as_designed(settings: RunSettings, speed: float) -> RunSettings:
+    """Settings of a pass at a speed (m/s) along line and pantograph as designed: nothing of it is drawn."""
+    nothing_drawn = {
+        "line_condition": (LineCondition(),),
+        "pantograph_scatter": 0.0,
+        "speed_drift": 0.0,
+        "run_in": 0.0,
+        "distance": None,
+        "spans": None,
+        "speed_kmh": (to_kmh(speed), to_kmh(speed)),
+    }
+    return far_enough(settings.model_copy(update=nothing_drawn))
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:

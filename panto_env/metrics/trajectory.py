@@ -160,6 +160,11 @@ class Trajectory:
         """Covered from the start to the end of the last step (m)."""
         return float(self.position[-1] + self.position[0])
 
+    def time_at(self, position: float) -> float:
+        """When the train comes to a position (m): s since the start, however its speed drifts."""
+        places = np.array([0.0, *self.position, self.distance])
+        return float(np.interp(position, places, [0.0, *self.time, self.time[-1] + 0.5 * self.time_step]))
+
     def spans(self, choice: SpanChoice = None) -> Spans | None:
         """First and last span that a choice means, by default those after the start; None: the whole run.
 

@@ -39,7 +39,7 @@ def shown(first: Filmed, first_span: int, seconds: float, slow_motion: float) ->
     span.
     """
     run, interval = first.run, first.control_interval
-    begin = run.alignment.support(first_span - 1) / run.speed
+    begin = run.time_at(run.alignment.support(first_span - 1))
     if begin >= run.time[-1]:
         raise InputError(
             f"The run ends at {run.distance:.0f} m, before span {first_span}; begin in an earlier one."

@@ -139,6 +139,21 @@ def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     assert row.figures.std == run.summary((1, 3)).std
 
 
+def test_where_the_speed_drifts_commands_count_where_the_figures_do():
+    """An ideal actuator does what it is told: its effort in the figures is the rms of the commands."""
+    given = settings(line_condition="new", speed_drift=10.0)
+    line = LINE.model_copy(update={"distance": 2000.0})
+    run, commands = drive(given, line, "p:gain=0.5", 100.0, seed=5)
+    assert abs(run.position - 100 / 3.6 * run.time).max() > 10.0  # m: a fifth of a span
+    steps = round(given.control_interval / run.time_step)
+    begin, end = 20 * 50.0, 24 * 50.0
+    counted = (run.position[::steps] >= begin) & (run.position[::steps] < end)
+    expected = np.diff(commands[counted], axis=0) / given.control_interval
+    row = run_pass(given, line, (21, 24), "p:gain=0.5", 100.0, seed=5).row
+    assert row.action_rate == pytest.approx(np.sqrt(np.mean(expected**2)))
+    assert np.sqrt(np.mean(commands[counted] ** 2)) == pytest.approx(row.figures.effort, rel=2e-3)
+
+
 def test_a_slow_train_leaves_points_enough_for_a_peak_at_20_hz():
     given = settings(line_condition="new")
     trace = run_pass(given, LINE, (2, 2), "passive", 40.0, seed=0, traced=True).trace

@@ -219,14 +219,21 @@ def test_where_all_candidates_are_worse_the_start_stays() -> None:
 # --- batches and tuning --------------------------------------------------------------------------
 
 
-def test_a_batch_is_what_single_passes_are() -> None:
-    settings = {"speed_kmh": 300.0, "accuracy": "fast", "distance": 660.0, "spans": 19} | REAL
+@pytest.mark.parametrize("drift", [0.0, 10.0])
+def test_a_batch_is_what_single_passes_are(drift: float) -> None:
+    settings = {
+        "speed_kmh": 300.0,
+        "accuracy": "fast",
+        "distance": 660.0,
+        "spans": 19,
+        "speed_drift": drift,
+    } | REAL
     laws = [Still(), Skyhook(gains=(100.0, 0.0))]
     force = run_batch(run_settings(settings), laws, [1000, 1001])
     assert (force.std[:, 0] != force.std[:, 1]).all()  # a line of its own for each seed
     for row, policy in enumerate((None, "skyhook:gains=(100.0,0.0)")):
         figures = simulate(policy=policy, seed=1001, **settings).summary()
-        assert force.mean[row, 1] == pytest.approx(figures.mean, rel=1e-3)
+        assert force.mean[row, 1] == pytest.approx(figures.mean, rel=2e-3 if drift else 1e-3)
         assert force.std[row, 1] == pytest.approx(figures.std, rel=1e-2)
 
 

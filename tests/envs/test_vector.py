@@ -216,7 +216,7 @@ def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"pantograph_scatter": 2}, "pantograph_scatter must lie in 0 to 0.3, not 2"),
+        ({"pantograph_scatter": 2}, "pantograph_scatter must be a number from 0 to 0.3, not 2"),
         ({"line_condition": []}, "line_condition must name at least one condition"),
         ({"line_condition": ["new", "rusty"]}, "line_condition must be 'new' or"),
     ],
