@@ -1,5 +1,4 @@
-"""Show that two versions of the project give the same results on this machine: bit for bit, but for the cases
-of ``tolerance.py``.
+"""Show that two versions of the project give the same results, bit for bit, on this machine.
 
 ``python -m tests.before.compare --before COMMIT [--only PATTERN]`` compares a commit with the working tree,
 or with another commit (``--after``); exit status 1 if any case differs. Both record the same cases at the
@@ -18,13 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from .install import HERE, Version, installed
-from .tolerance import TOLERANCES, differences, within_tolerance
 
 LISTED = 3  # parts that differ, named in the table
 
@@ -40,25 +37,15 @@ class Comparison:
     largest: float | None  # relative difference of a figure; None where there is none to compare
     at: str  # name of that figure
     failure: str | None = None
-    tolerated: float | None = None  # largest relative difference of a number; None where bits are compared
-    tolerated_at: str = ""  # part that it is in
 
     @property
     def same(self) -> bool:
-        """Whether all that the older version gave is there, with the same bits or within the tolerance."""
+        """Whether all that the older version gave is there, with the same bits."""
         return not self.differing and self.failure is None
 
 
-def compare(
-    case: str,
-    before: dict[str, Any] | None,
-    after: dict[str, Any] | None,
-    numbers: tuple[dict[str, Any], dict[str, Any]],
-) -> Comparison:
-    """Compare what a case gave; None where a version has no such case.
-
-    numbers: of both versions, those that may differ a little.
-    """
+def compare(case: str, before: dict[str, Any] | None, after: dict[str, Any] | None) -> Comparison:
+    """Compare what a case gave; None where a version has no such case."""
     if before is None or after is None:
         missing = "before" if before is None else "after"
         return Comparison(case, 0, (), (), None, "", f"not recorded {missing}")
@@ -76,23 +63,11 @@ def compare(
         relative = abs(other - figure) / size if size else 0.0
         if largest is None or relative > largest:
             largest, at = relative, name
-    tolerated, tolerated_at = None, ""
-    if within_tolerance(case):
-        found = differences(case, *numbers)
-        differing += tuple(name for name, (_, small) in found.items() if not small)
-        tolerated_at = max(found, key=lambda name: found[name][0], default="")
-        tolerated = found[tolerated_at][0] if found else 0.0
-    failure = "; ".join(failures) or None
-    return Comparison(case, len(old), differing, gained, largest, at, failure, tolerated, tolerated_at)
+    return Comparison(case, len(old), differing, gained, largest, at, "; ".join(failures) or None)
 
 
-def record(
-    versions: tuple[Version, Version], only: str, quick: bool
-) -> tuple[list[dict[str, Any]], tuple[dict[str, Any], dict[str, Any]]]:
-    """Recordings of both versions, and their numbers that may differ a little.
-
-    They are made side by side; that of a commit is made once in a kept folder.
-    """
+def record(versions: tuple[Version, Version], only: str, quick: bool) -> list[dict[str, Any]]:
+    """Recordings of both versions, made side by side; that of a commit is made once in a kept folder."""
     sources = b"".join(path.read_bytes() for path in sorted(HERE.glob("*.py")))
     key = hashlib.sha256(sources + f"{only} {quick}".encode()).hexdigest()[:12]
     files, running = [], []
@@ -117,12 +92,11 @@ def record(
         print(f"{version.title} ran from {told['origin']['panto_env']}", file=sys.stderr)
         if not Path(told["origin"]["panto_env"]).is_relative_to(version.site.resolve()):
             sys.exit(f"{version.title} ran from a wrong place.")
-    before, after = (dict(np.load(file.with_suffix(".npz"))) for file in files)
-    return recordings, (before, after)
+    return recordings
 
 
 def _table(found: list[Comparison]) -> Table:
-    table = Table("case", "parts", "same?", "largest difference of the figures", "parts that differ")
+    table = Table("case", "parts", "same bits?", "largest difference of the figures", "parts that differ")
     for each in found:
         shown = "no figures" if each.largest is None else f"{each.largest:.1e}"
         if each.largest:
@@ -131,8 +105,6 @@ def _table(found: list[Comparison]) -> Table:
         if len(each.differing) > LISTED:
             named += f", ... ({len(each.differing)} in all)"
         verdict = "yes" if each.same else "[bold red]no"
-        if each.tolerated is not None:
-            verdict += f" (within {each.tolerated:.1e}: {each.tolerated_at})"
         table.add_row(escape(each.case), str(each.parts), verdict, escape(shown), escape(named))
     return table
 
@@ -148,10 +120,9 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder to keep installations, kernels and recordings in")
     given = parser.parse_args()
     with installed(given.before, given.after, given.keep) as versions:
-        recordings, numbers = record(versions, given.only, given.quick)
-    before, after = (each["cases"] for each in recordings)
+        before, after = (told["cases"] for told in record(versions, given.only, given.quick))
     names = [name for name in before | after if fnmatch.fnmatch(name, given.only)]
-    found = [compare(name, before.get(name), after.get(name), numbers) for name in names]
+    found = [compare(name, before.get(name), after.get(name)) for name in names]
     if not found:
         sys.exit(f"No case matches {given.only}.")
     differing = [each for each in found if not each.same]
@@ -164,22 +135,11 @@ def main() -> None:
         console.print(f"New parts, not compared: {', '.join(gained)}", markup=False)
     if differing:
         console.print("Figures are mean magnitudes of parts: 0 where only some last bits differ.")
+    parts = sum(each.parts for each in found)
     titles = f"{versions[0].title} and {versions[1].title}"
-    exact = [each for each in found if each.tolerated is None]
-    if exact:
-        same = sum(each.same for each in exact)
-        parts = sum(each.parts for each in exact)
-        console.print(f"{same} of {len(exact)} cases ({parts} parts) have the same bits in {titles}.")
-    close = [each for each in found if each.tolerated is not None]
-    if close:
-        worst = max(close, key=lambda each: each.tolerated or 0.0)
-        bounds = ", ".join(f"{bound:g} in {kind}" for kind, bound in TOLERANCES.items())
-        console.print(
-            f"{sum(each.same for each in close)} of {len(close)} cases of the massless line are the same "
-            f"within the tolerance ({bounds}); largest relative difference {worst.tolerated:.1e}, in "
-            f"{worst.case}: {worst.tolerated_at}.",
-            markup=False,
-        )
+    console.print(
+        f"{len(found) - len(differing)} of {len(found)} cases ({parts} parts) have the same bits in {titles}."
+    )
     sys.exit(bool(differing))
 
 

@@ -19,12 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import commands
-import numpy as np
 import passes
 import single
 import vector
 from tape import Tape
-from tolerance import join, within_tolerance
 
 PACKAGES = ("panto_env", "panto_baselines", "panto_agents")
 GROUPS = ("panto_env.policies", "panto_env.policy_loaders", "panto_env.commands")
@@ -74,21 +72,18 @@ def main() -> None:
     site = Path(os.environ["PYTHONPATH"])
     check_origin(site)
     recorded: dict[str, Any] = {}
-    floats: dict[str, Any] = {}
     chosen = {name: run for name, run in cases(given.quick).items() if fnmatch.fnmatch(name, given.only)}
     for number, (name, run) in enumerate(chosen.items(), start=1):
-        start, tape, failure = time.perf_counter(), Tape(within_tolerance(name)), None
+        start, tape, failure = time.perf_counter(), Tape(), None
         try:
             run(tape)
         except Exception as error:  # the other version may well run it
             failure = f"{type(error).__name__}: {error}"
         seconds = time.perf_counter() - start
-        floats |= {join(name, part): np.concatenate(each) for part, each in (tape.floats or {}).items()}
         recorded[name] = tape.told() | {"seconds": seconds, "failure": failure}
         line = f"{given.title:>14} {number:4}/{len(chosen)} {seconds:6.1f} s  {name}"
         print(line if failure is None else f"{line}\n{failure}", file=sys.stderr, flush=True)
     check_origin(site)
-    np.savez(output.with_suffix(".npz"), **floats)
     output.write_text(json.dumps({"origin": origin(), "cases": recorded}, indent=1), encoding="utf-8")
 
 

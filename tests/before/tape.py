@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import struct
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -22,9 +23,7 @@ class Tape:
     under its name, in order; a figure is the mean magnitude of the numbers among it.
     """
 
-    def __init__(self, keep_floats: bool = False) -> None:
-        """keep_floats: keep them as they are, to be compared within a tolerance, and out of the digests."""
-        self.floats: dict[str, list[Any]] | None = defaultdict(list) if keep_floats else None
+    def __init__(self) -> None:
         self._digests: dict[str, Any] = defaultdict(hashlib.sha256)
         self._sums: dict[str, list[float]] = defaultdict(list)
         self._counts: dict[str, int] = defaultdict(int)
@@ -48,28 +47,20 @@ class Tape:
         digest = self._digests[name]
         if isinstance(value, np.ndarray | np.generic):
             array = np.asarray(value)
-            digest.update(f"{array.dtype.str}{array.shape}".encode())
-            self._add_content(name, array)
+            digest.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
             numbers = array[np.isfinite(array)].astype(float)
             self._count(name, float(np.abs(numbers).sum()), numbers.size)
         elif isinstance(value, bool | int):
             digest.update(f"{type(value).__name__}{value}".encode())
             self._count(name, float(abs(value)), 1)
         elif isinstance(value, float):
-            digest.update(b"float")
-            self._add_content(name, np.array(value))
+            digest.update(b"float" + struct.pack("<d", value))
             if math.isfinite(value):
                 self._count(name, abs(value), 1)
         elif value is None or isinstance(value, str | bytes):
             digest.update(value if isinstance(value, bytes) else repr(value).encode())
         else:
             raise TypeError(f"{name} holds a {type(value).__name__}; teach Tape how to digest it.")
-
-    def _add_content(self, name: str, array: Any) -> None:
-        if self.floats is not None and array.dtype.kind == "f":
-            self.floats[name].append(array.ravel())
-        else:
-            self._digests[name].update(array.tobytes())
 
     def _count(self, name: str, total: float, count: int) -> None:
         self._sums[name].append(total)
