@@ -53,7 +53,8 @@ class Problem:
         self.places = len(settings.actuator.places)
         self.interval = settings.control_interval
         self.steps = whole_steps(self.interval, passive.time_step)
-        self.begin = max(0, int((inside[0] * passive.time_step - LEAD) / self.interval + 1e-9))
+        start = 0.0 if covered is None else passive.time_at(passive.alignment.limits(covered)[0])
+        self.begin = max(0, int((start - LEAD) / self.interval + 1e-9))
         self.count = int(inside[-1]) // self.steps + 1 - self.begin
         """Knots of one place."""
         self._inside = inside - self.begin * self.steps  # samples evaluated, counted from the first knot's

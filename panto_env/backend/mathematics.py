@@ -1,4 +1,4 @@
-"""Functions of vectors and of numbers alike, so that one source of a step serves both.
+"""Functions of vectors, for which Python's own (``if``, ``min``, ``max``, ``math.sqrt``) do not serve.
 
 Beside a vector a number counts as a vector of equal numbers.
 """
@@ -12,10 +12,8 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import overload
 
 from .compile import in_python
-from .dispatch import INLINED
 from .vectors import MaskType, VectorType
 
 NOT_NEGATIVE = 0xFFFFFFF
@@ -23,32 +21,10 @@ NOT_NEGATIVE = 0xFFFFFFF
 
 
 def _common(*given: Any) -> Any:
-    """Type of the result of an operation on vectors and numbers; None where others are among them."""
+    """Type of the result of an operation on vectors and numbers; None where no vector is among them."""
     if not all(isinstance(each, VectorType | types.Number) for each in given):
         return None
-    return next((each for each in given if isinstance(each, VectorType)), types.float64)
-
-
-def _of_one(name: str, plain: Callable[..., Any], docstring: str) -> Any:
-    """A function that LLVM knows by name."""
-
-    def compiled(typing: Any, x: Any) -> Any:
-        kind = _common(x)
-        if kind is None:
-            return None
-
-        def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            form = values[0].type
-            grouped = isinstance(kind, VectorType)
-            suffix = f"v{kind.count}f{kind.item.bitwidth}" if grouped else "f64"
-            signature = ir.FunctionType(form, [form])
-            function = cgutils.get_or_insert_function(builder.module, signature, f"llvm.{name}.{suffix}")
-            return builder.call(function, values)
-
-        return kind(kind), build
-
-    compiled.__doc__ = docstring
-    return in_python(plain)(compiled)
+    return next((each for each in given if isinstance(each, VectorType)), None)
 
 
 def _root_plain(x: Any) -> Any:
@@ -56,56 +32,28 @@ def _root_plain(x: Any) -> Any:
         return np.sqrt(x)
 
 
-root: Any = _of_one("sqrt", _root_plain, "``root(x)``: square root.")
-_floor_of_vector: Any = _of_one("floor", np.floor, "``_floor_of_vector(x)``.")
-
-
-@in_python(abs)
-def magnitude(typing: Any, x: Any) -> Any:
-    """``magnitude(x)``: absolute value."""
-    kind = _common(x)
-    if kind is None:
+@in_python(_root_plain)
+def root(typing: Any, x: Any) -> Any:
+    """``root(x)``: square root."""
+    if not isinstance(x, VectorType):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        zero = ir.Constant(values[0].type, None)  # a GPU's compiler knows no other way
-        negative = builder.fcmp_ordered("<", values[0], zero)
-        return builder.select(negative, builder.fsub(zero, values[0]), values[0])
+        form = values[0].type
+        name = f"llvm.sqrt.v{x.count}f{x.item.bitwidth}"
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(form, [form]), name)
+        return builder.call(function, values)
 
-    return kind(kind), build
-
-
-def floor(x: Any) -> Any:
-    """Largest whole number not above x, as a float."""
-    return np.floor(x)
+    return x(x), build
 
 
-@overload(floor, jit_options=INLINED)
-def _floor(x):  # no types: the signature must be that of the sources below
-    if isinstance(x, VectorType):
-        return lambda x: _floor_of_vector(x)
-    return lambda x: np.floor(x)
-
-
-def _choose_plain(mask: Any, a: Any, b: Any) -> Any:
-    return np.where(mask, a, b) if isinstance(mask, np.ndarray) else a if mask else b
-
-
-@in_python(_choose_plain)
+@in_python(np.where)
 def choose(typing: Any, mask: Any, a: Any, b: Any) -> Any:
     """``choose(mask, a, b)``: a where the mask is true, b elsewhere."""
     kind = _common(a, b)
-    if kind is None:
+    if kind is None or not isinstance(mask, MaskType):
         return None
-    if isinstance(mask, MaskType) and not isinstance(kind, VectorType):
-        kind = VectorType(types.float64, mask.count)
-    if isinstance(mask, MaskType) != isinstance(kind, VectorType):
-        return None
-
-    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        return builder.select(*values)
-
-    return kind(mask, kind, kind), build
+    return kind(mask, kind, kind), lambda context, builder, sig, values: builder.select(*values)
 
 
 def _extreme(sign: str, plain: Callable[..., Any], docstring: str) -> Any:
@@ -129,9 +77,7 @@ larger: Any = _extreme(">", np.maximum, "``larger(a, b)``: the larger of two; b 
 
 @in_python(np.any)
 def any_of(typing: Any, mask: Any) -> Any:
-    """``any_of(mask)``: whether a mask is true at any place; a truth value is itself."""
-    if isinstance(mask, types.Boolean):
-        return types.boolean(mask), lambda context, builder, sig, values: values[0]
+    """``any_of(mask)``: whether a mask is true at any place."""
     if not isinstance(mask, MaskType):
         return None
 

@@ -5,15 +5,12 @@ This needs the package numba-cuda with NVIDIA's compiler libraries, and no GPU.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
 import numba
-
-from .mathematics import floor
 
 COMPUTE_CAPABILITY = (9, 0)
 """Of the GPU that is compiled for."""
@@ -26,11 +23,6 @@ def ptx_of(function: Callable[..., Any], *arguments: Any) -> str:
     that a GPU does not know.
     """
     from numba import cuda
-    from numba.cuda.extending import overload
-
-    @overload(floor)
-    def _floor(x):  # no types: the signature must be that of the source below
-        return lambda x: float(math.floor(x))
 
     signature = tuple(numba.typeof(argument) for argument in arguments)
     source = getattr(function, "py_func", function)

@@ -36,19 +36,17 @@ class LaneThreads:
         self,
         run: Callable[..., Any],
         lanes: int,
-        abreast: int,
         shares: Shares,
         threads: int | None = None,
     ) -> None:
-        """run(first, last, size, role, patience): the kernel; shares: its own; abreast: lanes of a group.
+        """run(first, last, size, role, patience): the kernel; shares: its own.
 
         threads: at most, by default as many as there are cores.
         """
-        self._run, self._lanes, self._abreast = run, lanes, abreast
-        self._shares = shares
+        self._run, self._lanes, self._shares = run, lanes, shares
         # Plain Python has but one thread that could be inside a kernel.
         wanted = 1 if not JIT else cores() if threads is None else threads
-        self._threads = min(wanted, -(-lanes // abreast))
+        self._threads = min(wanted, lanes)
         self._begin_alone()
         _ALL.add(self)
 
@@ -83,11 +81,10 @@ class LaneThreads:
         return answer
 
     def _decide(self, work: tuple[Any, ...]) -> None:
-        groups = -(-self._lanes // self._abreast)
-        shares = min(groups, int(self._shortest / WORTH), SHARES_PER_THREAD * self._threads)
+        shares = min(self._lanes, int(self._shortest / WORTH), SHARES_PER_THREAD * self._threads)
         helpers = min(self._threads, shares) - 1
         if helpers > 0:
-            self._size = -(-groups // shares) * self._abreast
+            self._size = -(-self._lanes // shares)
             patience = int(LOOKS * AWAKE / min(self._time_of_looks(work) for _ in range(TRIALS)))
             call = partial(self._run, *work, 0, 0, 0, HELPER, patience)
             self._helpers = [_Helper(call) for _ in range(helpers)]

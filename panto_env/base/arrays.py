@@ -7,3 +7,5 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating[Any]]
 Index = NDArray[np.integer[Any]]
+Lanes = int | Index
+"""Numbers of lanes: one, or an array of them."""

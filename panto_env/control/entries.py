@@ -1,9 +1,9 @@
 """Entries of an observation, each in one piece: name, scale, unit, where it belongs, and its writer.
 
 A new entry is one decorated function here; its place in an observation is that among these functions.
-A writer gives the physical value, of one lane or of all in a group at once. It may look at ``episode``
-(``Episode``), ``own`` (rows of ``Row``), ``task`` (of ``TaskRow``) and ``now`` (of ``Now``); ``number`` tells
-entries apart that share a writer.
+A writer gives the physical value for one lane. It may look at ``episode`` (``Episode``), ``own`` (the lane's
+rows of ``Row``), ``task`` (of ``TaskRow``) and ``now`` (of ``Now``); ``number`` distinguishes entries that
+share a writer.
 """
 
 from __future__ import annotations

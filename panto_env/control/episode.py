@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import lane_table
+from ..backend import aligned_zeros
 from ..base.arrays import Array, Index
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
@@ -16,21 +16,22 @@ from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
-from .state import RESULT_ROWS, Flag, Result, TaskRow
+from .state import NOW_ROWS, RESULT_ROWS, Flag, Result, TaskRow
 
 Flags = NDArray[np.bool_]
 
 
 class Episode(NamedTuple):
-    """One episode per lane, in all of them; arrays by lane have a place for each lane of whole groups."""
+    """One episode per lane, in all of them."""
 
-    action: Array  # (actions, lanes): asked for in this control step
+    action: Array  # (lanes, actions): requested in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
-    table: Array  # (groups, ACTION + actions + history, lanes abreast): rows of ``TaskRow``
+    table: Array  # (lanes, ACTION + actions + history): rows of ``TaskRow``
+    now: Array  # (lanes, rows of ``Now``): of the present control step
     weights: Array  # (terms,): of the reward
     idle: Flags  # (lanes,): lanes that are to stay as they are
-    steps: Index  # (lanes,): control steps that a call makes, more than one only where lanes go one by one
+    steps: Index  # (lanes,): control steps that a call makes
     writers: Index  # (entries, 2): writer and number of each entry of the observation
     history: int  # of the observation: earlier control steps
     centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
@@ -49,20 +50,17 @@ def new_episode(
     settings: RunSettings, plant: Plant, layout: Layout, control_steps: int, odometer: OdometerArrays
 ) -> Episode:
     """Of all lanes of a plant, none begun; control_steps: plant steps in a control step."""
-    lanes, abreast, actuator = plant.lanes, plant.lanes_abreast, settings.actuator
+    lanes, actuator = plant.lanes, settings.actuator
     actions = len(actuator.places)
-    table = lane_table(TaskRow.ACTION + actions + layout.history * (READINGS + actions), lanes, abreast)
-    table[:, TaskRow.DISTANCE] = 1.0  # of places without a lane: it is divided by
-    # An odd number of groups: rows a power of two apart would drive each other out of a cache.
-    places = (len(table) | 1) * abreast
     return Episode(
-        action=np.zeros((actions, places)),
+        action=np.zeros((lanes, actions)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,
-        table=table,
+        table=aligned_zeros((lanes, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
+        now=aligned_zeros((lanes, NOW_ROWS)),
         weights=settings.reward.weights,
-        idle=np.arange(places) >= lanes,
-        steps=np.ones(places, dtype=np.int64),
+        idle=np.zeros(lanes, dtype=np.bool_),
+        steps=np.ones(lanes, dtype=np.int64),
         writers=layout.writers,
         history=layout.history,
         centre=layout.centre,
@@ -79,47 +77,36 @@ def new_episode(
 
 
 class Results(NamedTuple):
-    """What a control step, or the start of an episode, tells of all lanes.
+    """What a control step, or the start of an episode, gives for all lanes."""
 
-    Arrays have a place for each lane of whole groups. They have a row per number, so that a group of lanes is
-    written at once.
-    """
-
-    lanes: int
-    entries: NDArray[np.float32]  # (entries, places): of the observation
-    values: Array  # (RESULT_ROWS, places): rows of ``Result``
-    flags: Flags  # (flags, places): rows of ``Flag``
-
-    @property
-    def observation(self) -> NDArray[np.float32]:
-        """(lanes, entries), a view."""
-        return self.entries[:, : self.lanes].T
+    observation: NDArray[np.float32]  # (lanes, entries)
+    values: Array  # (lanes, RESULT_ROWS): rows of ``Result``
+    flags: Flags  # (lanes, flags): rows of ``Flag``
 
     @property
     def terminated(self) -> Flags:
         """(lanes,): whether the plant has left its valid range, a view."""
-        return self.flags[Flag.TERMINATED, : self.lanes]
+        return self.flags[:, Flag.TERMINATED]
 
     @property
     def truncated(self) -> Flags:
         """(lanes,): whether the end of the run is reached within it, a view."""
-        return self.flags[Flag.TRUNCATED, : self.lanes]
+        return self.flags[:, Flag.TRUNCATED]
 
     @property
     def reward_and_terms(self) -> Array:
         """(1 + terms, lanes): the reward, and its terms, not weighted; a view."""
-        return self.values[Result.REWARD : Result.CONTACT_FORCE, : self.lanes]
+        return self.values[:, Result.REWARD : Result.CONTACT_FORCE].T
 
     def copy(self) -> Results:
         """The same in arrays of its own."""
-        return Results(self.lanes, self.entries.copy(), self.values.copy(), self.flags.copy())
+        return Results(self.observation.copy(), self.values.copy(), self.flags.copy())
 
 
-def new_results(lanes: int, places: int, entries: int) -> Results:
-    """Room for the results of so many lanes, which take so many places in whole groups."""
+def new_results(lanes: int, entries: int) -> Results:
+    """Room for the results of so many lanes."""
     return Results(
-        lanes,
-        np.empty((entries, places), dtype=np.float32),
-        np.empty((RESULT_ROWS, places)),
-        np.empty((len(Flag), places), dtype=np.bool_),
+        np.empty((lanes, entries), dtype=np.float32),
+        np.empty((lanes, RESULT_ROWS)),
+        np.empty((lanes, len(Flag)), dtype=np.bool_),
     )

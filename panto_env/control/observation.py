@@ -9,16 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import (
-    NOT_NEGATIVE,
-    inlined,
-    larger,
-    number_at,
-    put_number,
-    rows_from,
-    smaller,
-    width_of,
-)
+from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
@@ -105,16 +96,16 @@ def layout(kind: str, asked: Asked) -> Layout:
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """Kernel code that writes an entry with the writer at a place known only as it runs.
+    """Kernel code that calls the writer at a place known only as it runs.
 
     Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
     """
     names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
-    lines = ["def write(chosen, episode, own, task, now, number, entry):"]
+    lines = ["def write(chosen, episode, own, task, now, number):"]
     for place in range(len(writers)):
         lines += [f"    if chosen == {place}:"]
-        lines += [f"        entry[0] = writer_{place}(episode, own, task, now, number)"]
-    exec("\n".join(lines), names)
+        lines += [f"        return writer_{place}(episode, own, task, now, number)"]
+    exec("\n".join([*lines, "    return 0.0"]), names)
     write: Callable[..., Any] = inlined(names["write"])
     return write
 
@@ -123,35 +114,33 @@ _write = _branches(WRITERS)
 
 
 @inlined
-def add_noise(sensors, idle, readings, lane):
-    """Add to the readings of a group the noise that is next in each of its lanes that is not idle."""
-    for i in range(width_of(readings)):
-        its = (lane + i) & NOT_NEGATIVE
-        if not idle[its]:
-            noise = sensors.noise[its, sensors.noise_used[its] & NOT_NEGATIVE]
-            for k in range(READINGS):
-                put_number(readings, k, i, number_at(readings, k, i) + noise[k])
-            sensors.noise_used[its] += 1
+def add_noise(sensors, readings, lane):
+    """Add to a lane's readings the noise that is next."""
+    noise = sensors.noise[lane, sensors.noise_used[lane] & NOT_NEGATIVE]
+    for k in range(READINGS):
+        readings[k] += noise[k]
+    sensors.noise_used[lane] += 1
 
 
 @inlined
 def prepare_entries(episode, sensors, run, own, now, lane):
-    """Make ready what entries of an observation look at: noise is added to the readings of a group."""
+    """Make ready what entries of a lane's observation look at: noise is added to its readings."""
     if sensors.noise.shape[1] > 0:
-        add_noise(sensors, episode.idle, rows_from(now, NOW.READING), lane)
+        add_noise(sensors, now[NOW.READING :], lane)
     now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
     now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
     if episode.odometer.table.shape[1] > 0:
-        spans, speed = rows_from(now, NOW.SPANS), rows_from(now, NOW.SPEED)
-        read_odometer(episode.odometer, episode.idle, spans, speed, lane)
+        spans, speed = read_odometer(episode.odometer, now[NOW.SPANS], now[NOW.SPEED], lane)
+        now[NOW.SPANS] = spans
+        now[NOW.SPEED] = speed
 
 
 @inlined
 def remember(episode, task, now):
-    """Let the readings and actions of a group be the latest of its history."""
+    """Let a lane's readings and actions be the latest of its history."""
     actions = episode.places.size
     each = READINGS + actions
-    past = rows_from(task, TASK_ROW.ACTION + actions)
+    past = task[TASK_ROW.ACTION + actions :]
     for row in range((episode.history - 1) * each - 1, -1, -1):
         past[row + each] = past[row]
     if episode.history > 0:
@@ -162,23 +151,20 @@ def remember(episode, task, now):
 
 
 @inlined
-def begin_history(episode, task, now, lane):
-    """Let the history of the lanes of a group that are not idle have been as their first readings."""
+def begin_history(episode, task, now):
+    """Let a lane's history have been as its first readings."""
     actions = episode.places.size
-    each = READINGS + actions
-    for i in range(width_of(task)):
-        if not episode.idle[(lane + i) & NOT_NEGATIVE]:
-            for step in range(episode.history):
-                past = rows_from(task, TASK_ROW.ACTION + actions + step * each)
-                for k in range(READINGS):
-                    put_number(past, k, i, number_at(now, NOW.READING + k, i))
-                for a in range(actions):
-                    put_number(past, READINGS + a, i, number_at(task, TASK_ROW.ACTION + a, i))
+    for step in range(episode.history):
+        past = task[TASK_ROW.ACTION + actions + step * (READINGS + actions) :]
+        for k in range(READINGS):
+            past[k] = now[NOW.READING + k]
+        for a in range(actions):
+            past[READINGS + a] = task[TASK_ROW.ACTION + a]
 
 
 @inlined
-def entry_of(episode, own, task, now, k, entry):
-    """Entry k of the observation of a group, within its bounds; entry: room for one row."""
-    _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1], entry)
+def entry_of(episode, own, task, now, k):
+    """Entry k of a lane's observation, within its bounds."""
+    value = _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1])
     centre = episode.centre[k] + episode.slope[k] * own[ROW.STRIDE]
-    return smaller(larger((entry[0] - centre) * episode.per_unit[k], -BOUND), BOUND)
+    return min(BOUND, max(-BOUND, (value - centre) * episode.per_unit[k]))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import of_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.units import to_kmh
@@ -31,7 +30,7 @@ def diverged(task: Task, lanes: Any, deviation: Array, height: Array) -> NDArray
     is that of no line.
     """
     possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
-    endings = of_lanes(task.episode.table, lanes)[:, TaskRow.ENDING]
+    endings = task.episode.table[lanes, TaskRow.ENDING]
     return np.asarray(~possible | (endings == Ending.DIVERGED))
 
 
@@ -120,4 +119,4 @@ def ending(task: Task, lane: int) -> str:
 
 
 def _ending(task: Task, lane: int) -> Ending:
-    return Ending(int(of_lanes(task.episode.table, lane)[TaskRow.ENDING]))
+    return Ending(int(task.episode.table[lane, TaskRow.ENDING]))

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..backend import of_lanes, set_lanes
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.units import to_kmh
@@ -43,7 +42,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
     _begin(task, lanes, end)
     plant.clear(task.samples, lanes)
-    samples = of_lanes(plant.run.table[0], lanes)[:, :SAMPLE_ROWS]
+    samples = plant.run.table[0, lanes, :SAMPLE_ROWS]
     task.sensors.reset(lanes, samples)
     if task.keep_samples:
         task.samples.rows[lanes, 0, 0] = samples
@@ -60,8 +59,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
 
 def _begin(task: Task, lanes: Any, end: Array) -> None:
     """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
-    run, table = task.plant.run.table[0], task.episode.table
-    start = of_lanes(run, lanes)
+    start, table = task.plant.run.table[0, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
@@ -78,7 +76,7 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     shifted = task.plant.ahead(lanes, np.stack([start[:, Row.STEP], end], axis=1))
     steady = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
     rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
-    set_lanes(table, lanes, rows)
+    table[lanes] = rows
     task.running.peak[lanes] = -np.inf
 
 
@@ -87,11 +85,11 @@ def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
-    rows = of_lanes(task.episode.table, lanes)
+    rows = task.episode.table[lanes]
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(task.ending(lane))
     _begin(task, lanes, rows[:, TaskRow.END])
-    results.values[: Result.CONTACT_FORCE, lanes] = 0.0  # rewards are not of the episode
+    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards are not of the episode
     if task.layout.history:
         _forget(task, lanes, rows, results)
 
@@ -104,8 +102,6 @@ def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
     first = TaskRow.ACTION + len(task.actuator.places)
     history = rows[:, first:]
     latest = history[:, : history.shape[1] // task.layout.history]
-    begun = of_lanes(task.episode.table, lanes)
-    begun[:, first:] = np.tile(latest, task.layout.history)
-    set_lanes(task.episode.table, lanes, begun)
+    task.episode.table[lanes, first:] = np.tile(latest, task.layout.history)
     past, now = task.layout.earlier
-    results.entries[np.ix_(past, lanes)] = results.entries[np.ix_(now, lanes)]
+    results.observation[np.ix_(lanes, past)] = results.observation[np.ix_(lanes, now)]

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from ..backend import choose, inlined, magnitude, rows_from
+from ..backend import inlined
 from ..base.arrays import Array
 from ..base.settings import NonNegative, Settings
 from ..plant.state import ROW
@@ -80,9 +80,9 @@ def add_sample_to_terms(own, task, now, force_before):
     """Add a plant step to the cost and the loss of its control step; force_before: of contact (N)."""
     force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.NOMINAL_FORCE]
     # An interval lies between two samples: before the first one there is none.
-    between = choose(own[ROW.STEP] > 1.5, 1.0, 0.0)
-    now[NOW.COST] += between * (magnitude(force_before - nominal_force) + magnitude(force - nominal_force))
-    lost = choose(force <= 0.0, 1.0, 0.0)
+    between = 1.0 if own[ROW.STEP] > 1.5 else 0.0
+    now[NOW.COST] += between * (abs(force_before - nominal_force) + abs(force - nominal_force))
+    lost = 1.0 if force <= 0.0 else 0.0
     now[NOW.LOSS_STEPS] += lost
     task[TASK_ROW.LOSS_STEPS_IN_A_ROW] = lost * (task[TASK_ROW.LOSS_STEPS_IN_A_ROW] + 1.0)
     now[NOW.SIGNED_DEVIATION] += force - nominal_force
@@ -95,7 +95,7 @@ def compute_reward(episode, own, task, now, values):
     The terms "cost_function" (N m) and "contact_loss" (%) sum over an episode to the CF and CL of its
     trajectory.
     """
-    per_step, weights, terms = 1.0 / episode.control_steps, episode.weights, rows_from(values, RESULT.TERM)
+    per_step, weights = 1.0 / episode.control_steps, episode.weights
     cost, loss_steps = 0.5 * now[NOW.COST], now[NOW.LOSS_STEPS]
     stride, per_nominal_force = now[NOW.STRIDE], 1.0 / own[ROW.NOMINAL_FORCE]
     change = now[NOW.SIGNED_DEVIATION] * per_step - task[TASK_ROW.MEAN_DEVIATION]
@@ -107,12 +107,12 @@ def compute_reward(episode, own, task, now, values):
     squared = task[TASK_ROW.SQUARED_DEVIATION] - now[NOW.SQUARED_BEFORE]
     about_target = (squared - 2.0 * shift * deviation) * per_step + shift * shift
     low_passed = about_target * per_spread * per_spread
-    terms[TERM.COST_FUNCTION] = stride * cost
-    terms[TERM.CONTACT_LOSS] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE]
-    terms[TERM.EFFORT] = now[NOW.EFFORT]
-    terms[TERM.RATE] = now[NOW.RATE]
-    terms[TERM.MEAN_FORCE] = mean_deviation * mean_deviation
-    terms[TERM.LOW_PASSED] = low_passed
+    values[RESULT.TERM + TERM.COST_FUNCTION] = stride * cost
+    values[RESULT.TERM + TERM.CONTACT_LOSS] = 100.0 * loss_steps * stride / task[TASK_ROW.DISTANCE]
+    values[RESULT.TERM + TERM.EFFORT] = now[NOW.EFFORT]
+    values[RESULT.TERM + TERM.RATE] = now[NOW.RATE]
+    values[RESULT.TERM + TERM.MEAN_FORCE] = mean_deviation * mean_deviation
+    values[RESULT.TERM + TERM.LOW_PASSED] = low_passed
     values[RESULT.REWARD] = -(
         weights[TERM.COST_FUNCTION] * per_step * cost * per_nominal_force
         + weights[TERM.CONTACT_LOSS] * per_step * loss_steps

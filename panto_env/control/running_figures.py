@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..backend import NOT_NEGATIVE, any_of, choose, inlined, larger, number_at, rows_from, smaller, width_of
+from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array
 from ..metrics.low_pass import low_pass_sections
 from ..plant.state import ROW, Row
@@ -79,15 +79,14 @@ def figures_so_far(
 @inlined
 def low_pass(running, task, force):
     """Contact force (N) behind EN 50317's filter, second-order sections in direct form II transposed."""
-    first, value = task[TASK_ROW.SAMPLES] == 0.0, force
-    if any_of(first):  # the filter begins settled at the first sample
+    value, states = force, task[TASK_ROW.FILTER_STATE :]
+    if task[TASK_ROW.SAMPLES] == 0.0:  # the filter begins settled at the first sample
         for k in range(running.settled.size):
-            state = rows_from(task, TASK_ROW.FILTER_STATE + k)
-            state[0] = choose(first, running.settled[k] * force, state[0])
+            states[k] = running.settled[k] * force
     for k in range(running.sections.shape[0]):
         b0, b1, b2 = running.sections[k, 0], running.sections[k, 1], running.sections[k, 2]
         a1, a2 = running.sections[k, 4], running.sections[k, 5]
-        state = rows_from(task, TASK_ROW.FILTER_STATE + 2 * k)
+        state = states[2 * k :]
         out = b0 * value + state[0]
         state[0] = b1 * value - a1 * out + state[1]
         state[1] = b2 * value - a2 * out
@@ -99,7 +98,7 @@ def low_pass(running, task, force):
 def add_sample_to_figures(running, samples, own, task, frame_before, head_before, lane):
     """Add a plant step; frame_before, head_before: forces of the actuators in the one before (N)."""
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
-    between = choose(task[TASK_ROW.SAMPLES] == 0.0, 0.0, 1.0)  # a change lies between two samples
+    between = 0.0 if task[TASK_ROW.SAMPLES] == 0.0 else 1.0  # a change lies between two samples
     frame, head = own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
     frame_change, head_change = frame - frame_before, head - head_before
     task[TASK_ROW.SQUARED_CHANGE] += between * (frame_change * frame_change + head_change * head_change)
@@ -108,14 +107,13 @@ def add_sample_to_figures(running, samples, own, task, frame_before, head_before
     deviation = filtered - nominal_force
     task[TASK_ROW.DEVIATION] += deviation
     task[TASK_ROW.SQUARED_DEVIATION] += deviation * deviation
-    task[TASK_ROW.MAX] = larger(task[TASK_ROW.MAX], filtered)
-    task[TASK_ROW.MIN] = smaller(task[TASK_ROW.MIN], filtered)
+    task[TASK_ROW.MAX] = max(filtered, task[TASK_ROW.MAX])
+    task[TASK_ROW.MIN] = min(filtered, task[TASK_ROW.MIN])
     if running.peak.shape[1] > 0:
-        for i in range(min(width_of(own), running.peak.shape[0] - lane)):
-            its = (lane + i) & NOT_NEGATIVE
-            row = min(int(number_at(own, ROW.STEP, i)), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
-            for s in range(running.peak.shape[1]):
-                running.peak[its, s] = max(running.peak[its, s], samples.uplift[its, row, s])
+        row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
+        peak, uplift = running.peak[lane], samples.uplift[lane, row]
+        for s in range(peak.size):
+            peak[s] = max(peak[s], uplift[s])
 
 
 @inlined

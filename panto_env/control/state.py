@@ -49,7 +49,7 @@ class TaskRow(IntEnum):
 
 
 class Now(IntEnum):
-    """Rows of what a kernel keeps of a group of lanes during a control step."""
+    """Rows of what a kernel keeps of a lane during a control step."""
 
     COST = 0  # sum of deviations at both ends of each interval (N)
     LOSS_STEPS = 1  # plant steps without contact

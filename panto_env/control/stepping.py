@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..backend import ALONE, LaneThreads, bind, copy_whole, new_shares, of_lanes, pack, set_lanes
+from ..backend import ALONE, LaneThreads, bind, copy_whole, new_shares, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.plant import Plant
@@ -18,7 +18,7 @@ from .step import control_steps, observe_start
 
 COASTED = 100
 """Control steps without a policy that are made at once."""
-BOUND_ANEW = ("_action", "_threads", "_plain_step", "_observe_start")
+BOUND_ANEW = ("_threads", "_plain_step", "_observe_start")
 """Attributes that ``Stepping._bind`` makes of the others."""
 
 
@@ -57,14 +57,13 @@ class Stepping:
 
     def _bind(self) -> None:
         """Bind the kernels to the arrays."""
-        self._action = self.episode.action[:, : self.lanes].T
         shares = new_shares()
         packed = pack(*self.plant.arrays, *self._arrays, shares)
-        run = bind(control_steps, packed, *self.results[1:], 0, self.lanes, self.lanes, ALONE, 0)
-        self._threads = threads = LaneThreads(run, self.lanes, self.plant.lanes_abreast, shares)
-        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results[1:]
+        run = bind(control_steps, packed, *self.results, 0, self.lanes, self.lanes, ALONE, 0)
+        self._threads = threads = LaneThreads(run, self.lanes, shares)
+        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results
         self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
-        self._observe_start = bind(observe_start, packed, *self.results[1:], 0, self.lanes)
+        self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what a copy has to bind anew, since its arrays lie elsewhere."""
@@ -77,7 +76,7 @@ class Stepping:
 
     def new_results(self) -> Results:
         """Room for the results of a step."""
-        return new_results(self.lanes, self.episode.action.shape[1], self._entries)
+        return new_results(self.lanes, self._entries)
 
     def begin(self, lanes: Any) -> None:
         """Take it that episodes begin in lanes, (n,)."""
@@ -89,27 +88,24 @@ class Stepping:
         idle = self.episode.idle
         idle[:] = True
         idle[lanes] = False
-        self._observe_start(*results[1:], int(lanes.min()), int(lanes.max()) + 1)
-        idle[: self.lanes] = False
+        self._observe_start(*results, int(lanes.min()), int(lanes.max()) + 1)
+        idle[:] = False
 
     def step(
         self,
         action: Array,
         skip: Flags | None = None,
         results: Results | None = None,
-        *,
-        keep: bool = True,
     ) -> bool:
         """One control step of all lanes, but those to skip, under actions, (lanes, actions).
 
         Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
-        default the task's own. Lanes that are skipped stay as they are; without ``keep``, they may be left
-        anyhow, to be reset next. Raises InputError, and changes nothing, for an action that is not finite, or
-        a lane whose episode has ended or not begun.
+        default the task's own. Lanes that are skipped stay as they are. Raises InputError, and changes
+        nothing, for an action that is not finite, or a lane whose episode has ended or not begun.
         """
         if self._any_over:
             self._refuse_over(skip)
-        self._action[...] = action
+        self.episode.action[...] = action
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
         if self.odometers.drawn:
@@ -118,18 +114,10 @@ class Stepping:
             return self._told(self._plain_step(), self.results)  # the usual step, as short as it can be
         results = results or self.results
         if skip is None:
-            return self._told(self._threads.step(*results[1:]), results)
-        idle, lanes = self.episode.idle[: self.lanes], np.flatnonzero(skip)
-        idle[:] = skip
-        tables = self._tables if keep and self.plant.lanes_abreast > 1 else []
-        kept, told = [of_lanes(table, lanes) for table in tables], [each[:, lanes] for each in results[1:]]
-        answer = self._threads.step(*results[1:])
-        for table, values in zip(tables, kept, strict=True):
-            set_lanes(table, lanes, values)
-        if tables:
-            for each, before in zip(results[1:], told, strict=True):
-                each[:, lanes] = before
-        idle[:] = False
+            return self._told(self._threads.step(*results), results)
+        self.episode.idle[:] = skip
+        answer = self._threads.step(*results)
+        self.episode.idle[:] = False
         return self._told(answer, results, skip)
 
     def _refuse_over(self, skip: Flags | None) -> None:
@@ -147,46 +135,29 @@ class Stepping:
             self._over |= ended if skip is None else ended & ~skip
             self._any_over = bool(self._over.any())
         if answer < 0:
-            lane = int(np.flatnonzero(~np.isfinite(self._action).all(axis=1))[0])
+            action = self.episode.action
+            lane = int(np.flatnonzero(~np.isfinite(action).all(axis=1))[0])
             whose = f" of lane {lane}" if self.lanes > 1 else ""
-            raise InputError(f"The action{whose} must be finite, not {self._action[lane]}; check the policy.")
+            raise InputError(f"The action{whose} must be finite, not {action[lane]}; check the policy.")
         return answer > 0
-
-    @property
-    def _tables(self) -> list[Array]:
-        """All that a step changes of lanes that go in groups."""
-        plant = self.plant
-        return [*plant.run.table, *plant.actuators.table, *self.sensors.tables, self.episode.table]
 
     def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
         """Run all lanes, just reset, to their ends without actuators.
 
         watch: called with this object now and then, after some control steps; it must change nothing.
         """
-        ended, at_once = np.zeros(self.lanes, dtype=np.bool_), COASTED if self._one_by_one else 1
+        ended = np.zeros(self.lanes, dtype=np.bool_)
         while not ended.all():
-            self.coast(np.where(ended, 0, at_once), self.results)
+            self.coast(np.where(ended, 0, COASTED), self.results)
             ended = self.results.terminated | self.results.truncated
             if watch is not None:
                 watch(self)
 
-    @property
-    def _one_by_one(self) -> bool:
-        """Whether each lane can make control steps of its own, as many as its episode has at most."""
-        return self.plant.lanes_abreast == 1
-
     def coast(self, steps: Any, results: Results) -> None:
-        """Control steps without control, (lanes,) of them in each lane, whose episode must not end before.
+        """Control steps without control, (lanes,) of them in each lane, none beyond an episode's end.
 
-        Where lanes go one by one a call makes all, none beyond an episode's end, and noise is drawn for the
-        observation behind the last alone.
+        Noise is drawn for the observation behind the last step alone.
         """
-        action = np.zeros_like(self._action)
-        if not self._one_by_one:
-            for done in range(int(steps.max())):
-                self.step(action, steps <= done, results)
-            return
-        own = self.episode.steps[: self.lanes]
-        own[:] = steps
-        self.step(action, steps == 0, results)
-        own[:] = 1
+        self.episode.steps[:] = steps
+        self.step(np.zeros_like(self.episode.action), steps == 0, results)
+        self.episode.steps[:] = 1

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import Lanes, of_lanes
-from ..base.arrays import Array
+from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
 from ..base.shown import shown
 from ..metrics.figures import Figures
@@ -106,7 +105,7 @@ class Task(Stepping):
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
         """Sensors of all lanes, and the rms of their noise."""
         settings = self.settings
-        form = plant.time_step, self.length.control_steps, lanes, plant.lanes_abreast
+        form = plant.time_step, self.length.control_steps, lanes
         if settings.observation != ESTIMATED:
             return settings.sensors.arrays(*form), settings.sensors.noise_rms
         from ..estimation.readings import estimating  # slow: it imports SciPy
@@ -147,7 +146,7 @@ class Task(Stepping):
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
-        return int(of_lanes(self.episode.table, lane)[TaskRow.END])
+        return int(self.episode.table[lane, TaskRow.END])
 
     def context(self, lane: int) -> Context:
         """What a policy may know of a lane's episode."""
@@ -176,10 +175,10 @@ class Task(Stepping):
 
     def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
         """The same of several lanes, (n,), by name; and which have none, as their computation diverged."""
-        run, supports = of_lanes(self.plant.run.table[0], lanes), self.plant.model.supports
+        run, supports = self.plant.run.table[0, lanes], self.plant.model.supports
         with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
             figures = figures_so_far(
-                of_lanes(self.episode.table, lanes),
+                self.episode.table[lanes],
                 self.running.peak[lanes],
                 run,
                 supports,

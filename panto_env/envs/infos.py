@@ -38,8 +38,8 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
 
     Each key holds an array with a value per lane, or a dictionary of such; "_key" marks who has it.
     """
-    (count, _, values, _), speed_kmh, lanes = answer
-    rows = values[:, :count]
+    (_, values, _), speed_kmh, lanes = answer
+    rows = values.T
     cost_function, contact_loss, effort, rate, mean_force, low_passed = rows[TERM:CONTACT_FORCE]
     return {
         "contact_force": rows[CONTACT_FORCE],

@@ -26,7 +26,7 @@ class Answer(NamedTuple):
     def of(self, lanes: Flags) -> Answer:
         """What is of these lanes, in arrays of its own."""
         values = self.results.values.copy()
-        values[:, : len(lanes)][:, ~lanes] = 0.0
+        values[~lanes] = 0.0
         speed_kmh = np.where(lanes, self.speed_kmh, 0.0)
         return Answer(self.results._replace(values=values), speed_kmh, lanes.copy())
 
@@ -58,7 +58,7 @@ class Lanes:
             if self._others:
                 idle = ~its if waiting is None else ~its | waiting
             own = results if task is self.usual else task.results
-            ended = task.step(action, idle, results=own, keep=False) or ended
+            ended = task.step(action, idle, results=own) or ended
             self._results = results
             self._take(own, its)
         if waiting is not None:
@@ -81,8 +81,8 @@ class Lanes:
         """Take over the results of some lanes."""
         if results is not self._results:
             own = np.flatnonzero(lanes)
-            for taken, given in zip(self._results[1:], results[1:], strict=True):
-                taken[:, own] = given[:, own]
+            for taken, given in zip(self._results, results, strict=True):
+                taken[own] = given[own]
 
     def answer(self) -> Answer:
         """What all lanes have come to."""
@@ -105,7 +105,7 @@ class Lanes:
         return values
 
     def _tasks(self) -> Iterator[tuple[Task, Flags]]:
-        """The usual one first: of a group of lanes it may write those of others, too."""
+        """Each task with the lanes that run it, the usual one first."""
         usual = np.ones(self.usual.lanes, dtype=np.bool_)
         for _, its in self._others:
             usual &= ~its

@@ -164,8 +164,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task = task
         self._shape = (len(task.actuator.places),)
         results = task.results
-        self._observation, self._values = results.observation[0], results.values[:, 0]
-        self._flags = results.flags[:, 0]
+        self._observation, self._values = results.observation[0], results.values[0]
+        self._flags = results.flags[0]
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what a copy has to see anew, since its arrays lie elsewhere, and its window."""

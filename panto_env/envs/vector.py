@@ -162,7 +162,7 @@ class PantographVectorEnv(
         if ended or self._any_ended or self._limit is not None:
             self._ended = terminated | truncated
             self._any_ended = bool(self._ended.any())
-        observation, reward = results.observation, results.values[REWARD, : self.num_envs]
+        observation, reward = results.observation, results.values[:, REWARD]
         if self.render_mode is not None:
             self._reward_so_far += reward
             if waiting is not None:

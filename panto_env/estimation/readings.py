@@ -10,20 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..backend import (
-    NOT_NEGATIVE,
-    Lanes,
-    columns,
-    implements,
-    inlined,
-    lane_table,
-    number_at,
-    put_number,
-    rows_from,
-    set_lanes,
-    width_of,
-)
-from ..base.arrays import Array, Index
+from ..backend import NOT_NEGATIVE, aligned_zeros, implements, inlined
+from ..base.arrays import Array, Index, Lanes
 from ..plant.pantograph.build import matrices
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
@@ -48,7 +36,7 @@ class EstimatingArrays(NamedTuple):
     """
 
     sensors: Any  # that read all but the contact force
-    table: Array  # (groups, 2 N + m + 1, lanes abreast)
+    table: Array  # (lanes, 2 N + m + 1)
     noise: Array  # (lanes, times, readings + m samples): of readings, then of each sample in a control step
     noise_used: Index  # (lanes,): how many of them have been used
     every: int  # plant steps between two samples
@@ -59,11 +47,6 @@ class EstimatingArrays(NamedTuple):
     force_of_sample: Array  # (m,): and from the sample
     shape: Array  # (masses, 2): displacements at rest from those of head and frame
 
-    @property
-    def tables(self) -> tuple[Array, ...]:
-        """All that changes but the noise."""
-        return (*self.sensors.tables, self.table)
-
     def reset(self, lanes: Lanes, samples: Array) -> None:
         """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS), at rest."""
         self.sensors.reset(lanes, samples)
@@ -71,7 +54,7 @@ class EstimatingArrays(NamedTuple):
         rows = np.zeros((len(samples), self.table.shape[1]))
         rows[:, :masses] = samples[:, [Row.HEAD_HEIGHT, Row.FRAME_HEIGHT]] @ self.shape.T
         rows[:, [2 * masses, size + measured]] = samples[:, [Row.CONTACT_FORCE]]
-        set_lanes(self.table, lanes, rows)
+        self.table[lanes] = rows
 
 
 def estimating(
@@ -83,7 +66,6 @@ def estimating(
     time_step: float,
     control_steps: int,
     lanes: int,
-    abreast: int,
 ) -> tuple[SensorArrays, tuple[float, ...] | None]:
     """Sensors with an estimator of the contact force, and the rms of each number of their noise, if any.
 
@@ -102,8 +84,8 @@ def estimating(
         samples = (displacement, displacement, velocity, velocity)[:measured] * (control_steps // every)
         rms = (*rms[: Reading.CONTACT_FORCE], 0.0, *samples)
     arrays = EstimatingArrays(
-        sensors=sensors.arrays(time_step, control_steps, lanes, abreast),
-        table=lane_table(2 * size + measured + 1, lanes, abreast),
+        sensors=sensors.arrays(time_step, control_steps, lanes),
+        table=aligned_zeros((lanes, 2 * size + measured + 1)),
         noise=np.zeros((lanes, AHEAD if rms else 0, len(rms or ()))),
         noise_used=np.zeros(lanes, dtype=np.int64),
         every=every,
@@ -136,25 +118,23 @@ def _rest_shape(pantograph: PantographData) -> Array:
 
 @inlined
 def take_sample(sensors, step, own, sample, lane):
-    """Write a sample of a group, with noise, into its rows."""
+    """Write a lane's sample, with noise, into its rows."""
     count = sensors.driven.shape[1]
     first = READINGS + count * (step // sensors.every - 1)
     for c in range(count):
         sample[c] = own[SENSED[c]]
         if sensors.noise.shape[1] > 0:
-            for i in range(width_of(own)):
-                its = min(lane + i, sensors.noise.shape[0] - 1) & NOT_NEGATIVE
-                time = min(sensors.noise_used[its], sensors.noise.shape[1] - 1) & NOT_NEGATIVE
-                put_number(sample, c, i, number_at(sample, c, i) + sensors.noise[its, time, first + c])
+            time = min(sensors.noise_used[lane], sensors.noise.shape[1] - 1) & NOT_NEGATIVE
+            sample[c] += sensors.noise[lane, time, first + c]
 
 
 @inlined
 def filter_sample(sensors, own, rows):
-    """Estimate the contact force of a group from a sample, and move the filter's state on to the next."""
+    """Estimate a lane's contact force from a sample, and move the filter's state on to the next."""
     size, count = sensors.kept.shape[0], sensors.driven.shape[1]
-    sample, after = rows_from(rows, size), rows_from(rows, size + count + 1)
+    sample, after = rows[size:], rows[size + count + 1 :]
     on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
-    force = 0.0 * on_frame
+    force = 0.0
     for j in range(size):
         force += sensors.force_of_state[j] * rows[j]
     for c in range(count):
@@ -174,9 +154,9 @@ def filter_sample(sensors, own, rows):
 @implements(take_readings, EstimatingArrays)
 def _take_readings(sensors, step, own, readings, lane):
     size, count = sensors.kept.shape[0], sensors.driven.shape[1]
-    rows = columns(own, sensors.table, lane)
+    rows = sensors.table[lane]
     if step % sensors.every == 0:
-        take_sample(sensors, step, own, rows_from(rows, size), lane)
+        take_sample(sensors, step, own, rows[size:], lane)
         filter_sample(sensors, own, rows)
     true = own[ROW.CONTACT_FORCE]
     own[ROW.CONTACT_FORCE] = rows[size + count]

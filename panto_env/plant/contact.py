@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..backend import inlined, larger
+from ..backend import inlined
 
 
 @inlined
@@ -18,4 +18,4 @@ def contact_force(compliance, gap, change, damping, gap_yield, change_yield, low
     """
     damped = compliance * damping
     force = (gap + damped * change) / (compliance + gap_yield + damped * change_yield)
-    return larger(lowest, force)
+    return max(force, lowest)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..backend import columns, inlined
+from ..backend import inlined
 from ..base.arrays import Array
 from .state import ROW
 from .trigonometry import cosine_of_turns, sine_of_turns
@@ -65,7 +65,7 @@ def position_after(run, own, steps, lane):
     """Where the contact point is (m) after so many steps, of which one may be a half."""
     x = own[ROW.STRIDE] * steps
     if run.drift.shape[1] > 0:
-        drift = columns(own, run.drift, lane)
+        drift = run.drift[lane]
         x += drift[0]
         for k in range(1, run.drift.shape[1], 3):
             x += drift[k] * sine_of_turns(drift[k + 1] * steps + drift[k + 2])
@@ -77,7 +77,7 @@ def stride_after(run, own, steps, lane):
     """How far the contact point moves in a step (m), by its speed after so many steps."""
     stride = own[ROW.STRIDE]
     if run.drift.shape[1] > 0:
-        drift = columns(own, run.drift, lane)
+        drift = run.drift[lane]
         for k in range(1, run.drift.shape[1], 3):
             turns = drift[k + 1] * steps + drift[k + 2]
             stride += _TURN * drift[k] * drift[k + 1] * cosine_of_turns(turns)

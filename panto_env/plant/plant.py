@@ -7,17 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..backend import (
-    Lanes,
-    bind,
-    copy_whole,
-    lane_table,
-    lanes_abreast,
-    of_lanes,
-    pack,
-    set_lanes,
-)
-from ..base.arrays import Array
+from ..backend import aligned_zeros, bind, copy_whole, pack
+from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
@@ -29,12 +20,12 @@ from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
-from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples
+from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples, Scratch
 from .step import advance
 
 
 class Plant:
-    """Pantographs on a line, one column per lane; all lanes advance together in one kernel call."""
+    """Pantographs on a line, one row per lane; all lanes advance together in one kernel call."""
 
     def __init__(
         self,
@@ -71,21 +62,22 @@ class Plant:
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         size = 2 * len(pantograph.masses)
-        self.lanes_abreast = abreast = lanes_abreast(self.model.line)
-        self.pantographs = pantographs(size, lanes if varied else 1, abreast)
+        self.pantographs = pantographs(size, lanes if varied else 1)
         actuator = actuator or actuator_settings("ideal")
         self._reflected = actuator.reflected_masses
-        all_lanes = np.arange(lanes if varied else abreast)
-        self.pantographs.set_lanes(all_lanes, pantograph, self.model, self._reflected)
-        self.actuators = actuator.arrays(self.time_step, lanes, abreast)
+        every = np.arange(len(self.pantographs.table))
+        self.pantographs.set_lanes(every, pantograph, self.model, self._reflected)
+        self.actuators = actuator.arrays(self.time_step, lanes)
         waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
-            table=lane_table(Row.STATE + size, lanes, abreast, CONTACTS),
-            waves=lane_table(3 * waves, lanes, abreast),
-            drift=lane_table(DRIFT_ROWS if drifting else 0, lanes, abreast),
+            table=aligned_zeros((CONTACTS, lanes, Row.STATE + size)),
+            command=aligned_zeros((CONTACTS, lanes, len(Place))),
+            scratch=aligned_zeros((CONTACTS, lanes, len(Scratch))),
+            free_state=aligned_zeros((CONTACTS, lanes, size)),
+            waves=aligned_zeros((lanes, 3 * waves)),
+            drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
-        self.run.table[:, :, Row.NOMINAL_FORCE] = 1.0  # of places without a lane: it is divided by
         copy_whole(*self.arrays)
         self._advance: Callable[..., Any] | None = None  # bound to the arrays when it is wanted
 
@@ -98,16 +90,16 @@ class Plant:
         copy_whole(*self.arrays)
 
     def row(self, row: Row) -> Array:
-        """A row of the first contact's in all lanes, (lanes,), a copy."""
-        return of_lanes(self.run.table[0], np.arange(self.lanes))[:, row]
+        """A row of the first contact in all lanes, (lanes,), a copy."""
+        return self.run.table[0, :, row].copy()
 
     def of(self, lane: int, row: Row) -> float:
-        """The same of one lane."""
-        return float(of_lanes(self.run.table[0], lane)[row])
+        """A row of the first contact in one lane."""
+        return float(self.run.table[0, lane, row])
 
     def ahead(self, lanes: Any, steps: Array) -> Array:
         """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
-        return ahead(of_lanes(self.run.drift, lanes), steps)
+        return ahead(self.run.drift[lanes], steps)
 
     def position(self, lane: int, steps: Any) -> Array:
         """Where the train of a lane is (m), (n,), after numbers of steps, (n,), which may be fractions."""
@@ -150,11 +142,11 @@ class Plant:
         waves = np.zeros((len(lanes), run.waves.shape[1]))
         for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
             own_waves[: line.waves.size] = line.waves.ravel()
-        set_lanes(run.waves, lanes, waves)
-        set_lanes(run.drift, lanes, 0.0 if drift is None else drift)
+        run.waves[lanes] = waves
+        run.drift[lanes] = 0.0 if drift is None else drift
         height, wire, spring = self.model.start_point
         heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
-        strip = float(self.pantographs.table[0, Part.STRIP_COMPLIANCE, 0])  # all have the same strips
+        strip = float(self.pantographs.table[0, Part.STRIP_COMPLIANCE])  # all have the same strips
         compliance = strip + wire + spring
         nominal_forces = self.pantograph.nominal_force(speeds)
         if static_forces is not None:
@@ -172,9 +164,8 @@ class Plant:
         table[:, Row.HEAD_HEIGHT] = state[:, 0]
         table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
-        for contact in range(CONTACTS):
-            set_lanes(run.table[contact], lanes, table)
-            set_lanes(self.actuators.table[contact], lanes, 0.0)
+        run.table[:, lanes] = table
+        self.actuators.table[:, lanes] = 0.0
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays of ``rows`` rows for kernels to record in: one more than steps are to be kept."""

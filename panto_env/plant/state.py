@@ -5,13 +5,11 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from ..backend import constants
+from ..backend import NOT_NEGATIVE, constants, inlined
 from ..base.arrays import Array
 
 CONTACTS = 1
 """Contact points per lane: pantographs on one line, each with an axis of its own in all that moves."""
-MAX_STATE = 16
-"""Entries of the state of a pantograph at most: the schema allows eight masses."""
 
 
 class Place(IntEnum):
@@ -22,7 +20,7 @@ class Place(IntEnum):
 
 
 class Row(IntEnum):
-    """Rows of the table of all lanes.
+    """Rows of the table of all lanes, for each contact.
 
     The sample of the last step comes first; each of its values is the mean over the step, so it belongs
     to the middle of the step.
@@ -45,27 +43,25 @@ class Row(IntEnum):
 class Scratch(IntEnum):
     """Rows of what a kernel keeps of a contact during a step."""
 
-    COMMAND = 0  # of the actuators (N), one row per place
-    IRREGULARITY = COMMAND + len(Place)  # of the contact wire's height, at mid-step (m)
-    WIRE_BEFORE = IRREGULARITY + 1  # height of the wire where it is touched, at the step's start (m)
-    WIRE_MIDDLE = IRREGULARITY + 2  # likewise at mid-step, as far as this step's forces don't count (m)
+    IRREGULARITY = 0  # of the contact wire's height, at mid-step (m)
+    WIRE_BEFORE = 1  # height of the wire where it is touched, at the step's start (m)
+    WIRE_MIDDLE = 2  # likewise at mid-step, as far as this step's forces don't count (m)
 
 
 ROW, PLACE, SCRATCH = constants(Row), constants(Place), constants(Scratch)
 SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 """Rows of a sample: the first ones."""
-SCRATCH_ROWS = int(Scratch.WIRE_MIDDLE) + 1
-"""Rows of ``Scratch`` for each contact."""
-ALL_SCRATCH_ROWS, ALL_FREE_ROWS = CONTACTS * SCRATCH_ROWS, CONTACTS * MAX_STATE
-"""Of all contacts, and of their states as they would be at the end of the step without contact force."""
 
 
 class Run(NamedTuple):
     """Where each lane is on its line, its pantographs' motion, and their contacts."""
 
-    table: Array  # (contacts, groups, STATE + 2n, lanes abreast): the rows above
-    waves: Array  # (groups, 3 waves, lanes abreast): irregularity, each as a ``Wave``
-    drift: Array  # (groups, DRIFT_ROWS, lanes abreast): of the speed; no rows where it is constant
+    table: Array  # (contacts, lanes, STATE + 2n): the rows above
+    command: Array  # (contacts, lanes, places): of the actuators (N)
+    scratch: Array  # (contacts, lanes, rows of ``Scratch``)
+    free_state: Array  # (contacts, lanes, 2n): at the step's end, without the contact force
+    waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
+    drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 
@@ -75,3 +71,9 @@ class Samples(NamedTuple):
     rows: Array  # (lanes, steps, contacts, SAMPLE_ROWS); step 0 is the start
     uplift: Array  # (lanes, steps, supports): of the contact wire at the end of the step (m)
     tension: Array  # (lanes, steps, droppers): mean over the step (N)
+
+
+@inlined
+def own_row(table, lane):
+    """Row of a lane in a table of one row for all lanes or one per lane."""
+    return min(lane, table.shape[0] - 1) & NOT_NEGATIVE

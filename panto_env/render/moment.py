@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..backend import of_lanes
 from ..base.arrays import Array
 from ..control import Task
 from ..metrics import en50367
@@ -77,7 +76,7 @@ def felt(task: Task, lane: int, behind: float) -> Felt:
 def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Moment:
     """What a lane of a task that keeps its samples is doing now."""
     plant = task.plant
-    own = of_lanes(plant.run.table[0], lane)
+    own = plant.run.table[0, lane]
     speed, position = float(task.speed[lane]), position_of(task, lane)
     span = plant.alignment.mean_length
     contact = felt(task, lane, BEHIND)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backend import of_lanes
 from ..base.errors import InputError
 from ..control import Task
 from ..control.state import TaskRow
@@ -55,7 +54,7 @@ class Viewer:
 
 def figures_so_far(task: Task, lane: int) -> dict[str, str]:
     """Figures of a lane's episode so far, in words; none before its first step, or once it has diverged."""
-    if not of_lanes(task.episode.table, lane)[TaskRow.SAMPLES]:
+    if not task.episode.table[lane, TaskRow.SAMPLES]:
         return {}
     try:
         values = task.figures(lane).as_dict()

@@ -60,7 +60,7 @@ LINES = """
 import warnings
 import sys
 sys.path.insert(0, {root!r})
-from ..plant.test_nonsense import case_of, scaled
+from tests.plant.test_nonsense import case_of, scaled
 from panto_env import InputError, simulate
 ways = {{"finite": 0, "refused": 0}}
 for seed in range(40):

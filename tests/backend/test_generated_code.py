@@ -1,6 +1,5 @@
 """The loops that the speed rests on became vector instructions."""
 
-import json
 import os
 import platform
 import re
@@ -16,13 +15,10 @@ import panto_env
 PACKAGE = Path(panto_env.__file__).parent
 # Numba can't show the code of kernels that it read from disk, so a fresh process compiles them anew.
 CODE = """
-import json, sys
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.control.step import control_steps
-settings = json.loads(sys.argv[1])
-lanes = settings.pop("lanes", 1)
-Task(run_settings(settings), lanes=lanes)
+Task(run_settings({}))
 (assembly,) = control_steps.inspect_asm().values()
 print(assembly)
 """
@@ -36,22 +32,17 @@ pytestmark = [
 ]
 
 
-def assembly(settings, cache):
-    """The control step, compiled anew."""
+def loops(cache):
+    """Innermost loops of the control step, compiled anew: blocks that jump back to their own label."""
     environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent), "PANTO_CACHE_DIR": str(cache)}
     result = subprocess.run(
-        [sys.executable, "-c", CODE, json.dumps(settings)],
+        [sys.executable, "-c", CODE],
         capture_output=True,
         text=True,
         env=environment,
         check=True,
     )
-    return result.stdout
-
-
-def loops(settings, cache):
-    """Bodies of the innermost loops of the control step: blocks that jump back to their own label."""
-    blocks = re.split(r"^(\.LBB\w+):", assembly(settings, cache), flags=re.MULTILINE)
+    blocks = re.split(r"^(\.LBB\w+):", result.stdout, flags=re.MULTILINE)
     return [
         body
         for label, body in zip(blocks[1::2], blocks[2::2], strict=True)
@@ -68,18 +59,7 @@ def test_sweep_of_the_flexible_wires_is_vectorised(tmp_path):
     """The stencil: five differences, and multiply-adds; with and without masses on the wire."""
     sweeps = [
         body
-        for body in loops({}, tmp_path)
+        for body in loops(tmp_path)
         if packed(body, "vsubps") >= 5 and packed(body, r"vfn?madd\w+ps") >= 2
     ]
     assert len(sweeps) >= 2
-
-
-def test_lanes_under_a_massless_line_share_vector_instructions(tmp_path):
-    """Contact, stiffness, pantograph, actuators, sums and reward: all that is computed."""
-    settings = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "lanes": 64}
-    code = assembly(settings, tmp_path)
-    shared = packed(code, r"v(add|sub|mul|div|min|max|fn?m(add|sub)\w+)pd")
-    alone = len(re.findall(r"^\s+v(add|sub|mul|div|min|max|fn?m(add|sub)\w+)sd\s", code, re.MULTILINE))
-    assert packed(code, "vdivpd") >= 4
-    assert shared > 300
-    assert alone < shared / 5  # the noise of sensors, lane by lane; uplift

@@ -43,8 +43,8 @@ def test_edit_of_any_kernel_source_is_seen_and_no_edit_compiles_nothing(tmp_path
     # The contact law lies in another file than the kernel that is kept on disk.
     law = tmp_path / "panto_env" / "plant" / "contact.py"
     source = law.read_text()
-    assert "return larger(lowest, force)" in source
-    law.write_text(source.replace("(lowest, force)", "(lowest, 2.0 * force)"))
+    assert "return max(force, lowest)" in source
+    law.write_text(source.replace("max(force, lowest)", "max(2.0 * force, lowest)"))
     hits, total = run(tmp_path, cache)
     assert hits == 0
     assert abs(total - first[1]) > 1.0

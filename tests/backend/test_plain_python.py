@@ -66,7 +66,7 @@ def passive_run():
     return [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
 
 
-def lanes_abreast():
+def several_lanes():
     """Observations and rewards of four lanes that end apart, each then idle for a step."""
     envs = gymnasium.make_vec(
         "PantographStiffness-v0", num_envs=4, speed_kmh=(200, 300), distance=12.0, line_condition="worn"
@@ -83,7 +83,7 @@ def lanes_abreast():
 RUNS = {
     **{name: partial(observations, name) for name in CASES},
     "a window that moves along a line": passive_run,
-    "lanes abreast": lanes_abreast,
+    "several lanes": several_lanes,
 }
 
 

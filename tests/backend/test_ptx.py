@@ -8,7 +8,7 @@ from panto_env.backend.ptx import ptx_of
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.contact import contact_force
 from panto_env.plant.plant import Plant
-from panto_env.plant.step import new_scratch, step_group
+from panto_env.plant.step import step_lane
 
 LINES = {"en50318-2002": "en50318-2002", "ohl-three-span": "dsa350", "periodic-stiffness": "three-mass"}
 
@@ -21,10 +21,6 @@ def test_contact_law():
     assert "fma.rn.f64" in ptx_of(contact_force, *[1.0] * 7)
 
 
-def one_step(line, wire, pantographs, actuators, run):
-    step_group(line, wire, pantographs, actuators, run, new_scratch(line), 0)
-
-
 @pytest.mark.parametrize("line", LINES)
 def test_whole_step(line):
-    assert "fma.rn.f64" in ptx_of(one_step, *plant(line).arrays)
+    assert "fma.rn.f64" in ptx_of(step_lane, *plant(line).arrays, 0)

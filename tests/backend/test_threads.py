@@ -28,7 +28,7 @@ from panto_env.base.machine import cores
 
 pytestmark = pytest.mark.skipif(not JIT, reason="plain Python has but one thread")
 
-LANES, ABREAST = 1001, 7
+LANES = 1001
 
 
 @kernel
@@ -59,7 +59,7 @@ class Batch:
     def __init__(self, cost, threads=3):
         shares, self.add = new_shares(), np.zeros(1)
         call = functools.partial(mark, shares, cost, self.add)
-        self.threads = LaneThreads(call, LANES, ABREAST, shares, threads)
+        self.threads = LaneThreads(call, LANES, shares, threads)
 
     def step(self, steps=1):
         """What was done, and by whom, in arrays of this step."""

@@ -166,7 +166,7 @@ def test_measured_observation_is_the_beginning_of_the_full_one():
 def test_entries_are_clipped_to_ten_of_their_scales(sign):
     env = gymnasium.make("panto_env:PantographStiffness-v0", bilateral=True).unwrapped
     env.reset(seed=0)
-    env.task.plant.run.table[0, 0, Row.CONTACT_FORCE, 0] = sign * 3000.0
+    env.task.plant.run.table[0, 0, Row.CONTACT_FORCE] = sign * 3000.0
     env.task.observe_start(np.array([0]), env.task.results)
     observation = env.task.results.observation[0]
     force = observation[env.context.layout.index("contact force")]

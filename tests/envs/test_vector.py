@@ -5,7 +5,6 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import ClipAction, NormalizeObservation, RecordEpisodeStatistics
 
 from panto_env import InputError
-from panto_env.backend import of_lanes
 from panto_env.envs import BARE, IDS
 from panto_env.plant.state import Row
 
@@ -208,8 +207,8 @@ def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
             np.testing.assert_array_equal(observations[lane], seen)
             assert rewards[lane] == reward
     plant = env.unwrapped.task.plant
-    assert len({own.tobytes() for own in of_lanes(plant.pantographs.table, np.arange(5))}) == 5
-    amplitudes = of_lanes(plant.run.waves, np.arange(5))[:, ::3]
+    assert len({own.tobytes() for own in plant.pantographs.table}) == 5
+    amplitudes = plant.run.waves[:, ::3]
     assert set(np.count_nonzero(amplitudes, axis=1)) == {0, 4}
 
 

@@ -24,7 +24,7 @@ def readings(task, steps, seed=0):
     task.reset(np.arange(task.lanes), np.random.default_rng(seed))
     place, seen = task.layout.index("contact force"), []
     for _ in range(steps + 1):
-        seen.append(float(task.results.entries[place, 0]) * task.layout.entries[place].scale)
+        seen.append(float(task.results.observation[0, place]) * task.layout.entries[place].scale)
         task.step(np.zeros((task.lanes, len(task.actuator.places))))
     return np.array(seen)
 

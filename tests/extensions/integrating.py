@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import columns, implements, lane_table
+from ...backend import implements
 from ...base.ranges import Between
 from ..state import CONTACTS, ROW, Place
 from .base import ActuatorSettings, drive
@@ -19,8 +19,8 @@ class IntegratingActuator(ActuatorSettings):
         0.1, description="time in which the full command is reached (s)"
     )
 
-    def arrays(self, time_step, lanes, abreast):
-        table = lane_table(len(Place), lanes, abreast, CONTACTS)
+    def arrays(self, time_step, lanes):
+        table = np.zeros((CONTACTS, lanes, len(Place)))
         return IntegratingArrays(table, time_step / self.time)
 
 
@@ -28,13 +28,13 @@ KIND = IntegratingActuator
 
 
 class IntegratingArrays(NamedTuple):
-    table: np.ndarray  # (contacts, groups, places, lanes abreast): force that the motor has wound up (N)
+    table: np.ndarray  # (contacts, lanes, places): force that the motor has wound up (N)
     share: float  # of the command, per step
 
 
 @implements(drive, IntegratingArrays)
 def _drive(actuators, pantographs, contact, own, command, lane):
-    turned = columns(own, actuators.table[contact], lane)
-    for place in range(actuators.table.shape[2]):
+    turned = actuators.table[contact, lane]
+    for place in range(turned.size):
         turned[place] += actuators.share * command[place]
         own[ROW.FRAME_FORCE + place] = turned[place]

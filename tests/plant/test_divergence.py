@@ -22,7 +22,7 @@ def test_an_episode_that_is_no_longer_finite_ends(name, row, value):
     env.reset(seed=0)
     env.step(np.zeros(1, dtype=np.float32))
     task = env.unwrapped.task
-    task.plant.run.table[0, 0, row, 0] = value
+    task.plant.run.table[0, 0, row] = value
     with pytest.warns(AccuracyWarning, match="diverged, so it has no result"):
         seen, reward, terminated, truncated, info = env.step(np.zeros(1, dtype=np.float32))
     assert (terminated, truncated) == (True, False)
@@ -44,8 +44,7 @@ def test_the_other_lanes_go_on(name):
     envs = [gymnasium.make_vec(f"panto_env:{name}", num_envs=5) for _ in range(2)]
     for each in envs:
         each.reset(seed=0)
-    task, abreast = envs[0].unwrapped.task, envs[0].unwrapped.task.plant.lanes_abreast
-    task.plant.run.table[0, 2 // abreast, Row.STATE, 2 % abreast] = np.nan
+    envs[0].unwrapped.task.plant.run.table[0, 2, Row.STATE] = np.nan
     actions = np.zeros(envs[0].action_space.shape, dtype=np.float32)
     with pytest.warns(AccuracyWarning, match="diverged"):
         told = envs[0].step(actions)

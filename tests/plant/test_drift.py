@@ -61,7 +61,7 @@ def test_the_kernel_s_train_is_where_python_s_is():
         ended = any(ends)
     task, run = env.task, env.trajectory
     steps = task.length.control_steps * np.arange(1, len(positions) + 1)
-    row = task.plant.run.drift[0, :, 0]
+    row = task.plant.run.drift[0]
     times = steps * task.plant.time_step
     expected = 200 / 3.6 * times + ahead(row[None], steps[None])[0]
     np.testing.assert_allclose(positions, expected, atol=1e-9)

@@ -67,7 +67,7 @@ class Bench:
         self.rig = Rig(motor, mass, stiffness, damping, HOLDING, self.wire)
 
     def state(self):
-        return self.plant.run.table[0, 0, Row.STATE : Row.STATE + 2, 0].copy()
+        return self.plant.run.table[0, 0, Row.STATE : Row.STATE + 2].copy()
 
     def run(self, forces, interval):
         """Height, speed, current of each motor, and force, after each time step."""
@@ -78,7 +78,7 @@ class Bench:
             command = np.array([[[0.0, force]]])
             for _ in range(round(interval / self.step)):
                 self.plant.advance(command, 1, samples)
-                current = self.plant.actuators.table[0, 0, place, 0] / per_ampere
+                current = self.plant.actuators.table[0, 0, place] / per_ampere
                 rows.append([*self.state(), current, self.plant.of(0, Row.HEAD_FORCE)])
         return np.array(rows)
 
@@ -180,7 +180,7 @@ def test_a_motor_that_turns_back_crosses_its_play_as_long_as_the_continuous_one(
     teeth = motor.motors * motor.gear_stiffness / motor.arm_length**2
     assert ours[-1, 3] == pytest.approx(-50.0, abs=0.2)
     assert ahead[-1] == pytest.approx(-play - 50 / teeth, abs=1e-5)
-    assert bench.plant.actuators.table[0, 0, len(MotorRow) + MotorRow.GAP, 0] == pytest.approx(
+    assert bench.plant.actuators.table[0, 0, len(MotorRow) + MotorRow.GAP] == pytest.approx(
         ahead[-1], abs=1e-5
     )
 
@@ -330,7 +330,7 @@ def test_power_is_refused_where_it_cannot_be_told():
 
 
 @pytest.mark.parametrize("changes", [{"backlash": 0.0}, {"backlash": 0.014}])
-def test_lanes_abreast_are_single_environments(changes):
+def test_lanes_of_a_batch_are_single_environments(changes):
     """With motors at both places, and pantographs that differ."""
     settings = {
         "actuator": {"kind": "motor", "place": "both", **changes},

@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from panto_env import simulate
-from panto_env.backend import JIT, columns, kernel, new_columns
+from panto_env.backend import JIT, kernel
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.pantograph import build as pantograph
@@ -80,9 +80,9 @@ def test_scatter_is_of_its_size_and_leaves_nothing_out():
 
 
 @kernel
-def swing(line, pantographs, run, heights):
+def swing(pantographs, run, heights):
     """Free motion of a pantograph of one mass, from where it is."""
-    own, after = columns(line, run.table[0], 0), new_columns(line, 2)
+    own, after = run.table[0, 0], run.free_state[0, 0]
     for k in range(heights.size):
         move_freely(pantographs, own, after, 0)
         own[ROW.STATE] = after[0]
@@ -97,10 +97,10 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
     data = load_pantograph("dsa350").model_copy(update=changed | {"static_force": 0.0})
     plant = Plant(load_catenary("en50318-2002"), data, numerics=Numerics(time_step=2e-4, window=3))
     plant.start(0, 50.0)
-    line, _, pantographs, _, run = plant.arrays
-    run.table[0, 0, Row.STATE :, 0] = 0.02, 0.0
+    _, _, pantographs, _, run = plant.arrays
+    run.table[0, 0, Row.STATE :] = 0.02, 0.0
     height = np.zeros(6000 if JIT else 1500)
-    swing(line, pantographs, run, height)
+    swing(pantographs, run, height)
     up = np.diff(height) > 0
     turns = np.abs([0.02, *height[1:-1][up[1:] != up[:-1]]])
     assert -np.diff(turns[:3]) == pytest.approx(2 * friction / spring, rel=0.02)

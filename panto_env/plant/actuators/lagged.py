@@ -7,17 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import (
-    choose,
-    columns,
-    implements,
-    inlined,
-    lane_table,
-    larger,
-    magnitude,
-    rows_from,
-    smaller,
-)
+from ...backend import aligned_zeros, implements, inlined
 from ...base.arrays import Array, Index
 from ...base.ranges import Between
 from ..state import CONTACTS, ROW, Place
@@ -38,15 +28,15 @@ class LaggedActuator(ActuatorSettings):
         None, description="largest change of force (N/s)"
     )
 
-    def arrays(self, time_step: float, lanes: int, abreast: int) -> LaggedArrays:
-        """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
+    def arrays(self, time_step: float, lanes: int) -> LaggedArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
         steps = int(self.delay / time_step + 1e-6)
         late = max(self.delay / time_step - steps, 0.0)
         late = 0.0 if late < 1e-6 else late
         share = 1.0 if self.lag == 0 else 1.0 - np.exp(-time_step / self.lag)
         rate = np.inf if self.rate_limit is None else self.rate_limit * time_step
         return LaggedArrays(
-            table=lane_table(_PLACES * (1 + steps + (late > 0)), lanes, abreast, CONTACTS),
+            table=aligned_zeros((CONTACTS, lanes, _PLACES * (1 + steps + (late > 0)))),
             late=late,
             share=share,
             mean=1.0 if self.lag == 0 else 1.0 / share - self.lag / time_step,
@@ -65,7 +55,7 @@ class LaggedArrays(NamedTuple):
     commands on their way, the next to arrive first, likewise (N).
     """
 
-    table: Array  # (contacts, groups, places (1 + delay), lanes abreast)
+    table: Array  # (contacts, lanes, places (1 + delay))
     late: float  # share of a step before the next one arrives: the delay's part that is no whole step
     share: float  # of the way to the command that is gone in one step
     mean: float  # share of the way gone that the step's mean force has gone
@@ -90,15 +80,14 @@ def arriving(actuators, pending, command, place):
 
 @implements(drive, LaggedArrays)
 def _drive(actuators, pantographs, contact, own, command, lane):
-    reached = columns(own, actuators.table[contact], lane)
+    reached = actuators.table[contact, lane]
     for place in actuators.places:
         asked = command[place]
         if actuators.table.shape[2] > _PLACES:
-            asked = arriving(actuators, rows_from(reached, _PLACES), command, place)
-        target = smaller(larger(asked, -actuators.limit), actuators.limit)
+            asked = arriving(actuators, reached[_PLACES:], command, place)
+        target = min(actuators.limit, max(-actuators.limit, asked))
         wanted = actuators.share * (target - reached[place])
-        change = smaller(larger(wanted, -actuators.rate), actuators.rate)
-        gone = actuators.mean - actuators.ramp * magnitude(change)
-        gone = choose(magnitude(wanted) > actuators.rate, 0.5, gone)
+        change = min(actuators.rate, max(-actuators.rate, wanted))
+        gone = 0.5 if abs(wanted) > actuators.rate else actuators.mean - actuators.ramp * abs(change)
         own[ROW.FRAME_FORCE + place] = reached[place] + gone * change
         reached[place] += change

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...backend import Lanes, lane_table, set_lanes
-from ...base.arrays import Array
+from ...backend import aligned_zeros
+from ...base.arrays import Array, Lanes
 from ..catenary.protocol import CatenaryModel
 from .schema import PantographData
 from .step import Part
@@ -35,7 +35,7 @@ class Pantographs(NamedTuple):
     """
 
     size: int  # 2n: entries of the state
-    table: Array  # (groups, rows of ``Part``, lanes abreast); one group for all lanes where they are alike
+    table: Array  # (lanes, rows of ``Part``); one row for all lanes where they are alike
 
     def set_lanes(
         self,
@@ -44,8 +44,8 @@ class Pantographs(NamedTuple):
         catenary: CatenaryModel,
         reflected: ReflectedMasses = NONE_REFLECTED,
     ) -> None:
-        """Make those of some lanes, of the only group where all are alike, this one."""
-        set_lanes(self.table, lanes, parts(pantograph, catenary, reflected))
+        """Make those of some lanes this one."""
+        self.table[lanes] = parts(pantograph, catenary, reflected)
 
 
 def parts(
@@ -64,9 +64,9 @@ def parts(
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 
-def pantographs(size: int, lanes: int, abreast: int) -> Pantographs:
+def pantographs(size: int, lanes: int) -> Pantographs:
     """Arrays for the pantographs of ``lanes`` lanes, of ``size`` entries of state each, all zero."""
-    return Pantographs(size, lane_table(Part.CONTACT_INPUT + 3 * size + size**2, lanes, abreast))
+    return Pantographs(size, aligned_zeros((lanes, Part.CONTACT_INPUT + 3 * size + size**2)))
 
 
 def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:

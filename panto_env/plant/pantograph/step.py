@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ...backend import any_of, columns, constants, inlined, larger, rows_from, smaller
-from ..state import PLACE, ROW
+from ...backend import constants, inlined
+from ..state import PLACE, ROW, own_row
 
 
 class Part(IntEnum):
@@ -30,16 +30,16 @@ PART = constants(Part)
 def rub(frame_input, friction, free_state, size):
     """Hold the frame by dry friction (N): at rest by as much as that takes, in motion by all of it."""
     stopping = free_state[size - 1] / frame_input[size - 1]
-    force = -smaller(larger(stopping, -friction), friction)
+    force = -min(friction, max(-friction, stopping))
     for r in range(size):
         free_state[r] = free_state[r] + frame_input[r] * force
 
 
 @inlined
 def free_value(pantographs, own, parts, r, on_frame, on_head):
-    """Entry ``r`` of the state of a group after a step, the contact force as in the step before."""
-    size, state = pantographs.size, rows_from(own, ROW.STATE)
-    row = rows_from(parts, PART.CONTACT_INPUT + 3 * size + r * size)
+    """Entry ``r`` of a lane's state after a step, the contact force as in the step before."""
+    size, state = pantographs.size, own[ROW.STATE :]
+    row = parts[PART.CONTACT_INPUT + 3 * size + r * size :]
     total = parts[PART.CONTACT_INPUT + r] * own[ROW.CONTACT_FORCE]
     total += parts[PART.CONTACT_INPUT + size + r] * on_frame
     total += parts[PART.CONTACT_INPUT + 2 * size + r] * on_head
@@ -56,8 +56,8 @@ def move_apart(pantographs, own, place, first, lane):
     the step's start; at its end, the contact force as in the step before; and what 1 N of the actuator, held
     over the step, adds to it at the end.
     """
-    size, parts = pantographs.size, columns(own, pantographs.table, lane)
-    on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0 * own[ROW.HEAD_FORCE]
+    size, parts = pantographs.size, pantographs.table[own_row(pantographs.table, lane)]
+    on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0
     upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
         upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
@@ -75,29 +75,33 @@ def move_apart(pantographs, own, place, first, lane):
 
 @inlined
 def move_freely(pantographs, own, free_state, lane):
-    """State of a group after a step without contact force, into ``free_state``."""
-    size, parts = pantographs.size, columns(own, pantographs.table, lane)
-    frame_input = rows_from(parts, PART.CONTACT_INPUT + size)
-    head_input = rows_from(parts, PART.CONTACT_INPUT + 2 * size)
-    transition, state = rows_from(parts, PART.CONTACT_INPUT + 3 * size), rows_from(own, ROW.STATE)
+    """State of a lane's pantograph after a step without contact force, into ``free_state``."""
+    size, parts = pantographs.size, pantographs.table[own_row(pantographs.table, lane)]
+    frame_input = parts[PART.CONTACT_INPUT + size :]
+    head_input = parts[PART.CONTACT_INPUT + 2 * size :]
+    transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
     on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
     for r in range(0, size, 2):  # in pairs, that a processor has more to do at once
         total = frame_input[r] * on_frame + head_input[r] * on_head
         other = frame_input[r + 1] * on_frame + head_input[r + 1] * on_head
-        first, second = rows_from(transition, r * size), rows_from(transition, (r + 1) * size)
+        first, second = transition[r * size :], transition[(r + 1) * size :]
         for j in range(size):
             total += first[j] * state[j]
             other += second[j] * state[j]
         free_state[r] = total
         free_state[r + 1] = other
-    if any_of(parts[PART.FRAME_FRICTION] > 0.0):
+    if parts[PART.FRAME_FRICTION] > 0.0:
         rub(frame_input, parts[PART.FRAME_FRICTION], free_state, size)
 
 
 @inlined
 def add_contact_force(pantographs, own, free_state, lane):
     """End the step: the free motion and what the contact force adds to it."""
-    contact_input = rows_from(columns(own, pantographs.table, lane), PART.CONTACT_INPUT)
-    state, force = rows_from(own, ROW.STATE), own[ROW.CONTACT_FORCE]
+    parts, state, force = (
+        pantographs.table[own_row(pantographs.table, lane)],
+        own[ROW.STATE :],
+        own[ROW.CONTACT_FORCE],
+    )
+    contact_input = parts[PART.CONTACT_INPUT :]
     for r in range(pantographs.size):
         state[r] = free_state[r] + contact_input[r] * force

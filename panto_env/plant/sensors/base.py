@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from enum import IntEnum
 from typing import Any, Protocol
 
-from ...backend import Lanes, constants, operation
-from ...base.arrays import Array, Index
+from ...backend import constants, operation
+from ...base.arrays import Array, Index, Lanes
 from ...base.settings import Settings
 from .odometer import OdometerErrors
 
@@ -27,10 +27,6 @@ READING = constants(Reading)
 
 class SensorArrays(Protocol):
     """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
-
-    @property
-    def tables(self) -> tuple[Array, ...]:
-        """All that changes but the noise, each (groups, rows, lanes abreast)."""
 
     @property
     def noise(self) -> Array:
@@ -58,18 +54,16 @@ class SensorSettings(Settings, ABC):
         return OdometerErrors()
 
     @abstractmethod
-    def arrays(self, time_step: float, control_steps: int, lanes: int, abreast: int) -> SensorArrays:
-        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step;
-        abreast: lanes of a group.
-        """
+    def arrays(self, time_step: float, control_steps: int, lanes: int) -> SensorArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
 
 
 @operation
 def take_readings(sensors: Any, step: int, own: Any, readings: Any, lane: int) -> None:
-    """What the sensors read after plant step ``step`` of a control step, counted from 1, without noise.
+    """What a lane's sensors read after plant step ``step`` of a control step, counted from 1, without noise.
 
-    Of the group of lanes that begins at ``lane``: own: its rows of ``Row``, at the end of the step.
-    readings: its rows of ``Reading``, written to at least once in each control step.
+    own: the lane's rows of ``Row``, at the end of the step. readings: its rows of ``Reading``, written to at
+    least once in each control step.
     """
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ...backend import Lanes, columns, implements, inlined, lane_table, rows_from, set_lanes
-from ...base.arrays import Array, Index
+from ...backend import aligned_zeros, implements, inlined
+from ...base.arrays import Array, Index, Lanes
 from ...base.ranges import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
@@ -67,17 +67,15 @@ class DelayedSensors(SensorSettings):
         rms = (displacement, displacement, velocity, velocity, self.force_noise)
         return rms if any(rms) else None
 
-    def arrays(self, time_step: float, control_steps: int, lanes: int, abreast: int) -> DelayedArrays:
-        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step;
-        abreast: lanes of a group.
-        """
+    def arrays(self, time_step: float, control_steps: int, lanes: int) -> DelayedArrays:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
         # A sample is a mean over its step, so half a step old when that ends; between two it is interpolated.
         age = max(self.delay / time_step - 0.5, 0.0)
         late = age - int(age + 1e-6)
         whole, rest = divmod(int(age + 1e-6), control_steps)
         read_at = control_steps - rest
         return DelayedArrays(
-            table=lane_table(_READINGS * (1 + whole), lanes, abreast),
+            table=aligned_zeros((lanes, _READINGS * (1 + whole))),
             read_at=read_at,
             older_at=read_at - 1 if read_at > 1 else control_steps,
             older_share=0.0 if late < 1e-6 else late,
@@ -94,30 +92,24 @@ class DelayedArrays(NamedTuple):
     way, the next to arrive first, one control step after the other.
     """
 
-    table: Array  # (groups, readings (1 + control steps), lanes abreast)
+    table: Array  # (lanes, readings (1 + control steps))
     read_at: int  # plant step of a control step whose sample is read, counted from 1
     older_at: int  # plant step whose sample, the one before, is read too
     older_share: float  # weight of that
     noise: Array  # (lanes, times, readings): of the next readings, in their units; no times for none
     noise_used: Index  # (lanes,): how many of them have been used
 
-    @property
-    def tables(self) -> tuple[Array, ...]:
-        """All that changes but the noise."""
-        return (self.table,)
-
     def reset(self, lanes: Lanes, samples: Array) -> None:
         """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
-        past = np.tile(samples[..., list(SENSED)], self.table.shape[1] // _READINGS)
-        set_lanes(self.table, lanes, past)
+        self.table[lanes] = np.tile(samples[..., list(SENSED)], self.table.shape[1] // _READINGS)
 
 
 @inlined
 def read(sensors, own, readings, lane):
     """Take the reading that arrives in this control step, and send off the one taken now."""
     rows, share = sensors.table.shape[1] - _READINGS, sensors.older_share
-    older = columns(own, sensors.table, lane)
-    past = rows_from(older, _READINGS)
+    older = sensors.table[lane]
+    past = older[_READINGS:]
     for k in range(_READINGS):
         taken = own[_SENSED[k]]
         if share > 0.0:
@@ -136,7 +128,7 @@ def _take_readings(sensors, step, own, readings, lane):
     if step == sensors.read_at:
         read(sensors, own, readings, lane)
     if step == sensors.older_at and sensors.older_share > 0.0:
-        older = columns(own, sensors.table, lane)
+        older = sensors.table[lane]
         for k in range(_READINGS):
             older[k] = own[_SENSED[k]]
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...backend import NOT_NEGATIVE, constants, inlined, number_at, put_number, width_of
+from ...backend import NOT_NEGATIVE, constants, inlined
 from ...base.arrays import Array, Index
 from .noise import AHEAD, Noise
 
@@ -103,23 +103,16 @@ class Odometers:
 
 
 @inlined
-def read_odometer(odometer, idle, spans, speed, lane):
-    """Replace the true position (spans) and speed (m/s) of a group, one row each, by what is read of them, in
-    each of its lanes that is not idle.
-    """
-    for i in range(width_of(spans)):
-        its = (lane + i) & NOT_NEGATIVE
-        if not idle[its]:
-            own = odometer.table[its]
-            noise = odometer.noise[its, odometer.noise_used[its] & NOT_NEGATIVE]
-            true = number_at(spans, 0, i)
-            since = true - own[ROW.SPANS]
-            if math.floor(true) > own[ROW.MAST]:
-                own[ROW.MAST] = math.floor(true)
-                own[ROW.ERROR] = noise[NOISE.MAST]
-                since = true - own[ROW.MAST]
-            own[ROW.SPANS] = true
-            own[ROW.ERROR] += own[ROW.SCALE] * since + math.sqrt(max(since, 0.0)) * noise[NOISE.WALK]
-            put_number(spans, 0, i, true + own[ROW.ERROR])
-            put_number(speed, 0, i, number_at(speed, 0, i) * (1.0 + own[ROW.SCALE]) + noise[NOISE.SPEED])
-            odometer.noise_used[its] += 1
+def read_odometer(odometer, true, speed, lane):
+    """What a lane's odometer reads at a true position (spans) and speed (m/s): position and speed."""
+    own = odometer.table[lane]
+    noise = odometer.noise[lane, odometer.noise_used[lane] & NOT_NEGATIVE]
+    since = true - own[ROW.SPANS]
+    if math.floor(true) > own[ROW.MAST]:
+        own[ROW.MAST] = math.floor(true)
+        own[ROW.ERROR] = noise[NOISE.MAST]
+        since = true - own[ROW.MAST]
+    own[ROW.SPANS] = true
+    own[ROW.ERROR] += own[ROW.SCALE] * since + math.sqrt(max(since, 0.0)) * noise[NOISE.WALK]
+    odometer.noise_used[lane] += 1
+    return true + own[ROW.ERROR], speed * (1.0 + own[ROW.SCALE]) + noise[NOISE.SPEED]

@@ -15,7 +15,9 @@ side of the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
 
 from __future__ import annotations
 
-from ....backend import choose, inlined, larger, magnitude, root, smaller
+import math
+
+from ....backend import inlined
 
 SMALL = 1e-9
 """Force (N) below which a difference from the bound is none."""
@@ -37,7 +39,7 @@ def age(left, halvings):
     """-log(left) of a share left, above 0: the series of atanh at its 2^halvings-th root."""
     y = left
     for _ in range(halvings):
-        y = root(y)
+        y = math.sqrt(y)
     z = (1.0 - y) / (1.0 + y)
     square = z * z
     series = 1.0 + square * (1 / 3 + square * (1 / 5 + square * (1 / 7 + square * (1 / 9))))
@@ -47,7 +49,7 @@ def age(left, halvings):
 @inlined
 def clip(x, lowest, highest):
     """The value within two bounds."""
-    return smaller(larger(x, lowest), highest)
+    return min(highest, max(lowest, x))
 
 
 @inlined
@@ -65,22 +67,23 @@ def follow(motors, force, wanted, coasting, gain):
     drop = drop + damping * old * force
     highest, lowest = (motors.stall_force - drop) * yielding, (-motors.stall_force - drop) * yielding
     target = clip(wanted, lowest, highest)
-    bound = choose(target >= force, highest, lowest)
+    bound = highest if target >= force else lowest
     turn = (lead * target - bound) * (1.0 / (lead - 1.0))
-    turn = choose(target >= force, larger(turn, force), smaller(turn, force))
+    turn = max(force, turn) if target >= force else min(force, turn)
     # At the largest voltage, towards the bound, until the turn or the end of the step.
     away = force - bound
-    there = magnitude(away) < SMALL
-    left = choose(there, 1.0, (turn - bound) / choose(there, 1.0, away))
-    whole = left <= motors.armature_left
-    left = choose(whole, motors.armature_left, left)
-    saturated = choose(whole, step, lag * age(left, motors.age_halvings))
+    left = 1.0 if abs(away) < SMALL else (turn - bound) / away
+    saturated = step
+    if left <= motors.armature_left:
+        left = motors.armature_left
+    else:
+        saturated = lag * age(left, motors.age_halvings)
     reached = bound + left * away
     gone = lag * (1.0 - left)
     impulse = bound * saturated + gone * away
     square = bound * bound * saturated + gone * away * (2.0 * bound + 0.5 * away * (1.0 + left))
     # Then below it, towards the reference.
-    rest = larger(step - saturated, 0.0)
+    rest = max(0.0, step - saturated)
     last = decay(rate * rest, motors.decay_halvings)
     away = reached - target
     gone = (1.0 - last) * (1.0 / rate)

@@ -162,6 +162,6 @@ class MotorActuator(ActuatorSettings):
         fixed = 0.0 if self.backlash > 0 else self.reflected_mass
         return tuple(fixed if place in self.places else 0.0 for place in (0, 1))  # type: ignore[return-value]
 
-    def arrays(self, time_step: float, lanes: int, abreast: int) -> MotorArrays:
-        """Actuators of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
-        return motor_arrays(self, time_step, lanes, abreast)
+    def arrays(self, time_step: float, lanes: int) -> MotorArrays:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
+        return motor_arrays(self, time_step, lanes)

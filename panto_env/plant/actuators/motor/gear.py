@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....backend import inlined, magnitude
+from ....backend import inlined
 from ...contact import contact_force
 from .current import clip
 
@@ -15,7 +15,7 @@ def friction(motors, load, stopping):
     efficiency's share of its torque, and a load that drives it has as much more to overcome. It sticks where
     it is larger than what would stop the motion.
     """
-    most = motors.dry_friction + motors.lost_share * magnitude(load)
+    most = motors.dry_friction + motors.lost_share * abs(load)
     return clip(stopping, -most, most)
 
 

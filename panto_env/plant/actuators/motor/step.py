@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....backend import Lanes, columns, constants, implements, inlined, lane_table, of_lanes, root, rows_from
-from ....base.arrays import Array, Index
+from ....backend import aligned_zeros, constants, implements, inlined
+from ....base.arrays import Array, Index, Lanes
 from ...pantograph.step import move_apart
 from ...state import CONTACTS, ROW, Place
 from ..base import drive
@@ -42,7 +42,7 @@ _ROWS = len(MotorRow)
 class MotorArrays(NamedTuple):
     """Motors of all lanes, seen from where they press."""
 
-    table: Array  # (contacts, groups, places of ``MotorRow``, lanes abreast)
+    table: Array  # (contacts, lanes, places of ``MotorRow``)
     places: Index  # (used,): where there are motors, each a ``Place``
     time_step: float  # s
     command_limit: float  # largest force that is asked for (N)
@@ -71,17 +71,17 @@ class MotorArrays(NamedTuple):
 
         lanes: a number, or (n,). What motors that are driven give back is taken off the supply's.
         """
-        rows = of_lanes(self.table[contact], lanes)
+        rows = self.table[contact, lanes]
         rows = rows.reshape(*rows.shape[:-1], len(Place), _ROWS)
         return np.array(rows[..., [MotorRow.SUPPLIED, MotorRow.COPPER]])
 
 
-def motor_arrays(motor: MotorActuator, time_step: float, lanes: int, abreast: int) -> MotorArrays:
-    """Motors of all lanes at rest, for steps of ``time_step`` (s); abreast: lanes of a group."""
+def motor_arrays(motor: MotorActuator, time_step: float, lanes: int) -> MotorArrays:
+    """Motors of all lanes at rest, for steps of ``time_step`` (s)."""
     armature = motor.inductance / motor.resistance
     bandwidth = 2 * math.pi * motor.bandwidth
     return MotorArrays(
-        table=lane_table(len(Place) * _ROWS, lanes, abreast, CONTACTS),
+        table=aligned_zeros((CONTACTS, lanes, len(Place) * _ROWS)),
         places=np.array(motor.places, dtype=np.int64),
         time_step=time_step,
         command_limit=motor.force_limit,
@@ -122,7 +122,7 @@ def reference(motors, rows, asked, free, gain):
     asked = clip(asked, -motors.command_limit, motors.command_limit)
     steady, peak = motors.continuous_force * motors.continuous_force, motors.peak_force * motors.peak_force
     room = clip((steady - rows[MOTOR_ROW.HEAT]) * (1.0 / (HEAT_TAPER * steady)), 0.0, 1.0)
-    limit = root(steady + (peak - steady) * room)
+    limit = math.sqrt(steady + (peak - steady) * room)
     slope = limit / (SPEED_TAPER * motors.largest_speed + limit * gain)  # N s/m
     up = clip((motors.largest_speed - free) * slope, 0.0, limit)
     down = clip((motors.largest_speed + free) * slope, 0.0, limit)
@@ -177,9 +177,9 @@ def press_loosely(motors, pantographs, own, rows, asked, place, lane):
 
 @implements(drive, MotorArrays)
 def _drive(actuators, pantographs, contact, own, command, lane):
-    table = columns(own, actuators.table[contact], lane)
+    table = actuators.table[contact, lane]
     for place in actuators.places:
-        rows = rows_from(table, place * _ROWS)
+        rows = table[place * _ROWS :]
         if actuators.play > 0.0:
             force = press_loosely(actuators, pantographs, own, rows, command[place], place, lane)
         else:

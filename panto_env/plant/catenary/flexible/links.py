@@ -8,12 +8,6 @@ from .segments import move, read
 
 
 @inlined
-def own_row(table, lane):
-    """Row of a lane in a table of one row for all or one per lane."""
-    return min(lane, table.shape[0] - 1) & NOT_NEGATIVE
-
-
-@inlined
 def first_link(line, first_span):
     """Where the window's links begin in the tables of static tension and gap."""
     count = line.link_set.size

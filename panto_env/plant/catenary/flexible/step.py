@@ -11,6 +11,7 @@ acts on it. So the wire's displacement at the ends of a step is the mean of u be
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
+from ...state import own_row
 from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
@@ -23,7 +24,7 @@ from ..protocol import (
     rise_at_contact,
 )
 from .line import CONTACT, LOWER, UPPER, FlexibleLine
-from .links import difference, follow_links, measure_extensions, own_row, pull_links
+from .links import difference, follow_links, measure_extensions, pull_links
 from .segments import shift_nodes
 from .wires import (
     apply_springs,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ....backend import NOT_NEGATIVE, WIDTH, floor, inlined, load_row, store_row
+from ....backend import NOT_NEGATIVE, WIDTH, inlined, load_row, store_row
 from ...interpolation import cubic_weights
 from .line import PAD
 from .segments import node_after, row_of, segment_of, share_ends
@@ -14,7 +14,7 @@ from .segments import node_after, row_of, segment_of, share_ends
 def static_height(shape, span, x):
     """Static height (m) of the contact wire at x (m)."""
     intervals = shape.size - 1
-    ratio = (x / span - floor(x / span)) * intervals
+    ratio = (x / span - math.floor(x / span)) * intervals
     k = min(int(ratio), intervals - 1)
     return shape[k] + (ratio - k) * (shape[k + 1] - shape[k])
 
@@ -40,7 +40,7 @@ def rise_by_defects(pieces, breaks, decay, x):
 def locate(x, spacing, rows):
     """Row and segment of the first of the four nodes around x (m from the window's start); their weights."""
     ratio = x / spacing
-    left = min(max(int(floor(ratio)), 0), rows * WIDTH - 1)
+    left = min(max(math.floor(ratio), 0), rows * WIDTH - 1)
     segment = segment_of(left - 1, rows)
     return row_of(left - 1, segment, rows), segment, cubic_weights(ratio - left)
 

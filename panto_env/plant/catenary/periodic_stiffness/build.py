@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....backend import GROUPED
 from ....base.arrays import Array
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
@@ -25,9 +24,6 @@ class PeriodicLine(NamedTuple):
     mean: float  # k_m (N/m)
     variation: float  # epsilon (-)
     spans_per_metre: float  # 1 / L (1/m)
-
-
-GROUPED.add(PeriodicLine)
 
 
 class PeriodicWire(NamedTuple):
