@@ -26,7 +26,7 @@ INLINED: dict[str, Any] = OPTIONS | PART_OPTIONS
 def operation(declaration: F) -> F:
     """An operation that each type of its first argument, a class of named tuples, may implement for itself.
 
-    ``declaration`` has the arguments, the docstring and, as its body, what is done for a type without a source
+    ``declaration`` has the arguments and the docstring; its body is what is done for a type without a source
     of its own. ``implements`` adds the source of a type.
     """
     sources: dict[type, Callable[..., Any]] = {}

@@ -17,6 +17,7 @@ of the chain, in the pantograph's own equations, which are solved exactly
 of their own, and the flanks of the teeth push by the plant's contact law, implicit in what both sides yield.
 """
 
+from . import step as step
 from .data import MotorActuator
 
 __all__ = ["KIND", "MotorActuator"]
