@@ -9,7 +9,7 @@ from panto_env import InputError, simulate
 from panto_env.base.explanation import explain
 from panto_env.base.ranges import ranges_of
 from panto_env.catalog import available, load_catenary
-from panto_env.plant.catenary.flexible import static_shape
+from panto_env.plant.catenary.flexible import static as static_shape
 from panto_env.plant.catenary.flexible.schema import Droppers, FlexibleCatenaryData, Support
 from panto_env.plant.catenary.schema import Wire
 

@@ -13,14 +13,14 @@ from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
 from ..view import LineView
+from .arrays import CONTACT, MESSENGER, PAD
 from .build import at_rest, constants, dropper_positions, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
-from .line import CONTACT, MESSENGER, PAD
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
 from .segments import along
-from .static_shape import StaticShape, hang
+from .static import StaticShape, hang
 from .tension import shape_left, with_tension_left
 from .wire_defects import locate
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from ....base.ranges import Between
 from ....base.settings import Settings
 from ..schema import LONGEST_SPAN, CatenaryData, Wire
-from .static_shape import hang
+from .static import hang
 
 CLOSEST = 0.1
 """Least distance between two droppers, or between one and a support (m)."""

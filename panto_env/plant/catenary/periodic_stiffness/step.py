@@ -8,7 +8,7 @@ from ..protocol import (
     look_at_contact,
     place_contact,
 )
-from .build import PeriodicLine
+from .arrays import PeriodicLine
 
 
 @inlined

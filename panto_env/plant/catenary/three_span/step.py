@@ -13,7 +13,7 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .build import MARGIN, ThreeSpanLine
+from .arrays import MARGIN, ThreeSpanLine
 
 
 @inlined
