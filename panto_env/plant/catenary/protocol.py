@@ -14,7 +14,7 @@ does on the wire is force times the change of that height, exactly, and no conta
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
@@ -81,11 +81,16 @@ class CatenaryModel(Protocol):
         """What can be seen of one lane's line now, from begin to end (m) as far as it is computed there."""
 
 
+def accept(data: Any) -> None:
+    """Accept every line whose values its schema accepts."""
+
+
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
+    check: Callable[[Any], Any] = accept  # raises InputError where a line of such values cannot exist
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:

@@ -52,10 +52,10 @@ class FlexibleCatenary:
         """
         designed, condition = data, of_wires(runs.conditions)
         data = with_tension_left(designed, condition)
-        shape, own = (
-            hang(data) if data is designed else shape_left(designed, data),
-            locate(data, spans, condition),
-        )
+        shape = hang(designed)
+        if data is not designed:
+            shape = shape_left(designed, data)
+        own = locate(data, spans, condition)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
