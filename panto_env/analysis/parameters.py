@@ -12,6 +12,7 @@ from ..base.explanation import complaints, explain
 from ..base.names import hint
 from ..base.ranges import ranges_of
 from ..base.settings import Settings
+from ..plant.catenary import CatenaryData, check_line
 
 S = TypeVar("S", bound=Settings)
 
@@ -66,16 +67,18 @@ def parameter_label(name: str, entry: Settings) -> str:
 def change(entry: S, name: str, value: float) -> S:
     """The entry with another value of the parameter ``name``, whose first part names the family.
 
-    Raises InputError where the entry has no such parameter, or its schema refuses the value.
+    Raises InputError where the entry has no such parameter, or cannot have the value.
     """
     check_name(name, entry)
     path = name.split(".")[1:]
     try:
-        return type(entry).model_validate(_put(entry.model_dump(), path, value))
+        return _checked(entry, _put(entry.model_dump(), path, value))
     except ValidationError as error:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found)
         raise InputError(f"{name} can't be {value:g}: {'; '.join(words)}.") from error
+    except InputError as error:
+        raise InputError(f"{name} can't be {value:g}: {error}") from error
 
 
 def change_together(entry: S, values: Mapping[str, float]) -> S:
@@ -88,9 +91,19 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
         check_name(name, entry)
         table = _put(table, name.split(".")[1:], value)
     try:
-        return type(entry).model_validate(table)
+        return _checked(entry, table)
     except ValidationError as error:
         raise InputError(f"These values do not go together: {explain(error, type(entry))}.") from error
+    except InputError as error:
+        raise InputError(f"These values do not go together: {error}") from error
+
+
+def _checked(entry: S, table: Mapping[str, Any]) -> S:
+    """An entry of the same class with the values of a table. Raises InputError where it cannot exist."""
+    changed = type(entry).model_validate(table)
+    if isinstance(changed, CatenaryData):
+        check_line(changed)
+    return changed
 
 
 def _places(values: tuple[Any, ...], prefix: str) -> list[str]:

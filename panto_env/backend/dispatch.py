@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import wraps
+from types import FunctionType
 from typing import Any, TypeVar
 
 from numba.extending import overload
@@ -23,26 +24,26 @@ INLINED: dict[str, Any] = OPTIONS | PART_OPTIONS
 
 
 def operation(declaration: F) -> F:
-    """An operation that each type of its first argument, a class of named tuples, implements for itself.
+    """An operation that each type of its first argument, a class of named tuples, may implement for itself.
 
-    ``declaration`` has the arguments and the docstring; its body is never run. ``implements`` adds a type.
+    ``declaration`` has the arguments and the docstring; its body is what is done for a type without a source
+    of its own. ``implements`` adds the source of a type.
     """
     sources: dict[type, Callable[..., Any]] = {}
+    # Numba wants the signatures of all sources alike, without types.
+    default = FunctionType(declaration.__code__, declaration.__globals__, declaration.__name__)
 
     @wraps(declaration)
     def chosen(*arguments: Any) -> Any:
-        return sources[type(arguments[0])](*arguments)
+        return sources.get(type(arguments[0]), default)(*arguments)
 
     chosen.sources = sources  # type: ignore[attr-defined]
     if JIT:
 
         def choose(*types: Any) -> Any:
-            return sources.get(getattr(types[0], "instance_class", None))  # type: ignore[arg-type]
+            return sources.get(getattr(types[0], "instance_class", None), default)  # type: ignore[arg-type]
 
-        # Numba wants the signature of the source, which has no types.
-        names = inspect.signature(declaration).parameters.values()
-        untyped = [name.replace(annotation=inspect.Parameter.empty) for name in names]
-        choose.__signature__ = inspect.Signature(untyped)  # type: ignore[attr-defined]
+        choose.__signature__ = inspect.signature(default)  # type: ignore[attr-defined]
         overload(chosen, jit_options=INLINED)(choose)
     return chosen  # type: ignore[return-value]
 

@@ -16,7 +16,7 @@ from ..base.files import read_toml
 from ..base.names import nearest, suggest
 from ..base.settings import Settings
 from ..base.shown import shown
-from ..plant.catenary import CATENARIES, CatenaryData
+from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.pantograph.schema import PantographData
 
 FOLDERS = {
@@ -98,11 +98,17 @@ def _read(family: str, path: Path, _modified: int) -> Any:
         schema = _schema(family, table)
         if "line" in schema.model_fields and isinstance(table.get("line"), str):
             table["line"] = load_catenary(table["line"])  # a rig may name the line that it computes
-        return schema.model_validate(table)
+        entry = schema.model_validate(table)
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
     except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
+    if isinstance(entry, CatenaryData):
+        try:
+            check_line(entry)
+        except InputError as error:
+            raise InputError(f"{path} is not a valid entry: {error}") from error
+    return entry
 
 
 def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:

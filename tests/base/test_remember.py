@@ -4,7 +4,7 @@ import numpy as np
 
 from panto_env.base.remember import remembered
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.static_shape import hang
+from panto_env.plant.catenary.flexible.static import hang
 
 LINE = load_catenary("en50318-2002")
 

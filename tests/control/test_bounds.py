@@ -19,7 +19,7 @@ from panto_env.control.settings import run_settings
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of
 from panto_env.identification.low_pass import low_pass
-from panto_env.plant.catenary.flexible import static_shape
+from panto_env.plant.catenary.flexible import static as static_shape
 
 
 @pytest.fixture(autouse=True)

@@ -12,15 +12,9 @@ from ...base.ranges import Between
 from .protocol import (
     CatenaryKind,
     StartPoint,
-    advance_wire,
-    apply_force,
-    end_step,
-    ending_by_wire,
     look_at_contact,
     place_contact,
-    record_wire,
     refuse_defects,
-    rise_at_contact,
 )
 from .schema import CatenaryData
 from .view import NOTHING
@@ -74,36 +68,6 @@ def _place(line, wire, lane, contact, x):
     return 0.0, 0.0
 
 
-@implements(rise_at_contact, RailLine)
-def _rise(line, wire, lane, contact, x0, x1):
-    return 0.0
-
-
 @implements(look_at_contact, RailLine)
 def _look(line, wire, lane, contact, x):
     return 0.0, 0.0, 0.0, line.compliance
-
-
-@implements(advance_wire, RailLine)
-def _advance(line, wire, lane):
-    pass
-
-
-@implements(apply_force, RailLine)
-def _apply(line, wire, lane, contact, x, force):
-    pass
-
-
-@implements(end_step, RailLine)
-def _end(line, wire, lane):
-    pass
-
-
-@implements(ending_by_wire, RailLine)
-def _ending(line, wire, lane):
-    return 0
-
-
-@implements(record_wire, RailLine)
-def _record(line, wire, lane, uplift, tension):
-    pass

@@ -6,13 +6,13 @@ from panto_env.backend import WIDTH, kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant import interpolation
 from panto_env.plant.catenary.flexible import model
+from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
 from panto_env.plant.catenary.flexible.build import at_rest, constants, dropper_positions
 from panto_env.plant.catenary.flexible.grid import spring_levels
-from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER, PAD
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
-from panto_env.plant.catenary.flexible.static_shape import solve
+from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.flexible.wires import leapfrog
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
 from panto_env.plant.numerics import Numerics, Runs

@@ -8,7 +8,7 @@ from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.build import STIFFEST, constants
 from panto_env.plant.catenary.flexible.grid import missing_yield, stencil_weights
 from panto_env.plant.catenary.flexible.resolution import resolution
-from panto_env.plant.catenary.flexible.static_shape import solve
+from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.interpolation import stencil
 from panto_env.plant.numerics import Numerics, Runs
 

@@ -15,7 +15,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics.spans import LAST_USUAL
 from panto_env.plant.catenary import CATENARIES
-from panto_env.plant.catenary.flexible.line import CONTACT, MESSENGER
+from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER
 from panto_env.plant.catenary.flexible.segments import places
 from panto_env.plant.catenary.protocol import ending_by_wire
 from panto_env.plant.line_condition import DrawnLine, LineCondition

@@ -4,11 +4,11 @@ import pytest
 from panto_env import simulate
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary
+from panto_env.plant.catenary.flexible.arrays import CONTACT
 from panto_env.plant.catenary.flexible.build import at_rest, constants
-from panto_env.plant.catenary.flexible.line import CONTACT
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
-from panto_env.plant.catenary.flexible.static_shape import solve
+from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
 from panto_env.plant.numerics import WINDOW, Numerics, Runs
 from panto_env.studies.en50318 import window as windows

@@ -57,3 +57,4 @@ def drive(actuators: Any, pantographs: Any, contact: int, own: Any, command: Any
     command: (places,) (N). pantographs: for actuators that are moved by what they press on (``move_apart`` of
     ``pantograph.step``).
     """
+    raise NotImplementedError

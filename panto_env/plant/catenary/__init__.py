@@ -11,7 +11,7 @@ from importlib import import_module
 from .protocol import CatenaryKind, CatenaryModel
 from .schema import CatenaryData
 
-__all__ = ["CATENARIES", "KINDS", "CatenaryData", "CatenaryKind", "CatenaryModel"]
+__all__ = ["CATENARIES", "KINDS", "CatenaryData", "CatenaryKind", "CatenaryModel", "check_line"]
 
 KINDS = [
     "flexible",
@@ -22,3 +22,8 @@ KINDS = [
 """Words that a line's TOML file may have under ``kind``: the names of the modules."""
 CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
 """Kinds by name."""
+
+
+def check_line(line: CatenaryData) -> None:
+    """Raise InputError where a line of these values cannot exist, such as one whose droppers would push."""
+    CATENARIES[line.kind].check(line)

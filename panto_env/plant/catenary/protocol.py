@@ -1,8 +1,10 @@
 """What a kind of catenary provides: a class for Python, and its operations for kernels.
 
 A step of a lane goes: ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
-point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. Each operation has one source per
-class of line constants; what a run may end by is asked once a control step.
+point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. What a run may end by is asked once a
+control step. A class of line constants has its own sources of ``place_contact`` and ``look_at_contact``, and
+of those other operations that find something to do; without a source of its own, an operation does what is
+written here: nothing moves.
 
 A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
 the step is read there by the same weights by which the force acts there, so that the work that the force
@@ -12,7 +14,7 @@ does on the wire is force times the change of that height, exactly, and no conta
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
@@ -21,6 +23,7 @@ from ...base.errors import InputError
 from ...base.units import to_kmh
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
+from ..valid_range import ENDING
 from .schema import CatenaryData
 from .view import LineView
 
@@ -79,11 +82,16 @@ class CatenaryModel(Protocol):
         """What can be seen of one lane's line now, from begin to end (m) as far as it is computed there."""
 
 
+def accept(data: Any) -> None:
+    """Accept every line whose values its schema accepts."""
+
+
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
+    check: Callable[[Any], Any] = accept  # raises InputError where a line of such values cannot exist
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
@@ -119,6 +127,7 @@ def place_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> An
     """Place a contact point at x (m), where it is at mid-step; returns the wire's height there (m) now, and
     at mid-step as far as the forces of this step don't count.
     """
+    raise NotImplementedError
 
 
 @operation
@@ -126,6 +135,7 @@ def rise_at_contact(line: Any, wire: Any, lane: int, contact: int, x0: float, x1
     """How much higher the wire is at x1 than at x0 (m) at mid-step, between ``advance_wire`` and
     ``apply_force``; x0, x1: where the contact point is at the step's ends.
     """
+    return 0.0
 
 
 @operation
@@ -136,6 +146,7 @@ def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> 
     1 N of contact force at the step's end and at mid-step (m/N), and the compliance of a massless spring in
     series (m/N, 0 if none).
     """
+    raise NotImplementedError
 
 
 @operation
@@ -151,6 +162,7 @@ def end_step(line: Any, wire: Any, lane: int) -> None:
 @operation
 def ending_by_wire(line: Any, wire: Any, lane: int) -> Any:
     """The ``Ending`` of one lane's run by what its wire does, ``Ending.NONE`` within the valid range."""
+    return ENDING.NONE
 
 
 @operation

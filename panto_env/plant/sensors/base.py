@@ -65,8 +65,10 @@ def take_readings(sensors: Any, step: int, own: Any, readings: Any, lane: int) -
     own: the lane's rows of ``Row``, at the end of the step. readings: its rows of ``Reading``, written to at
     least once in each control step.
     """
+    raise NotImplementedError
 
 
 @operation
 def take_first_readings(sensors: Any, own: Any, readings: Any, lane: int) -> None:
     """What the sensors read at the start of a run; arguments as above."""
+    raise NotImplementedError

@@ -27,8 +27,8 @@ from ...metrics.spectrum import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
 from ...plant.actuators.motor import MotorActuator
+from ...plant.actuators.motor.arrays import MotorArrays
 from ...plant.actuators.motor.power import MotorPower, motor_power
-from ...plant.actuators.motor.step import MotorArrays
 from ...plant.state import Place, Row
 
 PANTOGRAPH, CATENARY, MOTOR = "atr95", "en50318-2002", "head-motor"

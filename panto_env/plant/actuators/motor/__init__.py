@@ -1,7 +1,7 @@
 """Servomotors that press through a gearbox and an arm (paper 2, section 4.3).
 
 Paper 2 turns the arms of the collector head by armature-controlled DC motors with gearboxes, inside the
-joints between pan-head and arms, driven in force mode. ``data`` says what such a drive is made of,
+joints between pan-head and arms, driven in force mode. ``schema`` says what such a drive is made of,
 ``current`` solves the armature and its current loop, ``gear`` is friction, inertia and backlash, ``step``
 joins them in the plant's step, ``power`` gives current, voltage and watts.
 
@@ -17,7 +17,8 @@ of the chain, in the pantograph's own equations, which are solved exactly
 of their own, and the flanks of the teeth push by the plant's contact law, implicit in what both sides yield.
 """
 
-from .data import MotorActuator
+from . import step as step
+from .schema import MotorActuator
 
 __all__ = ["KIND", "MotorActuator"]
 

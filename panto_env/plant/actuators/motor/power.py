@@ -8,7 +8,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.errors import InputError
-from .data import MotorActuator
+from .schema import MotorActuator
 
 
 class MotorPower(NamedTuple):

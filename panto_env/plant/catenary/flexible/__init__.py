@@ -15,7 +15,8 @@ from ..protocol import CatenaryKind
 from . import step as step
 from .model import FlexibleCatenary
 from .schema import FlexibleCatenaryData
+from .static import hang
 
 __all__ = ["KIND", "FlexibleCatenary", "FlexibleCatenaryData"]
 
-KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary)
+KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary, hang)

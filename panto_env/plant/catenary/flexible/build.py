@@ -15,12 +15,12 @@ from ...interpolation import stencil
 from ...numerics import Numerics
 from ...state import CONTACTS
 from ...valid_range import LARGEST_SPEED
+from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .grid import missing_yield, nodes_per_span, spring_levels, stencil_weights
-from .line import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .resolution import Resolution
 from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
-from .static_shape import StaticShape
+from .static import StaticShape
 from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m

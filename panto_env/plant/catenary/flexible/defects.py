@@ -20,9 +20,9 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
-from .line import CONTACT, MESSENGER, FlexibleLine
+from .arrays import CONTACT, MESSENGER, FlexibleLine
 from .schema import FlexibleCatenaryData
-from .static_shape import GRAVITY, solve
+from .static import GRAVITY, solve
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from .schema import FlexibleCatenaryData
-from .static_shape import solve
+from .static import solve
 
 SPANS = 5
 """Computed, of which the middle one is looked at; its neighbours count, further ones hardly do."""

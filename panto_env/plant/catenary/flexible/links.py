@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
-from .line import LOWER, UPPER
+from .arrays import LOWER, UPPER
 from .segments import move, read
 
 

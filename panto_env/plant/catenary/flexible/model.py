@@ -13,14 +13,14 @@ from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
 from ..view import LineView
+from .arrays import CONTACT, MESSENGER, PAD
 from .build import at_rest, constants, dropper_positions, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
-from .line import CONTACT, MESSENGER, PAD
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
 from .segments import along
-from .static_shape import StaticShape, hang
+from .static import StaticShape, hang
 from .tension import shape_left, with_tension_left
 from .wire_defects import locate
 
@@ -52,10 +52,10 @@ class FlexibleCatenary:
         """
         designed, condition = data, of_wires(runs.conditions)
         data = with_tension_left(designed, condition)
-        shape, own = (
-            hang(data) if data is designed else shape_left(designed, data),
-            locate(data, spans, condition),
-        )
+        shape = hang(designed)
+        if data is not designed:
+            shape = shape_left(designed, data)
+        own = locate(data, spans, condition)
         self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)

@@ -19,7 +19,7 @@ from ....backend import (
     store_row,
 )
 from ....base.arrays import Array, Index
-from .line import PAD
+from .arrays import PAD
 
 
 @inlined

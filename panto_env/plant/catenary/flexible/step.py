@@ -23,7 +23,7 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .line import CONTACT, LOWER, UPPER, FlexibleLine
+from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
 from .links import difference, follow_links, measure_extensions, pull_links
 from .segments import shift_nodes
 from .wires import (

@@ -17,7 +17,7 @@ from ....base.arrays import Array
 from ....base.remember import remembered
 from ...line_condition import LineCondition
 from .schema import FlexibleCatenaryData
-from .static_shape import GRAVITY, StaticShape, solve
+from .static import GRAVITY, StaticShape, solve
 
 
 class Misfit(NamedTuple):

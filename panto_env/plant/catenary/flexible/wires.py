@@ -6,7 +6,7 @@ import math
 
 from ....backend import NOT_NEGATIVE, WIDTH, inlined, load_row, store_row
 from ...interpolation import cubic_weights
-from .line import PAD
+from .arrays import PAD
 from .segments import node_after, row_of, segment_of, share_ends
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,24 +12,11 @@ from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds, refuse_defects
 from ..view import NOTHING, LineView
+from .arrays import PeriodicLine, PeriodicWire
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
 """Unless told otherwise (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
-
-
-class PeriodicLine(NamedTuple):
-    """Constants of the line."""
-
-    mean: float  # k_m (N/m)
-    variation: float  # epsilon (-)
-    spans_per_metre: float  # 1 / L (1/m)
-
-
-class PeriodicWire(NamedTuple):
-    """A massless wire has no state; Numba wants a field."""
-
-    nothing: Array
 
 
 class PeriodicStiffness:

@@ -8,9 +8,9 @@ as under a line.
 
 from ..protocol import CatenaryKind
 from . import step as step
-from .build import Rig
+from .build import Rig, check
 from .schema import Computer, Cylinder, LoadCell, RigData
 
 __all__ = ["KIND", "Computer", "Cylinder", "LoadCell", "Rig", "RigData"]
 
-KIND = CatenaryKind(RigData, Rig)
+KIND = CatenaryKind(RigData, Rig, check)

@@ -37,6 +37,11 @@ FIT_BOUNDS = ((0.9, 0.4, 0.2), (1.1, 2.5, 5.0))
 """Least and largest coefficients, as shares of those that are assumed."""
 
 
+def check(data: RigData) -> None:
+    """Raise InputError where the line that is computed cannot exist."""
+    LINES[data.line.kind].check(data.line)
+
+
 class Rig:
     """A pantograph on a cylinder that follows a line's computed contact point."""
 

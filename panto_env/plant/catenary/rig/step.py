@@ -17,7 +17,6 @@ from ..protocol import (
     look_at_contact,
     place_contact,
     record_wire,
-    rise_at_contact,
 )
 from .arrays import RIG_ROW, RigLine
 from .computer import moved, take_sample
@@ -61,11 +60,6 @@ def _advance(line, wire, lane):
     own[RIG_ROW.VELOCITY_BEFORE] = velocity
     own[RIG_ROW.HEIGHT] = end
     own[RIG_ROW.VELOCITY] = rate
-
-
-@implements(rise_at_contact, RigLine)
-def _rise(line, wire, lane, contact, x0, x1):
-    return 0.0  # the collectors do not move along a wire
 
 
 @implements(look_at_contact, RigLine)

@@ -4,50 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ....base.arrays import Array, Index
+from ....base.arrays import Array
 from ....base.linear_algebra import one_thread
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ...state import CONTACTS
 from ..protocol import StartPoint, check_speeds, refuse_defects
 from ..view import NOTHING, LineView
+from .arrays import MARGIN, ThreeSpanLine, ThreeSpanWire
 from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
-MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
 VIEW_POINTS = 361
 """Of the three spans, in a picture."""
 TIME_STEP = 2.5e-3
 """Unless told otherwise (s): tests/plant/test_three_span.py shows how figures converge."""
-
-
-class ThreeSpanLine(NamedTuple):
-    """Constants of the line; modes are scaled to unit modal mass."""
-
-    span: float  # m
-    time_step: float  # s
-    shape: Array  # (points, modes): mode shapes about the central span (1/sqrt(kg))
-    spacing: float  # of the points (m)
-    propagate: Array  # (4, modes): exact free motion over a step: q <- q, v; v <- q, v
-    impulse: Array  # (2, modes): change of q and v by 1 N of modal force over a step
-    half_step: Array  # (3, modes): q at mid-step <- q, v at the step's start, 1 N of modal force
-    softness: Array  # (modes,): 1 / omega^2 (s^2)
-    at_support: Array  # (2, modes): mode shapes at the two supports
-    project: Array  # (modes, modes): modal coordinates in the next span from those in this one
-    free_uplift: float  # room for the uplift at a support up to the steady arm's stop (m)
-
-
-class ThreeSpanWire(NamedTuple):
-    """What moves, in all lanes."""
-
-    modal: Array  # (lanes, 2, modes): coordinates and their rates
-    contact_shape: Array  # (lanes, contacts, modes): mode shapes where the contact points are
-    scratch: Array  # (lanes, 2, modes)
-    central_span: Index  # (lanes,): number of the central span along the line
 
 
 class ThreeSpan:

@@ -7,14 +7,13 @@ from ...valid_range import ENDING
 from ..protocol import (
     advance_wire,
     apply_force,
-    end_step,
     ending_by_wire,
     look_at_contact,
     place_contact,
     record_wire,
     rise_at_contact,
 )
-from .build import MARGIN, ThreeSpanLine
+from .arrays import MARGIN, ThreeSpanLine
 
 
 @inlined
@@ -97,11 +96,6 @@ def _apply(line, wire, lane, contact, x, force):
     for m in range(shape.size):
         modal[0, m] += line.impulse[0, m] * shape[m] * force
         modal[1, m] += line.impulse[1, m] * shape[m] * force
-
-
-@implements(end_step, ThreeSpanLine)
-def _end(line, wire, lane):
-    pass
 
 
 @inlined

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from ....backend import aligned_zeros
 from ....base.ranges import Between
+from ...state import CONTACTS, Place
 from ..base import ActuatorSettings
-from .step import MotorArrays, motor_arrays
+from .arrays import MOTOR_ROWS, MotorArrays
 
 LEAST_LEAD = 1.05
 """Bandwidth of a current loop over the armature's own, at least: at 1 it has nothing to hasten."""
@@ -164,4 +167,35 @@ class MotorActuator(ActuatorSettings):
 
     def arrays(self, time_step: float, lanes: int) -> MotorArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
-        return motor_arrays(self, time_step, lanes)
+        armature = self.inductance / self.resistance
+        bandwidth = 2 * math.pi * self.bandwidth
+        return MotorArrays(
+            table=aligned_zeros((CONTACTS, lanes, len(Place) * MOTOR_ROWS)),
+            places=np.array(self.places, dtype=np.int64),
+            time_step=time_step,
+            command_limit=self.force_limit,
+            peak_force=self.peak_force,
+            continuous_force=self.continuous_force,
+            heat_share=1.0 - math.exp(-time_step / self.thermal_time),
+            largest_speed=self.largest_speed / self.shaft_per_metre,
+            stall_force=self.stall_force,
+            shorted_damping=self.shorted_damping,
+            armature_time=armature,
+            armature_left=math.exp(-time_step / armature),
+            armature_mean=-armature / time_step * math.expm1(-time_step / armature),
+            bandwidth=bandwidth,
+            lead=bandwidth * armature,
+            decay_halvings=_halvings(bandwidth * time_step, 0.25),
+            age_halvings=_halvings(time_step / armature, 0.5),
+            dry_friction=self.dry_friction,
+            lost_share=1.0 - self.gear_efficiency,
+            mass=self.reflected_mass,
+            play=self.backlash * self.arm_length,
+            tooth_compliance=self.arm_length**2 / (self.motors * self.gear_stiffness),
+            tooth_damping=self.motors * self.gear_damping / self.arm_length**2 / time_step,
+        )
+
+
+def _halvings(value: float, largest: float) -> int:
+    """How often a value is halved until it is at most ``largest``."""
+    return max(0, math.ceil(math.log2(value / largest)))

@@ -11,7 +11,6 @@ with kappa = sqrt(T/EI) and B2(s) = s^2 - s + 1/6, the second Bernoulli polynomi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,7 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ..schema import Wire
-
-if TYPE_CHECKING:
-    from .schema import FlexibleCatenaryData
+from .schema import FlexibleCatenaryData
 
 GRAVITY = 9.81  # m/s^2
 MOST_ROUNDS = 200
