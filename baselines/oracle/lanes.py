@@ -14,7 +14,7 @@ from panto_env.control import Task
 from panto_env.control.cost import check_record
 from panto_env.control.mean_force import Trim
 from panto_env.control.settings import RunSettings
-from panto_env.plant.state import CONTACTS, SAMPLE_ROWS, Place, Row, Samples
+from panto_env.plant.state import SAMPLE_ROWS, Place, Row, Samples
 
 PUSHED = 48
 """Lanes of a group that take pushes."""
@@ -83,7 +83,7 @@ class _Group:
         self._places = [int(place) for place in task.actuator.places]
         self._first = begin * task.length.control_steps
         rows = self._first + control_steps * task.length.control_steps + 1
-        shape = (lanes, rows, CONTACTS, SAMPLE_ROWS)
+        shape = (lanes, rows, 1, SAMPLE_ROWS)
         check_record(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never touched, and so take no memory.
         self._samples = Samples(
@@ -141,7 +141,7 @@ class _Group:
 
     def _advance(self, commands: Array) -> None:
         """Advance all lanes under commands (N), (lanes, steps, places)."""
-        now = np.zeros((len(commands), CONTACTS, len(Place)))
+        now = np.zeros((len(commands), 1, len(Place)))
         for step in range(commands.shape[1]):
             now[:, 0, self._places] = commands[:, step]
             self._plant.advance(now, self._steps, self._samples)

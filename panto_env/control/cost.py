@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base import machine
 from ..base.errors import InputError
-from ..plant.state import CONTACTS, SAMPLE_ROWS
+from ..plant.state import SAMPLE_ROWS
 
 COPIES = 2
 """How often a record lies in memory: as it is written, and as a trajectory."""
@@ -55,7 +55,7 @@ def run_cost(lanes: int, steps: float, supports: int, droppers: int, moving: flo
 
     moving: numbers that move in a step, in all lanes together. record: whether one is kept, of all steps.
     """
-    columns = CONTACTS * SAMPLE_ROWS + supports + droppers
+    columns = SAMPLE_ROWS + supports + droppers
     memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
     return Cost(steps, memory, steps * (lanes * STEP + moving * NUMBER))
 

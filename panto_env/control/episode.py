@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..backend import aligned_zeros
 from ..base.arrays import Array, Index
+from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
@@ -38,7 +39,7 @@ class Episode(NamedTuple):
     slope: Array  # (entries,): of the observation, what is added to that for each metre in a plant step
     per_unit: Array  # (entries,): of the observation, for one unit of what it is of
     odometer: OdometerArrays  # by which trains know where they are, and their speed
-    spans_per_metre: float  # 1/m
+    alignment: AlignmentArrays  # of the line
     time_step: float  # s
     control_steps: int  # plant steps in a control step
     mean_share: float  # of the running mean of the force that a control step replaces
@@ -67,7 +68,7 @@ def new_episode(
         slope=layout.slope / plant.time_step,
         per_unit=1 / layout.scale,
         odometer=odometer,
-        spans_per_metre=plant.alignment.arrays.per_metre,
+        alignment=plant.alignment.arrays,
         time_step=plant.time_step,
         control_steps=control_steps,
         mean_share=1 - math.exp(-settings.control_interval / MEAN_TIME),

@@ -54,10 +54,9 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
     make_plant = partial(
         Plant,
         settings.catenary,
-        settings.pantograph,
+        settings.train,
         spans=spans(settings),
         numerics=settings.numerics,
-        actuator=settings.actuator,
         runs=runs(settings),
         bilateral=settings.bilateral,
         varied=settings.pantograph_scatter > 0,

@@ -13,11 +13,12 @@ from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
-from ..plant.drift import position_after, stride_after
+from ..plant.alignment import in_spans
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
+from ..plant.train import position, stride
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Asked, Entry, earlier, entries_of
-from .state import NOW, TASK_ROW
+from .state import CONTROLLED, NOW, TASK_ROW
 
 READINGS = len(Reading)
 BOUND = 10.0
@@ -116,7 +117,7 @@ _write = _branches(WRITERS)
 @inlined
 def add_noise(sensors, readings, lane):
     """Add to a lane's readings the noise that is next."""
-    noise = sensors.noise[lane, sensors.noise_used[lane] & NOT_NEGATIVE]
+    noise = sensors.noise[lane, CONTROLLED, sensors.noise_used[lane] & NOT_NEGATIVE]
     for k in range(READINGS):
         readings[k] += noise[k]
     sensors.noise_used[lane] += 1
@@ -125,12 +126,14 @@ def add_noise(sensors, readings, lane):
 @inlined
 def prepare_entries(episode, sensors, run, own, now, lane):
     """Make ready what entries of a lane's observation look at: noise is added to its readings."""
-    if sensors.noise.shape[1] > 0:
+    if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], lane)
-    now[NOW.SPANS] = position_after(run, own, own[ROW.STEP], lane) * episode.spans_per_metre
-    now[NOW.SPEED] = stride_after(run, own, own[ROW.STEP], lane) * (1.0 / episode.time_step)
+    now[NOW.SPANS] = in_spans(episode.alignment, position(run, CONTROLLED, lane, own[ROW.STEP]))
+    now[NOW.SPEED] = stride(run, CONTROLLED, lane, own[ROW.STEP]) * (1.0 / episode.time_step)
     if episode.odometer.table.shape[1] > 0:
-        spans, speed = read_odometer(episode.odometer, now[NOW.SPANS], now[NOW.SPEED], lane)
+        spans, speed = read_odometer(
+            episode.odometer, episode.alignment, now[NOW.SPANS], now[NOW.SPEED], lane
+        )
         now[NOW.SPANS] = spans
         now[NOW.SPEED] = speed
 

@@ -16,7 +16,7 @@ from ..plant.plant import Plant
 from ..plant.state import Row
 from ..plant.valid_range import LARGEST_HEIGHT, Ending, reason
 from .identity import identity
-from .state import TaskRow
+from .state import CONTROLLED, TaskRow
 
 if TYPE_CHECKING:
     from .task import Task
@@ -62,7 +62,7 @@ def trajectory(
     """
     plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE)
     steps = int(plant.of(lane, Row.STEP))
-    rows = task.samples.rows[lane, 1 : steps + 1, 0]
+    rows = task.samples.rows[lane, 1 : steps + 1, CONTROLLED]
     if steps:
         deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - nominal_force))
         highest = np.max(np.abs(rows[:, Row.WIRE_HEIGHT]))

@@ -14,7 +14,7 @@ from ..plant.valid_range import Ending
 from .episode import Results
 from .running_figures import no_figures
 from .start import LaneGenerators, draw_starts
-from .state import Result, TaskRow
+from .state import CONTROLLED, Result, TaskRow
 
 if TYPE_CHECKING:
     from .task import Task
@@ -42,10 +42,10 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
     _begin(task, lanes, end)
     plant.clear(task.samples, lanes)
-    samples = plant.run.table[0, lanes, :SAMPLE_ROWS]
+    samples = plant.run.table[:, lanes, :SAMPLE_ROWS]
     task.sensors.reset(lanes, samples)
     if task.keep_samples:
-        task.samples.rows[lanes, 0, 0] = samples
+        task.samples.rows[lanes, 0] = samples.swapaxes(0, 1)
     if task.odometers.drawn:
         for lane in lanes.tolist():
             task.odometers.start(task.episode.odometer, lane, of_lane(lane), task.noise is not None)
@@ -59,7 +59,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
 
 def _begin(task: Task, lanes: Any, end: Array) -> None:
     """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
-    start, table = task.plant.run.table[0, lanes], task.episode.table
+    start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]

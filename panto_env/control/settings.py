@@ -30,6 +30,7 @@ from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
+from ..plant.train import Train
 from .observation import OBSERVATIONS
 from .reward import REWARDS, Reward
 
@@ -210,6 +211,11 @@ class RunSettings(Numerics):
     )
     control_interval: ControlInterval = Field(0.01, description="time between two actions (s)")
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
+
+    @property
+    def train(self) -> Train:
+        """The train: one collector."""
+        return Train.of(self.pantograph, self.actuator, self.sensors)
 
     @property
     def speeds(self) -> tuple[float, float]:

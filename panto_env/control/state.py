@@ -84,6 +84,8 @@ class Flag(IntEnum):
     TRUNCATED = 1  # whether the end of the run is reached, within it
 
 
+CONTROLLED = 0
+"""The collector that is controlled, observed and judged."""
 TASK_ROW, TERM, NOW = constants(TaskRow), constants(Term), constants(Now)
 RESULT, FLAG = constants(Result), constants(Flag)
 NOW_ROWS = int(Now.READING) + len(Reading)

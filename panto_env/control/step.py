@@ -17,21 +17,21 @@ from ..backend import (
     share_done,
 )
 from ..plant.catenary.protocol import ending_by_wire
-from ..plant.drift import mean_stride, position_after
 from ..plant.sensors import take_first_readings, take_readings
-from ..plant.state import CONTACTS, PLACE, ROW
+from ..plant.state import PLACE, ROW
 from ..plant.step import record_lane, step_lane
+from ..plant.train import mean_stride, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .observation import begin_history, entry_of, prepare_entries, remember
 from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
-from .state import FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
+from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 
 @inlined
 def take_action(run, episode, task, now, lane):
     """Clip a lane's action; the forces that it asks for, and the reward's terms of it."""
-    for c in range(CONTACTS):
+    for c in range(run.command.shape[0]):
         run.command[c, lane, PLACE.FRAME] = 0.0
         run.command[c, lane, PLACE.HEAD] = 0.0
     now[NOW.EFFORT] = 0.0
@@ -42,7 +42,7 @@ def take_action(run, episode, task, now, lane):
         now[NOW.EFFORT] += action * action
         now[NOW.RATE] += change * change
         task[TASK_ROW.ACTION + a] = action
-        run.command[0, lane, episode.places[a]] = action * episode.force_limit
+        run.command[CONTROLLED, lane, episode.places[a]] = action * episode.force_limit
 
 
 @inlined
@@ -75,7 +75,7 @@ def tell(run, own, values, lane):
     values[RESULT.WIRE_HEIGHT] = own[ROW.WIRE_HEIGHT]
     values[RESULT.FRAME_FORCE] = own[ROW.FRAME_FORCE]
     values[RESULT.HEAD_FORCE] = own[ROW.HEAD_FORCE]
-    values[RESULT.POSITION] = position_after(run, own, own[ROW.STEP], lane)
+    values[RESULT.POSITION] = position(run, CONTROLLED, lane, own[ROW.STEP])
 
 
 @inlined
@@ -85,21 +85,21 @@ def control_lane(packed, entries, values, flags, lane):
     Returns whether its episode has ended.
     """
     line, wire, pantographs, actuators, run, sensors, samples, episode, running, _ = open_packed(packed)
-    own, task, now = run.table[0, lane], episode.table[lane], episode.now[lane]
+    own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
     take_action(run, episode, task, now, lane)
     ended = False
     for _ in range(episode.steps[lane]):
         if own[ROW.STEP] >= task[TASK_ROW.END]:
             break  # no step beyond it, whoever asks: there are neither line nor rows of samples
         begin_terms(task, now)
-        now[NOW.STRIDE] = mean_stride(run, own, float(episode.control_steps), lane)
+        now[NOW.STRIDE] = mean_stride(run, CONTROLLED, lane, float(episode.control_steps))
         for step in range(1, episode.control_steps + 1):
             force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
             step_lane(line, wire, pantographs, actuators, run, lane)
             record_lane(line, wire, run, samples, lane)
             add_sample_to_terms(own, task, now, force)
             add_sample_to_figures(running, samples, own, task, frame, head, lane)
-            take_readings(sensors, step, own, now[NOW.READING :], lane)
+            take_readings(sensors, CONTROLLED, step, own, now[NOW.READING :], lane)
         compute_reward(episode, own, task, now, values)
         add_control_step_to_figures(task, now, values)
         ended = end_episode(line, wire, episode, own, task, values, flags, lane)
@@ -160,8 +160,8 @@ def observe_start(packed, entries, values, flags, first, last):
     _, _, _, _, run, sensors, _, episode, _, _ = open_packed(packed)
     for lane in range(first, last):
         if not episode.idle[lane]:
-            own, task, now = run.table[0, lane], episode.table[lane], episode.now[lane]
-            take_first_readings(sensors, own, now[NOW.READING :], lane)
+            own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
+            take_first_readings(sensors, CONTROLLED, own, now[NOW.READING :], lane)
             prepare_entries(episode, sensors, run, own, now, lane)
             begin_history(episode, task, now)
             for k in range(entries.shape[1]):

@@ -32,7 +32,7 @@ from .reset import reset
 from .running_figures import figures_so_far, running_figures
 from .settings import RunSettings
 from .start import LaneGenerators
-from .state import TaskRow
+from .state import CONTROLLED, TaskRow
 from .stepping import Stepping
 
 
@@ -75,7 +75,7 @@ class Task(Stepping):
         if settings.reward.target == "passive":
             self.passive = passive_run(settings, length.speed_range, passive_pass)
         self.speed = plant.speed  # of each lane (m/s)
-        odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment.mean_length)
+        odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
         super().__init__(
@@ -105,7 +105,7 @@ class Task(Stepping):
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
         """Sensors of all lanes, and the rms of their noise."""
         settings = self.settings
-        form = plant.time_step, self.length.control_steps, lanes
+        form = plant.time_step, self.length.control_steps, lanes, len(plant.train.collectors)
         if settings.observation != ESTIMATED:
             return settings.sensors.arrays(*form), settings.sensors.noise_rms
         from ..estimation.readings import estimating  # slow: it imports SciPy
@@ -175,7 +175,7 @@ class Task(Stepping):
 
     def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
         """The same of several lanes, (n,), by name; and which have none, as their computation diverged."""
-        run, supports = self.plant.run.table[0, lanes], self.plant.model.supports
+        run, supports = self.plant.run.table[CONTROLLED, lanes], self.plant.model.supports
         with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
             figures = figures_so_far(
                 self.episode.table[lanes],

@@ -36,8 +36,9 @@ class EstimatingArrays(NamedTuple):
     """
 
     sensors: Any  # that read all but the contact force
-    table: Array  # (lanes, 2 N + m + 1)
-    noise: Array  # (lanes, times, readings + m samples): of readings, then of each sample in a control step
+    table: Array  # (collectors, lanes, 2 N + m + 1)
+    # (lanes, collectors, times, readings + m samples): of readings, then of the samples of a control step
+    noise: Array
     noise_used: Index  # (lanes,): how many of them have been used
     every: int  # plant steps between two samples
     kept: Array  # (N, N): next state from this one
@@ -48,13 +49,13 @@ class EstimatingArrays(NamedTuple):
     shape: Array  # (masses, 2): displacements at rest from those of head and frame
 
     def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS), at rest."""
+        """Let lanes have been at rest as in these samples, (collectors, lanes, SAMPLE_ROWS)."""
         self.sensors.reset(lanes, samples)
         masses, (size, measured) = len(self.shape), self.driven.shape
-        rows = np.zeros((len(samples), self.table.shape[1]))
-        rows[:, :masses] = samples[:, [Row.HEAD_HEIGHT, Row.FRAME_HEIGHT]] @ self.shape.T
-        rows[:, [2 * masses, size + measured]] = samples[:, [Row.CONTACT_FORCE]]
-        self.table[lanes] = rows
+        rows = np.zeros((*samples.shape[:2], self.table.shape[2]))
+        rows[..., :masses] = samples[..., [Row.HEAD_HEIGHT, Row.FRAME_HEIGHT]] @ self.shape.T
+        rows[..., [2 * masses, size + measured]] = samples[..., [Row.CONTACT_FORCE]]
+        self.table[:, lanes] = rows
 
 
 def estimating(
@@ -66,6 +67,7 @@ def estimating(
     time_step: float,
     control_steps: int,
     lanes: int,
+    collectors: int,
 ) -> tuple[SensorArrays, tuple[float, ...] | None]:
     """Sensors with an estimator of the contact force, and the rms of each number of their noise, if any.
 
@@ -84,9 +86,9 @@ def estimating(
         samples = (displacement, displacement, velocity, velocity)[:measured] * (control_steps // every)
         rms = (*rms[: Reading.CONTACT_FORCE], 0.0, *samples)
     arrays = EstimatingArrays(
-        sensors=sensors.arrays(time_step, control_steps, lanes),
-        table=aligned_zeros((lanes, 2 * size + measured + 1)),
-        noise=np.zeros((lanes, AHEAD if rms else 0, len(rms or ()))),
+        sensors=sensors.arrays(time_step, control_steps, lanes, collectors),
+        table=aligned_zeros((collectors, lanes, 2 * size + measured + 1)),
+        noise=np.zeros((lanes, collectors, AHEAD if rms else 0, len(rms or ()))),
         noise_used=np.zeros(lanes, dtype=np.int64),
         every=every,
         kept=np.ascontiguousarray(model.transition @ corrected),
@@ -117,15 +119,15 @@ def _rest_shape(pantograph: PantographData) -> Array:
 
 
 @inlined
-def take_sample(sensors, step, own, sample, lane):
+def take_sample(sensors, collector, step, own, sample, lane):
     """Write a lane's sample, with noise, into its rows."""
     count = sensors.driven.shape[1]
     first = READINGS + count * (step // sensors.every - 1)
     for c in range(count):
         sample[c] = own[SENSED[c]]
-        if sensors.noise.shape[1] > 0:
-            time = min(sensors.noise_used[lane], sensors.noise.shape[1] - 1) & NOT_NEGATIVE
-            sample[c] += sensors.noise[lane, time, first + c]
+        if sensors.noise.shape[2] > 0:
+            time = min(sensors.noise_used[lane], sensors.noise.shape[2] - 1) & NOT_NEGATIVE
+            sample[c] += sensors.noise[lane, collector, time, first + c]
 
 
 @inlined
@@ -152,18 +154,18 @@ def filter_sample(sensors, own, rows):
 
 
 @implements(take_readings, EstimatingArrays)
-def _take_readings(sensors, step, own, readings, lane):
+def _take_readings(sensors, collector, step, own, readings, lane):
     size, count = sensors.kept.shape[0], sensors.driven.shape[1]
-    rows = sensors.table[lane]
+    rows = sensors.table[collector, lane]
     if step % sensors.every == 0:
-        take_sample(sensors, step, own, rows[size:], lane)
+        take_sample(sensors, collector, step, own, rows[size:], lane)
         filter_sample(sensors, own, rows)
     true = own[ROW.CONTACT_FORCE]
     own[ROW.CONTACT_FORCE] = rows[size + count]
-    take_readings(sensors.sensors, step, own, readings, lane)
+    take_readings(sensors.sensors, collector, step, own, readings, lane)
     own[ROW.CONTACT_FORCE] = true
 
 
 @implements(take_first_readings, EstimatingArrays)
-def _take_first_readings(sensors, own, readings, lane):
-    take_first_readings(sensors.sensors, own, readings, lane)
+def _take_first_readings(sensors, collector, own, readings, lane):
+    take_first_readings(sensors.sensors, collector, own, readings, lane)

@@ -145,6 +145,15 @@ def in_spans(alignment, x):
 
 
 @inlined
+def mean_over_own_length(alignment, counted):
+    """Mean length of a span over that of the one at a position in spans; 1 where all have one length."""
+    if alignment.per_metre > 0.0:
+        return 1.0
+    k = min(max(int(counted), 0), alignment.supports.size - 2) & NOT_NEGATIVE
+    return alignment.mean_length / (alignment.supports[k + 1] - alignment.supports[k])
+
+
+@inlined
 def span_index(alignment, x):
     """Number, counted from 0, of the span at a position (m) of a line whose spans differ in length."""
     last = alignment.supports.size - 2

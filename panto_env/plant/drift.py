@@ -12,7 +12,6 @@ import numpy as np
 
 from ..backend import inlined
 from ..base.arrays import Array
-from .state import ROW
 from .trigonometry import cosine_of_turns, sine_of_turns
 
 PERIODS = (7.0, 13.0, 29.0)
@@ -61,35 +60,18 @@ def ahead(drift: Array, steps: Array) -> Array:
 
 
 @inlined
-def position_after(run, own, steps, lane):
-    """Where the contact point is (m) after so many steps, of which one may be a half."""
-    x = own[ROW.STRIDE] * steps
-    if run.drift.shape[1] > 0:
-        drift = run.drift[lane]
-        x += drift[0]
-        for k in range(1, run.drift.shape[1], 3):
-            x += drift[k] * sine_of_turns(drift[k + 1] * steps + drift[k + 2])
-    return x
+def drifted_way(drift, way, steps):
+    """Way (m) after a number of steps of a lane whose speed drifts; way: at its mean speed (m)."""
+    way += drift[0]
+    for k in range(1, drift.size, 3):
+        way += drift[k] * sine_of_turns(drift[k + 1] * steps + drift[k + 2])
+    return way
 
 
 @inlined
-def stride_after(run, own, steps, lane):
-    """How far the contact point moves in a step (m), by its speed after so many steps."""
-    stride = own[ROW.STRIDE]
-    if run.drift.shape[1] > 0:
-        drift = run.drift[lane]
-        for k in range(1, run.drift.shape[1], 3):
-            turns = drift[k + 1] * steps + drift[k + 2]
-            stride += _TURN * drift[k] * drift[k + 1] * cosine_of_turns(turns)
-    return stride
-
-
-@inlined
-def mean_stride(run, own, steps, lane):
-    """The same as a mean over so many steps to come."""
-    stride = own[ROW.STRIDE]
-    if run.drift.shape[1] > 0:
-        begin, end = own[ROW.STEP], own[ROW.STEP] + steps
-        way = position_after(run, own, end, lane) - position_after(run, own, begin, lane)
-        stride = way * (1.0 / steps)
+def drifting_stride(drift, stride, steps):
+    """Distance covered in a step (m), by the speed after a number of steps; stride: its mean (m)."""
+    for k in range(1, drift.size, 3):
+        turns = drift[k + 1] * steps + drift[k + 2]
+        stride += _TURN * drift[k] * drift[k + 1] * cosine_of_turns(turns)
     return stride

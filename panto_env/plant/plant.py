@@ -1,4 +1,4 @@
-"""Lanes of pantographs on one line: the arrays behind the kernels."""
+"""Lanes of trains on one line: the arrays behind the kernels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
-from .actuators import ActuatorSettings, actuator_settings
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
@@ -20,60 +19,62 @@ from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
-from .state import CONTACTS, SAMPLE_ROWS, Place, Row, Run, Samples, Scratch
+from .state import SAMPLE_ROWS, Place, Row, Run, Samples, Scratch
 from .step import advance
+from .train import Train
 
 
 class Plant:
-    """Pantographs on a line, one row per lane; all lanes advance together in one kernel call."""
+    """A train on a line in each lane; all lanes advance together in one kernel call."""
 
     def __init__(
         self,
         catenary: CatenaryData,
-        pantograph: PantographData,
+        train: Train,
         *,
         lanes: int = 1,
         spans: int | None = None,
         numerics: Numerics | None = None,
-        actuator: ActuatorSettings | None = None,
         runs: Runs = RUNS,
         bilateral: bool = False,
         varied: bool = False,
         drifting: bool = False,
     ) -> None:
-        """Build the line and ``lanes`` pantographs; each lane must be started before it advances.
+        """Build the line and the tables of so many lanes; each must be started before it advances.
 
         runs: what the plant must be good for: speeds, conditions of the line. bilateral: let the
         contact pull, as paper 3's equations do. varied: each lane may have a pantograph that differs in
         its values. drifting: each may have a speed that drifts. Raises InputError where grid and step are
         not usable, or the line has not what is said to be defective.
         """
-        self.catenary, self.pantograph, self.lanes = catenary, pantograph, lanes
+        self.catenary, self.train, self.lanes = catenary, train, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
         self.alignment = catenary.alignment(self.spans)
         self.runs = runs
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
             lanes=lanes,
+            collectors=len(train.collectors),
             spans=self.spans,
             numerics=numerics or Numerics(),
             runs=runs,
         )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
-        size = 2 * len(pantograph.masses)
-        self.pantographs = pantographs(size, lanes if varied else 1)
-        actuator = actuator or actuator_settings("ideal")
+        count, actuator = len(train.collectors), train.first.actuator
+        size = 2 * len(self.pantograph.masses)
+        self.pantographs = pantographs(size, count, lanes if varied else 1)
         self._reflected = actuator.reflected_masses
-        every = np.arange(len(self.pantographs.table))
-        self.pantographs.set_lanes(every, pantograph, self.model, self._reflected)
-        self.actuators = actuator.arrays(self.time_step, lanes)
+        every = np.arange(self.pantographs.table.shape[1])
+        self.pantographs.set_lanes(0, every, self.pantograph, self.model, self._reflected)
+        self.actuators = actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
-            table=aligned_zeros((CONTACTS, lanes, Row.STATE + size)),
-            command=aligned_zeros((CONTACTS, lanes, len(Place))),
-            scratch=aligned_zeros((CONTACTS, lanes, len(Scratch))),
-            free_state=aligned_zeros((CONTACTS, lanes, size)),
+            table=aligned_zeros((count, lanes, Row.STATE + size)),
+            distance=np.array([collector.distance for collector in train.collectors]),
+            command=aligned_zeros((count, lanes, len(Place))),
+            scratch=aligned_zeros((count, lanes, len(Scratch))),
+            free_state=aligned_zeros((count, lanes, size)),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
             lowest_force=-np.inf if bilateral else 0.0,
@@ -89,23 +90,29 @@ class Plant:
         vars(self).update(state)
         copy_whole(*self.arrays)
 
+    @property
+    def pantograph(self) -> PantographData:
+        """The first collector's pantograph."""
+        return self.train.first.pantograph
+
     def row(self, row: Row) -> Array:
-        """A row of the first contact in all lanes, (lanes,), a copy."""
+        """A row of the first collector in all lanes, (lanes,), a copy."""
         return self.run.table[0, :, row].copy()
 
     def of(self, lane: int, row: Row) -> float:
-        """A row of the first contact in one lane."""
+        """A row of the first collector in one lane."""
         return float(self.run.table[0, lane, row])
 
     def ahead(self, lanes: Any, steps: Array) -> Array:
         """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
         return ahead(self.run.drift[lanes], steps)
 
-    def position(self, lane: int, steps: Any) -> Array:
-        """Where the train of a lane is (m), (n,), after numbers of steps, (n,), which may be fractions."""
+    def position(self, lane: int, steps: Any, collector: int = 0) -> Array:
+        """Where a lane's collector is (m), (n,), after numbers of steps, (n,), which may be fractions."""
         steps = np.atleast_1d(steps)
         steady = steps * self.time_step * self.speed[lane]
-        return np.asarray(steady + self.ahead(np.array([lane]), steps[None])[0])
+        way = steady + self.ahead(np.array([lane]), steps[None])[0]
+        return np.asarray(way - self.train.collectors[collector].distance)
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -138,7 +145,7 @@ class Plant:
         self.speed[lanes] = speeds
         drawn = drawn or [DrawnLine(self.runs.conditions[0])] * len(lanes)
         for lane, own in zip(lanes, pantographs, strict=False):
-            self.pantographs.set_lanes(lane, own, self.model, self._reflected)
+            self.pantographs.set_lanes(0, lane, own, self.model, self._reflected)
         waves = np.zeros((len(lanes), run.waves.shape[1]))
         for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
             own_waves[: line.waves.size] = line.waves.ravel()
@@ -146,7 +153,7 @@ class Plant:
         run.drift[lanes] = 0.0 if drift is None else drift
         height, wire, spring = self.model.start_point
         heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
-        strip = float(self.pantographs.table[0, Part.STRIP_COMPLIANCE])  # all have the same strips
+        strip = float(self.pantographs.table[0, 0, Part.STRIP_COMPLIANCE])  # all have the same strips
         compliance = strip + wire + spring
         nominal_forces = self.pantograph.nominal_force(speeds)
         if static_forces is not None:
@@ -171,7 +178,7 @@ class Plant:
         """Arrays of ``rows`` rows for kernels to record in: one more than steps are to be kept."""
         droppers = len(self.model.droppers) if tension else 0
         return Samples(
-            rows=np.zeros((self.lanes, rows, CONTACTS, SAMPLE_ROWS)),
+            rows=np.zeros((self.lanes, rows, len(self.train.collectors), SAMPLE_ROWS)),
             uplift=np.zeros((self.lanes, rows, len(self.model.supports))),
             tension=np.zeros((self.lanes, rows, droppers)),
         )
@@ -184,7 +191,7 @@ class Plant:
                 samples.tension[lane] = self.model.rest_tension(lane)
 
     def advance(self, command: Array, steps: int, samples: Samples) -> None:
-        """Advance all lanes by ``steps`` under commands (N), (lanes, contacts, places).
+        """Advance all lanes by ``steps`` under commands (N), (lanes, collectors, places).
 
         The sample of a lane's step n (counted from 0) is recorded in row n + 1. Raises InputError where a
         train would run beyond the line's end, or the samples have no row for a step.
@@ -211,4 +218,4 @@ class Plant:
 
     def advance_passively(self, steps: int, samples: Samples) -> None:
         """Advance all lanes by ``steps`` without actuators."""
-        self.advance(np.zeros((self.lanes, CONTACTS, len(Place))), steps, samples)
+        self.advance(np.zeros((self.lanes, len(self.train.collectors), len(Place))), steps, samples)

@@ -8,9 +8,6 @@ from typing import NamedTuple
 from ..backend import NOT_NEGATIVE, constants, inlined
 from ..base.arrays import Array
 
-CONTACTS = 1
-"""Contact points per lane: pantographs on one line, each with an axis of its own in all that moves."""
-
 
 class Place(IntEnum):
     """Where a force acts on a pantograph: a row of each array of forces."""
@@ -20,7 +17,7 @@ class Place(IntEnum):
 
 
 class Row(IntEnum):
-    """Rows of the table of all lanes, for each contact.
+    """Rows of the table of all lanes, for each collector.
 
     The sample of the last step comes first; each of its values is the mean over the step, so it belongs
     to the middle of the step.
@@ -41,7 +38,7 @@ class Row(IntEnum):
 
 
 class Scratch(IntEnum):
-    """Rows of what a kernel keeps of a contact during a step."""
+    """Rows of what a kernel keeps of a collector during a step."""
 
     IRREGULARITY = 0  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 1  # height of the wire where it is touched, at the step's start (m)
@@ -54,12 +51,13 @@ SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 
 
 class Run(NamedTuple):
-    """Where each lane is on its line, its pantographs' motion, and their contacts."""
+    """Where each lane's train is on its line, its pantographs' motion, and their contacts."""
 
-    table: Array  # (contacts, lanes, STATE + 2n): the rows above
-    command: Array  # (contacts, lanes, places): of the actuators (N)
-    scratch: Array  # (contacts, lanes, rows of ``Scratch``)
-    free_state: Array  # (contacts, lanes, 2n): at the step's end, without the contact force
+    table: Array  # (collectors, lanes, STATE + 2n): the rows above
+    distance: Array  # (collectors,): behind the first collector (m)
+    command: Array  # (collectors, lanes, places): of the actuators (N)
+    scratch: Array  # (collectors, lanes, rows of ``Scratch``)
+    free_state: Array  # (collectors, lanes, 2n): at the step's end, without the contact force
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
@@ -68,7 +66,7 @@ class Run(NamedTuple):
 class Samples(NamedTuple):
     """What a kernel call records; arrays of no columns or one row record nothing."""
 
-    rows: Array  # (lanes, steps, contacts, SAMPLE_ROWS); step 0 is the start
+    rows: Array  # (lanes, steps, collectors, SAMPLE_ROWS); step 0 is the start
     uplift: Array  # (lanes, steps, supports): of the contact wire at the end of the step (m)
     tension: Array  # (lanes, steps, droppers): mean over the step (N)
 

@@ -14,9 +14,9 @@ from .catenary.protocol import (
     rise_at_contact,
 )
 from .contact import contact_force
-from .drift import mean_stride, position_after
 from .pantograph.step import PART, add_contact_force, move_freely
-from .state import CONTACTS, PLACE, ROW, SAMPLE_ROWS, SCRATCH, own_row
+from .state import PLACE, ROW, SAMPLE_ROWS, SCRATCH, own_row
+from .train import mean_stride, position
 from .trigonometry import cosine_of_turns
 
 
@@ -34,8 +34,8 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
     """Begin the step of one contact's pantograph: all but the contact force."""
     own, scratch = run.table[contact, lane], run.scratch[contact, lane]
     drive(actuators, pantographs, contact, own, run.command[contact, lane], lane)
-    move_freely(pantographs, own, run.free_state[contact, lane], lane)
-    x = position_after(run, own, own[ROW.STEP] + 0.5, lane)
+    move_freely(pantographs, contact, own, run.free_state[contact, lane], lane)
+    x = position(run, contact, lane, own[ROW.STEP] + 0.5)
     scratch[SCRATCH.IRREGULARITY] = irregularity(run, x, lane)
     before, middle = place_contact(line, wire, lane, contact, x)
     scratch[SCRATCH.WIRE_BEFORE] = before
@@ -45,9 +45,9 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
 @inlined
 def rise_along(line, wire, run, contact, own, lane):
     """How far the wire rises over the way of the step (m): what a damped contact feels."""
-    x0 = position_after(run, own, own[ROW.STEP], lane)
-    x1 = position_after(run, own, own[ROW.STEP] + 1.0, lane)
-    way = mean_stride(run, own, 1.0, lane)
+    x0 = position(run, contact, lane, own[ROW.STEP])
+    x1 = position(run, contact, lane, own[ROW.STEP] + 1.0)
+    way = mean_stride(run, contact, lane, 1.0)
     uneven = irregularity(run, x1, lane) - irregularity(run, x0, lane)
     return uneven + rise_at_contact(line, wire, lane, contact, x0, x0 + way)
 
@@ -56,9 +56,12 @@ def rise_along(line, wire, run, contact, own, lane):
 def meet(line, wire, pantographs, run, contact, lane):
     """The contact force over the step, from head and wire as they would move without it."""
     own, scratch = run.table[contact, lane], run.scratch[contact, lane]
-    free_head, parts = run.free_state[contact, lane, 0], pantographs.table[own_row(pantographs.table, lane)]
+    free_head, parts = (
+        run.free_state[contact, lane, 0],
+        pantographs.table[contact, own_row(pantographs.table[contact], lane)],
+    )
     contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
-    x = position_after(run, own, own[ROW.STEP] + 0.5, lane)
+    x = position(run, contact, lane, own[ROW.STEP] + 0.5)
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, own, lane)
@@ -89,7 +92,7 @@ def finish(pantographs, run, contact, lane):
     frame, head_speed = ROW.STATE + pantographs.size // 2 - 1, ROW.STATE + pantographs.size // 2
     frame_speed = ROW.STATE + pantographs.size - 1
     frame_before, head_speed_before, frame_speed_before = own[frame], own[head_speed], own[frame_speed]
-    add_contact_force(pantographs, own, run.free_state[contact, lane], lane)
+    add_contact_force(pantographs, contact, own, run.free_state[contact, lane], lane)
     own[ROW.FRAME_HEIGHT] = 0.5 * (frame_before + own[frame])
     own[ROW.HEAD_VELOCITY] = 0.5 * (head_speed_before + own[head_speed])
     own[ROW.FRAME_VELOCITY] = 0.5 * (frame_speed_before + own[frame_speed])
@@ -99,13 +102,13 @@ def finish(pantographs, run, contact, lane):
 @inlined
 def step_lane(line, wire, pantographs, actuators, run, lane):
     """One step of one lane under ``run.command``."""
-    for c in range(CONTACTS):
+    for c in range(run.table.shape[0]):
         approach(line, wire, pantographs, actuators, run, c, lane)
     advance_wire(line, wire, lane)
-    for c in range(CONTACTS):
+    for c in range(run.table.shape[0]):
         meet(line, wire, pantographs, run, c, lane)
     end_step(line, wire, lane)
-    for c in range(CONTACTS):
+    for c in range(run.table.shape[0]):
         finish(pantographs, run, c, lane)
 
 
@@ -115,7 +118,7 @@ def record_lane(line, wire, run, samples, lane):
     rows, uplift, tension = samples.rows, samples.uplift, samples.tension
     n = int(run.table[0, lane, ROW.STEP]) & NOT_NEGATIVE
     if rows.shape[1] > 1:
-        for c in range(CONTACTS):
+        for c in range(run.table.shape[0]):
             own = run.table[c, lane]
             for k in range(SAMPLE_ROWS):
                 rows[lane, n, c, k] = own[k]
@@ -128,12 +131,12 @@ def record_lane(line, wire, run, samples, lane):
 def advance(packed, samples, command, steps, first, last):
     """Advance the lanes from ``first`` to before ``last`` by ``steps``.
 
-    packed: line, wire, pantographs, actuators and run. command: of the actuators (N), (lanes, contacts,
+    packed: line, wire, pantographs, actuators and run. command: of the actuators (N), (lanes, collectors,
     places).
     """
     line, wire, pantographs, actuators, run = open_packed(packed)
     for lane in range(first, last):
-        for c in range(CONTACTS):
+        for c in range(run.table.shape[0]):
             for place in (PLACE.FRAME, PLACE.HEAD):
                 run.command[c, lane, place] = command[lane, c, place]
         for _ in range(steps):

@@ -60,7 +60,7 @@ class RigComputer:
         condition = line_condition or LineCondition()
         runs = Runs((speed, speed), self.interval, (condition,))
         self._model = model = Rig(
-            data, lanes=1, spans=spans or data.spans, numerics=numerics or Numerics(), runs=runs
+            data, lanes=1, collectors=1, spans=spans or data.spans, numerics=numerics or Numerics(), runs=runs
         )
         check_speeds(data.name, model.wave_speed, [speed])
         self._drawn, self._start_force, self._range = DrawnLine(condition), force, data.load_cell.force_range

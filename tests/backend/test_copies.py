@@ -150,7 +150,7 @@ def test_tasks_and_plants_are_copied_too():
     np.testing.assert_array_equal(twin.results.reward_and_terms, task.results.reward_and_terms)
     np.testing.assert_equal(twin.figures(1).as_dict(), task.figures(1).as_dict())
     settings = run_settings({})
-    plant = Plant(settings.catenary, settings.pantograph, lanes=2)
+    plant = Plant(settings.catenary, settings.train, lanes=2)
     plant.start(np.arange(2), np.array([80.0, 81.0]))
     samples = [each.samples(51) for each in (plant, plant)]
     twin = pickle.loads(pickle.dumps(plant))

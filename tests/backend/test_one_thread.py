@@ -19,6 +19,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 
 
 def used_by_four_threads(env, action, tries=2000, patience=60.0):
@@ -187,7 +188,7 @@ def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
 
 
 def test_a_plant_runs_neither_beyond_its_line_nor_without_rows():
-    plant = Plant(load_catenary("en50318-2002"), load_pantograph("en50318-2002"), spans=10)
+    plant = Plant(load_catenary("en50318-2002"), Train.of(load_pantograph("en50318-2002")), spans=10)
     plant.start(0, 80.0)
     with pytest.raises(InputError, match="rows for 99 steps, not for 100; ask for more"):
         plant.advance_passively(100, plant.samples(100))

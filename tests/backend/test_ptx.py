@@ -9,12 +9,13 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.contact import contact_force
 from panto_env.plant.plant import Plant
 from panto_env.plant.step import step_lane
+from panto_env.plant.train import Train
 
 LINES = {"en50318-2002": "en50318-2002", "ohl-three-span": "dsa350", "periodic-stiffness": "three-mass"}
 
 
 def plant(line):
-    return Plant(load_catenary(line), load_pantograph(LINES[line]))
+    return Plant(load_catenary(line), Train.of(load_pantograph(LINES[line])))
 
 
 def test_contact_law():

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...backend import implements
 from ...base.ranges import Between
-from ..state import CONTACTS, ROW, Place
+from ..state import ROW, Place
 from .base import ActuatorSettings, drive
 
 
@@ -19,8 +19,8 @@ class IntegratingActuator(ActuatorSettings):
         0.1, description="time in which the full command is reached (s)"
     )
 
-    def arrays(self, time_step, lanes):
-        table = np.zeros((CONTACTS, lanes, len(Place)))
+    def arrays(self, time_step, lanes, collectors):
+        table = np.zeros((collectors, lanes, len(Place)))
         return IntegratingArrays(table, time_step / self.time)
 
 
@@ -28,13 +28,13 @@ KIND = IntegratingActuator
 
 
 class IntegratingArrays(NamedTuple):
-    table: np.ndarray  # (contacts, lanes, places): force that the motor has wound up (N)
+    table: np.ndarray  # (collectors, lanes, places): force that the motor has wound up (N)
     share: float  # of the command, per step
 
 
 @implements(drive, IntegratingArrays)
-def _drive(actuators, pantographs, contact, own, command, lane):
-    turned = actuators.table[contact, lane]
+def _drive(actuators, pantographs, collector, own, command, lane):
+    turned = actuators.table[collector, lane]
     for place in range(turned.size):
         turned[place] += actuators.share * command[place]
         own[ROW.FRAME_FORCE + place] = turned[place]

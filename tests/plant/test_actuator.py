@@ -8,6 +8,7 @@ from panto_env.plant.actuators.lagged import LaggedActuator
 from panto_env.plant.numerics import Numerics
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
+from panto_env.plant.train import Train
 
 pytestmark = pytest.mark.plain
 
@@ -16,7 +17,7 @@ STEP = 1e-3
 
 def response(actuator, command, steps=200, step=STEP):
     line, pantograph = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
-    plant = Plant(line, pantograph, numerics=Numerics(time_step=step), actuator=actuator)
+    plant = Plant(line, Train.of(pantograph, actuator), numerics=Numerics(time_step=step))
     samples = plant.samples(steps + 1)
     plant.start(0, 50.0)
     plant.advance(np.array([[[command, 0.0]]]), steps, samples)

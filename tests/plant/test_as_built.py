@@ -14,6 +14,7 @@ from panto_env.plant.catenary.flexible.wires import rise_by_defects, static_heig
 from panto_env.plant.line_condition import LINE_CONDITIONS, DrawnLine, LineCondition, draw
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 
 from ..lanes import check_lanes_are_singles
 
@@ -87,7 +88,7 @@ def test_a_drawn_tension_is_that_of_a_line_built_with_what_is_left(name):
         (lost, DrawnLine(lost)),
         (LineCondition(), DrawnLine(LineCondition())),
     ):
-        plant = Plant(data, PANTOGRAPH, spans=8, numerics=numerics, runs=Runs(conditions=(built,)))
+        plant = Plant(data, Train.of(PANTOGRAPH), spans=8, numerics=numerics, runs=Runs(conditions=(built,)))
         plant.start(0, 250 / 3.6, [drawn])
         samples = plant.samples(5001)
         plant.advance_passively(5000, samples)
@@ -103,7 +104,7 @@ def test_more_tension_raises_the_wire_in_the_middle_of_a_span():
     """
     data = load_catenary(EN50318)
     condition = LineCondition(tension_scatter=0.02)
-    plant = Plant(data, PANTOGRAPH, spans=6, lanes=2, runs=Runs(conditions=(condition,)))
+    plant = Plant(data, Train.of(PANTOGRAPH), spans=6, lanes=2, runs=Runs(conditions=(condition,)))
     heights, more = [], 0.03
     for lane, messenger in enumerate((1.0, 1 + more)):
         plant.model.settle(lane, DrawnLine(condition, tensions=(1.0, messenger)), 0.0)

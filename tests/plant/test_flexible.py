@@ -17,6 +17,7 @@ from panto_env.plant.catenary.flexible.wires import leapfrog
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 
 from ..finite_element import simulation as finite_element
 
@@ -238,13 +239,13 @@ def test_wire_force_balance_in_the_mean(reference_run):
 def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
     speeds = [200 / 3.6, 300 / 3.6, 350 / 3.6]
-    batch = Plant(line, pantograph, lanes=3)
+    batch = Plant(line, Train.of(pantograph), lanes=3)
     together = batch.samples(801)
     for lane, speed in enumerate(speeds):
         batch.start(lane, speed)
     batch.advance(np.zeros((3, 1, 2)), 800, together)
     for lane, speed in enumerate(speeds):
-        alone = Plant(line, pantograph)
+        alone = Plant(line, Train.of(pantograph))
         samples = alone.samples(801)
         alone.start(0, speed)
         alone.advance(np.zeros((1, 1, 2)), 300, samples)
@@ -253,7 +254,9 @@ def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
 
 
 def test_restarted_lane_forgets_the_run_before():
-    plant = Plant(load_catenary("en50318-2002"), load_pantograph("en50318-2002"), numerics=Numerics(window=3))
+    plant = Plant(
+        load_catenary("en50318-2002"), Train.of(load_pantograph("en50318-2002")), numerics=Numerics(window=3)
+    )
     runs = []
     for _ in range(2):
         samples = plant.samples(1301)  # the window has begun to travel

@@ -18,6 +18,7 @@ from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import DrawnLine, LineCondition, draw
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 
 from ..finite_element import simulation as finite_element
 from ..finite_element.system import build
@@ -134,7 +135,7 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     condition = LineCondition(miscut_droppers=[(3, 4, 0.02)])
     plant = Plant(
         data,
-        load_pantograph(BENCHMARK),
+        Train.of(load_pantograph(BENCHMARK)),
         spans=5,
         numerics=Numerics(**WHOLE, spacing=0.2),
         runs=Runs(conditions=[condition]),

@@ -17,6 +17,7 @@ from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.pantograph.build import matrices
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
+from panto_env.plant.train import Train
 
 from ..motor_reference import Rig
 
@@ -55,9 +56,8 @@ class Bench:
         conditions = (LineCondition(wear_depth=1e-3, wear_wavelength=100.0),)  # room for one wave
         self.plant = Plant(
             line,
-            pantograph,
+            Train.of(pantograph, motor),
             numerics=Numerics(time_step=step),
-            actuator=motor,
             runs=Runs(conditions=conditions),
             bilateral=True,
         )

@@ -11,6 +11,7 @@ from panto_env.plant.pantograph import build as pantograph
 from panto_env.plant.pantograph.step import move_freely
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import ROW, Row
+from panto_env.plant.train import Train
 
 pytestmark = pytest.mark.plain
 
@@ -95,7 +96,7 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
     spring, friction = 4000.0, 6.0
     changed = {"masses": (10.0,), "stiffnesses": (spring,), "dampings": (0.0,), "frame_friction": friction}
     data = load_pantograph("dsa350").model_copy(update=changed | {"static_force": 0.0})
-    plant = Plant(load_catenary("en50318-2002"), data, numerics=Numerics(time_step=2e-4, window=3))
+    plant = Plant(load_catenary("en50318-2002"), Train.of(data), numerics=Numerics(time_step=2e-4, window=3))
     plant.start(0, 50.0)
     _, _, pantographs, _, run = plant.arrays
     run.table[0, 0, Row.STATE :] = 0.02, 0.0

@@ -8,6 +8,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 
 from ..pantograph_alone import means, replay, rest
 
@@ -146,7 +147,9 @@ def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
         return samples.uplift[0, 1 : steps + 1].copy()
 
     steps = 400
-    used, fresh = (Plant(load_catenary("ohl-three-span"), load_pantograph("dsa350")) for _ in range(2))
+    used, fresh = (
+        Plant(load_catenary("ohl-three-span"), Train.of(load_pantograph("dsa350"))) for _ in range(2)
+    )
     samples = used.samples(steps + 1)
     assert uplift(used, samples, 330.0 / 3.6, steps)[:, 1].max() > 0
     slower = uplift(fresh, fresh.samples(steps + 1), 100.0 / 3.6, steps)

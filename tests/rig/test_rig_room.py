@@ -12,6 +12,7 @@ from panto_env.cli import make_app
 from panto_env.plant.catenary.rig.arrays import RigRow
 from panto_env.plant.numerics import Runs
 from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
 from panto_env.rig import RigComputer, growth
 from panto_env.rig.comparison import compare
 from panto_env.rig.margins import Loop, analog_response, dynamic_stiffness, is_stable, margins_of, threshold
@@ -35,7 +36,7 @@ def step_often(computer, force, count):
 def test_the_computer_computes_what_the_simulated_rig_does():
     """A simulated rig's readings, given to the program by itself: the same heights of the contact point."""
     data = load_catenary("rig-flexible")
-    plant = Plant(data, PANTOGRAPH, runs=Runs((SPEED / 3.6, SPEED / 3.6), data.computer.interval))
+    plant = Plant(data, Train.of(PANTOGRAPH), runs=Runs((SPEED / 3.6, SPEED / 3.6), data.computer.interval))
     plant.start(0, SPEED / 3.6)
     simulated, steps = plant.model.wire.table[0], plant.model.line.interval_steps
     computer = RigComputer(data, SPEED, force=PANTOGRAPH.nominal_force(SPEED / 3.6))

@@ -19,7 +19,7 @@ class ActuatorArrays(Protocol):
 
     @property
     def table(self) -> Array:
-        """All that changes, (contacts, lanes, rows); zero at rest."""
+        """All that changes, (collectors, lanes, rows); zero at rest."""
 
 
 class ActuatorSettings(Settings, ABC):
@@ -45,13 +45,13 @@ class ActuatorSettings(Settings, ABC):
         return 0.0, 0.0
 
     @abstractmethod
-    def arrays(self, time_step: float, lanes: int) -> ActuatorArrays:
+    def arrays(self, time_step: float, lanes: int, collectors: int) -> ActuatorArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
 
 
 @operation
-def drive(actuators: Any, pantographs: Any, contact: int, own: Any, command: Any, lane: int) -> None:
-    """Move the forces on one contact's pantograph in one lane by a step towards their commands.
+def drive(actuators: Any, pantographs: Any, collector: int, own: Any, command: Any, lane: int) -> None:
+    """Move the forces on one collector's pantograph in one lane by a step towards their commands.
 
     own: the lane's rows of ``Row``, of which FRAME_FORCE and HEAD_FORCE are to be the means over the step.
     command: (places,) (N). pantographs: for actuators that are moved by what they press on (``move_apart`` of

@@ -10,7 +10,7 @@ from pydantic import Field
 from ...backend import aligned_zeros, implements, inlined
 from ...base.arrays import Array, Index
 from ...base.ranges import Between
-from ..state import CONTACTS, ROW, Place
+from ..state import ROW, Place
 from .base import ActuatorSettings, drive
 
 _PLACES = len(Place)
@@ -28,7 +28,7 @@ class LaggedActuator(ActuatorSettings):
         None, description="largest change of force (N/s)"
     )
 
-    def arrays(self, time_step: float, lanes: int) -> LaggedArrays:
+    def arrays(self, time_step: float, lanes: int, collectors: int) -> LaggedArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
         steps = int(self.delay / time_step + 1e-6)
         late = max(self.delay / time_step - steps, 0.0)
@@ -36,7 +36,7 @@ class LaggedActuator(ActuatorSettings):
         share = 1.0 if self.lag == 0 else 1.0 - np.exp(-time_step / self.lag)
         rate = np.inf if self.rate_limit is None else self.rate_limit * time_step
         return LaggedArrays(
-            table=aligned_zeros((CONTACTS, lanes, _PLACES * (1 + steps + (late > 0)))),
+            table=aligned_zeros((collectors, lanes, _PLACES * (1 + steps + (late > 0)))),
             late=late,
             share=share,
             mean=1.0 if self.lag == 0 else 1.0 / share - self.lag / time_step,
@@ -55,7 +55,7 @@ class LaggedArrays(NamedTuple):
     commands on their way, the next to arrive first, likewise (N).
     """
 
-    table: Array  # (contacts, lanes, places (1 + delay))
+    table: Array  # (collectors, lanes, places (1 + delay))
     late: float  # share of a step before the next one arrives: the delay's part that is no whole step
     share: float  # of the way to the command that is gone in one step
     mean: float  # share of the way gone that the step's mean force has gone
@@ -79,8 +79,8 @@ def arriving(actuators, pending, command, place):
 
 
 @implements(drive, LaggedArrays)
-def _drive(actuators, pantographs, contact, own, command, lane):
-    reached = actuators.table[contact, lane]
+def _drive(actuators, pantographs, collector, own, command, lane):
+    reached = actuators.table[collector, lane]
     for place in actuators.places:
         asked = command[place]
         if actuators.table.shape[2] > _PLACES:

@@ -60,6 +60,7 @@ class CatenaryModel(Protocol):
         data: Any,
         *,
         lanes: int,
+        collectors: int,
         spans: int,
         numerics: Numerics,
         runs: Runs,

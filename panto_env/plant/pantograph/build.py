@@ -29,23 +29,24 @@ NONE_REFLECTED: ReflectedMasses = (0.0, 0.0)
 
 
 class Pantographs(NamedTuple):
-    """What the pantographs of all lanes are made of: all alike, or each its own.
+    """What the pantographs of all lanes are made of: all lanes' alike, or each its own.
 
     n masses: the state is n displacements, then n velocities.
     """
 
     size: int  # 2n: entries of the state
-    table: Array  # (lanes, rows of ``Part``); one row for all lanes where they are alike
+    table: Array  # (collectors, lanes, rows of ``Part``); one row for all lanes where they are alike
 
     def set_lanes(
         self,
+        collector: int,
         lanes: Lanes,
         pantograph: PantographData,
         catenary: CatenaryModel,
         reflected: ReflectedMasses = NONE_REFLECTED,
     ) -> None:
-        """Make those of some lanes this one."""
-        self.table[lanes] = parts(pantograph, catenary, reflected)
+        """Make this one the pantograph of a collector in some lanes."""
+        self.table[collector, lanes] = parts(pantograph, catenary, reflected)
 
 
 def parts(
@@ -64,9 +65,9 @@ def parts(
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 
-def pantographs(size: int, lanes: int) -> Pantographs:
+def pantographs(size: int, collectors: int, lanes: int) -> Pantographs:
     """Arrays for the pantographs of ``lanes`` lanes, of ``size`` entries of state each, all zero."""
-    return Pantographs(size, aligned_zeros((lanes, Part.CONTACT_INPUT + 3 * size + size**2)))
+    return Pantographs(size, aligned_zeros((collectors, lanes, Part.CONTACT_INPUT + 3 * size + size**2)))
 
 
 def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:

@@ -49,14 +49,14 @@ def free_value(pantographs, own, parts, r, on_frame, on_head):
 
 
 @inlined
-def move_apart(pantographs, own, place, first, lane):
+def move_apart(pantographs, collector, own, place, first, lane):
     """How the ends that an actuator at ``place`` stands between move apart over a step without its force.
 
     first: 0 for the way between them (m), or half the entries of the state for its speed (m/s). Returns it at
     the step's start; at its end, the contact force as in the step before; and what 1 N of the actuator, held
     over the step, adds to it at the end.
     """
-    size, parts = pantographs.size, pantographs.table[own_row(pantographs.table, lane)]
+    size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0
     upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
@@ -74,9 +74,9 @@ def move_apart(pantographs, own, place, first, lane):
 
 
 @inlined
-def move_freely(pantographs, own, free_state, lane):
+def move_freely(pantographs, collector, own, free_state, lane):
     """State of a lane's pantograph after a step without contact force, into ``free_state``."""
-    size, parts = pantographs.size, pantographs.table[own_row(pantographs.table, lane)]
+    size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
@@ -95,13 +95,10 @@ def move_freely(pantographs, own, free_state, lane):
 
 
 @inlined
-def add_contact_force(pantographs, own, free_state, lane):
+def add_contact_force(pantographs, collector, own, free_state, lane):
     """End the step: the free motion and what the contact force adds to it."""
-    parts, state, force = (
-        pantographs.table[own_row(pantographs.table, lane)],
-        own[ROW.STATE :],
-        own[ROW.CONTACT_FORCE],
-    )
+    parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
+    state, force = own[ROW.STATE :], own[ROW.CONTACT_FORCE]
     contact_input = parts[PART.CONTACT_INPUT :]
     for r in range(pantographs.size):
         state[r] = free_state[r] + contact_input[r] * force

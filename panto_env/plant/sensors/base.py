@@ -30,14 +30,14 @@ class SensorArrays(Protocol):
 
     @property
     def noise(self) -> Array:
-        """Noise of the next readings, (lanes, times, readings), in their units; no times for none."""
+        """Noise of the next readings, (lanes, collectors, times, readings), in their units."""
 
     @property
     def noise_used(self) -> Index:
         """How many of them each lane has used, (lanes,)."""
 
     def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
+        """Let the past of some lanes have been as these samples, (collectors, lanes, SAMPLE_ROWS)."""
 
 
 class SensorSettings(Settings, ABC):
@@ -54,21 +54,22 @@ class SensorSettings(Settings, ABC):
         return OdometerErrors()
 
     @abstractmethod
-    def arrays(self, time_step: float, control_steps: int, lanes: int) -> SensorArrays:
+    def arrays(self, time_step: float, control_steps: int, lanes: int, collectors: int) -> SensorArrays:
         """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
 
 
 @operation
-def take_readings(sensors: Any, step: int, own: Any, readings: Any, lane: int) -> None:
-    """What a lane's sensors read after plant step ``step`` of a control step, counted from 1, without noise.
+def take_readings(sensors: Any, collector: int, step: int, own: Any, readings: Any, lane: int) -> None:
+    """What the sensors of a lane's collector read after a plant step, without noise.
 
-    own: the lane's rows of ``Row``, at the end of the step. readings: its rows of ``Reading``, written to at
-    least once in each control step.
+    step: number of the plant step within its control step, counted from 1. own: the collector's rows of
+    ``Row``, at the end of the step. readings: its rows of ``Reading``, written to at least once in each
+    control step.
     """
     raise NotImplementedError
 
 
 @operation
-def take_first_readings(sensors: Any, own: Any, readings: Any, lane: int) -> None:
+def take_first_readings(sensors: Any, collector: int, own: Any, readings: Any, lane: int) -> None:
     """What the sensors read at the start of a run; arguments as above."""
     raise NotImplementedError

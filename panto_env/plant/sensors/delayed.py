@@ -67,7 +67,7 @@ class DelayedSensors(SensorSettings):
         rms = (displacement, displacement, velocity, velocity, self.force_noise)
         return rms if any(rms) else None
 
-    def arrays(self, time_step: float, control_steps: int, lanes: int) -> DelayedArrays:
+    def arrays(self, time_step: float, control_steps: int, lanes: int, collectors: int) -> DelayedArrays:
         """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
         # A sample is a mean over its step, so half a step old when that ends; between two it is interpolated.
         age = max(self.delay / time_step - 0.5, 0.0)
@@ -75,11 +75,11 @@ class DelayedSensors(SensorSettings):
         whole, rest = divmod(int(age + 1e-6), control_steps)
         read_at = control_steps - rest
         return DelayedArrays(
-            table=aligned_zeros((lanes, _READINGS * (1 + whole))),
+            table=aligned_zeros((collectors, lanes, _READINGS * (1 + whole))),
             read_at=read_at,
             older_at=read_at - 1 if read_at > 1 else control_steps,
             older_share=0.0 if late < 1e-6 else late,
-            noise=np.zeros((lanes, AHEAD if self.noise_rms else 0, len(Reading))),
+            noise=np.zeros((lanes, collectors, AHEAD if self.noise_rms else 0, len(Reading))),
             noise_used=np.zeros(lanes, dtype=np.int64),
         )
 
@@ -92,23 +92,23 @@ class DelayedArrays(NamedTuple):
     way, the next to arrive first, one control step after the other.
     """
 
-    table: Array  # (lanes, readings (1 + control steps))
+    table: Array  # (collectors, lanes, readings (1 + control steps))
     read_at: int  # plant step of a control step whose sample is read, counted from 1
     older_at: int  # plant step whose sample, the one before, is read too
     older_share: float  # weight of that
-    noise: Array  # (lanes, times, readings): of the next readings, in their units; no times for none
+    noise: Array  # (lanes, collectors, times, readings): of the next readings; no times for none
     noise_used: Index  # (lanes,): how many of them have been used
 
     def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Let the past of some lanes have been as these samples, (lanes, SAMPLE_ROWS)."""
-        self.table[lanes] = np.tile(samples[..., list(SENSED)], self.table.shape[1] // _READINGS)
+        """Let the past of some lanes have been as these samples, (collectors, lanes, SAMPLE_ROWS)."""
+        self.table[:, lanes] = np.tile(samples[..., list(SENSED)], self.table.shape[2] // _READINGS)
 
 
 @inlined
-def read(sensors, own, readings, lane):
+def read(sensors, collector, own, readings, lane):
     """Take the reading that arrives in this control step, and send off the one taken now."""
-    rows, share = sensors.table.shape[1] - _READINGS, sensors.older_share
-    older = sensors.table[lane]
+    rows, share = sensors.table.shape[2] - _READINGS, sensors.older_share
+    older = sensors.table[collector, lane]
     past = older[_READINGS:]
     for k in range(_READINGS):
         taken = own[_SENSED[k]]
@@ -124,16 +124,16 @@ def read(sensors, own, readings, lane):
 
 
 @implements(take_readings, DelayedArrays)
-def _take_readings(sensors, step, own, readings, lane):
+def _take_readings(sensors, collector, step, own, readings, lane):
     if step == sensors.read_at:
-        read(sensors, own, readings, lane)
+        read(sensors, collector, own, readings, lane)
     if step == sensors.older_at and sensors.older_share > 0.0:
-        older = sensors.table[lane]
+        older = sensors.table[collector, lane]
         for k in range(_READINGS):
             older[k] = own[_SENSED[k]]
 
 
 @implements(take_first_readings, DelayedArrays)
-def _take_first_readings(sensors, own, readings, lane):
+def _take_first_readings(sensors, collector, own, readings, lane):
     for k in range(_READINGS):
         readings[k] = own[_SENSED[k]]

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...backend import NOT_NEGATIVE, constants, inlined
 from ...base.arrays import Array, Index
+from ..alignment import Alignment, mean_over_own_length
 from .noise import AHEAD, Noise
 
 WALK = 100.0
@@ -41,15 +42,15 @@ class OdometerRow(IntEnum):
 
     SPANS = 0  # from the line's start to where it was read last
     MAST = 1  # spans to the last mast that was detected
-    ERROR = 2  # of the position (spans)
+    ERROR = 2  # of the position (spans as long as the present one)
     SCALE = 3  # share by which way and speed are wrong
 
 
 class OdometerNoise(IntEnum):
     """Numbers that a reading takes."""
 
-    WALK = 0  # over a span (spans)
-    MAST = 1  # of the detection, where there was one (spans)
+    WALK = 0  # over a span of mean length (such spans)
+    MAST = 1  # of the detection, where there was one (spans of mean length)
     SPEED = 2  # m/s
 
 
@@ -68,11 +69,12 @@ class OdometerArrays(NamedTuple):
 class Odometers:
     """Draws the errors of all lanes' odometers; each lane must be started."""
 
-    def __init__(self, errors: OdometerErrors, lanes: int, span_length: float) -> None:
-        """span_length: of the line (m)."""
-        self.errors, self.drawn, self._lanes, self._span = errors, errors.drawn, lanes, span_length
-        walk = errors.walk * math.sqrt(span_length / WALK) / span_length
-        self._noise = Noise((walk, errors.mast / span_length, errors.speed), lanes)
+    def __init__(self, errors: OdometerErrors, lanes: int, alignment: Alignment) -> None:
+        """alignment: of the line."""
+        self.errors, self.drawn, self._lanes, self._alignment = errors, errors.drawn, lanes, alignment
+        length = alignment.mean_length
+        walk = errors.walk * math.sqrt(length / WALK) / length
+        self._noise = Noise((walk, errors.mast / length, errors.speed), lanes)
 
     def arrays(self) -> OdometerArrays:
         """Of all lanes."""
@@ -94,7 +96,8 @@ class Odometers:
         if shared:
             random.bit_generator.state = before
         scale, mast = own.standard_normal(2)
-        arrays.table[lane] = 0.0, 0.0, self.errors.mast / self._span * mast, self.errors.scale * scale
+        first = self.errors.mast / float(self._alignment.lengths[0]) * mast
+        arrays.table[lane] = 0.0, 0.0, first, self.errors.scale * scale
         self._noise.start(arrays, lane, own)
 
     def prepare(self, arrays: OdometerArrays, skip: Any = None) -> None:
@@ -103,16 +106,19 @@ class Odometers:
 
 
 @inlined
-def read_odometer(odometer, true, speed, lane):
+def read_odometer(odometer, alignment, true, speed, lane):
     """What a lane's odometer reads at a true position (spans) and speed (m/s): position and speed."""
+    ratio = mean_over_own_length(alignment, true)
     own = odometer.table[lane]
     noise = odometer.noise[lane, odometer.noise_used[lane] & NOT_NEGATIVE]
     since = true - own[ROW.SPANS]
     if math.floor(true) > own[ROW.MAST]:
         own[ROW.MAST] = math.floor(true)
-        own[ROW.ERROR] = noise[NOISE.MAST]
+        own[ROW.ERROR] = noise[NOISE.MAST] * ratio
         since = true - own[ROW.MAST]
     own[ROW.SPANS] = true
-    own[ROW.ERROR] += own[ROW.SCALE] * since + math.sqrt(max(since, 0.0)) * noise[NOISE.WALK]
+    own[ROW.ERROR] += own[ROW.SCALE] * since + math.sqrt(max(since, 0.0)) * (
+        noise[NOISE.WALK] * math.sqrt(ratio)
+    )
     odometer.noise_used[lane] += 1
     return true + own[ROW.ERROR], speed * (1.0 + own[ROW.SCALE]) + noise[NOISE.SPEED]

@@ -22,6 +22,7 @@ from ...plant.line_condition import DrawnLine, LineCondition
 from ...plant.numerics import Numerics, Runs
 from ...plant.plant import Plant
 from ...plant.state import Place, Row
+from ...plant.train import Train
 from .motors import CATENARY, CONTROL_INTERVAL, MOTOR, PANTOGRAPH, SPANS, rms_by_band, spectrum
 
 HARMONICS = 4
@@ -129,9 +130,8 @@ def _bench(record: Trajectory, wanted: float, driven: bool) -> tuple[Plant, Arra
     motor = actuator_settings(f"{MOTOR}:motors=1,force_limit=50" if driven else "ideal:place=head")
     plant = Plant(
         point,
-        collector,
+        Train.of(collector, motor),
         numerics=Numerics(time_step=TIME_STEP),
-        actuator=motor,
         runs=Runs(conditions=(room,)),
     )
     waves = motion_of_line(record)

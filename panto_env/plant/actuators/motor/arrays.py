@@ -30,7 +30,7 @@ MOTOR_ROWS = len(MotorRow)
 class MotorArrays(NamedTuple):
     """Motors of all lanes, seen from where they press."""
 
-    table: Array  # (contacts, lanes, places of ``MotorRow``)
+    table: Array  # (collectors, lanes, places of ``MotorRow``)
     places: Index  # (used,): where there are motors, each a ``Place``
     time_step: float  # s
     command_limit: float  # maximum force that is requested (N)
@@ -54,11 +54,11 @@ class MotorArrays(NamedTuple):
     tooth_compliance: float  # m/N
     tooth_damping: float  # N s/m divided by the step, so N/m
 
-    def energy(self, lanes: Lanes, contact: int = 0) -> Array:
+    def energy(self, lanes: Lanes, collector: int = 0) -> Array:
         """Energy from the supply since the start and, of it, losses in the armatures (J), (..., places, 2).
 
         lanes: a number, or (n,). Energy that driven motors give back is subtracted from the supply's.
         """
-        rows = self.table[contact, lanes]
+        rows = self.table[collector, lanes]
         rows = rows.reshape(*rows.shape[:-1], len(Place), MOTOR_ROWS)
         return np.array(rows[..., [MotorRow.SUPPLIED, MotorRow.COPPER]])

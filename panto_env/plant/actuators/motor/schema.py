@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from ....backend import aligned_zeros
 from ....base.ranges import Between
-from ...state import CONTACTS, Place
+from ...state import Place
 from ..base import ActuatorSettings
 from .arrays import MOTOR_ROWS, MotorArrays
 
@@ -165,12 +165,12 @@ class MotorActuator(ActuatorSettings):
         fixed = 0.0 if self.backlash > 0 else self.reflected_mass
         return tuple(fixed if place in self.places else 0.0 for place in (0, 1))  # type: ignore[return-value]
 
-    def arrays(self, time_step: float, lanes: int) -> MotorArrays:
+    def arrays(self, time_step: float, lanes: int, collectors: int) -> MotorArrays:
         """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
         armature = self.inductance / self.resistance
         bandwidth = 2 * math.pi * self.bandwidth
         return MotorArrays(
-            table=aligned_zeros((CONTACTS, lanes, len(Place) * MOTOR_ROWS)),
+            table=aligned_zeros((collectors, lanes, len(Place) * MOTOR_ROWS)),
             places=np.array(self.places, dtype=np.int64),
             time_step=time_step,
             command_limit=self.force_limit,

@@ -47,9 +47,9 @@ def book(motors, rows, end, mean, square, speed):
 
 
 @inlined
-def press(motors, pantographs, own, rows, asked, place, lane):
+def press(motors, pantographs, collector, own, rows, asked, place, lane):
     """Mean force over a step (N) of motors whose rotors turn with what they press on."""
-    now, free, gain = move_apart(pantographs, own, place, pantographs.size // 2, lane)
+    now, free, gain = move_apart(pantographs, collector, own, place, pantographs.size // 2, lane)
     wanted = reference(motors, rows, asked, free, gain)
     end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, 0.5 * (now + free), 0.5 * gain)
     moved = free + gain * mean  # speed at the end without friction
@@ -60,7 +60,7 @@ def press(motors, pantographs, own, rows, asked, place, lane):
 
 
 @inlined
-def press_loosely(motors, pantographs, own, rows, asked, place, lane):
+def press_loosely(motors, pantographs, collector, own, rows, asked, place, lane):
     """Mean force over a step (N) of motors whose rotors have a motion of their own, within the play."""
     step, before, turning = motors.time_step, own[ROW.FRAME_FORCE + place], rows[MOTOR_ROW.SPEED]
     per_force = step * (1.0 / motors.mass)  # change of the rotors' speed (m/s/N)
@@ -69,7 +69,7 @@ def press_loosely(motors, pantographs, own, rows, asked, place, lane):
     middle = 0.5 * (turning + slowed)
     end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], wanted, middle, 0.5 * per_force)
     push = mean - friction(motors, before, slowed * (1.0 / per_force) + mean)
-    now, free, gain = move_apart(pantographs, own, place, 0, lane)
+    now, free, gain = move_apart(pantographs, collector, own, place, 0, lane)
     way = step * (turning + 0.5 * per_force * push) - (free - now)
     yielding = 0.5 * step * per_force + gain
     force = tooth_force(motors, rows[MOTOR_ROW.GAP], way, yielding)
@@ -81,12 +81,12 @@ def press_loosely(motors, pantographs, own, rows, asked, place, lane):
 
 
 @implements(drive, MotorArrays)
-def _drive(actuators, pantographs, contact, own, command, lane):
-    table = actuators.table[contact, lane]
+def _drive(actuators, pantographs, collector, own, command, lane):
+    table = actuators.table[collector, lane]
     for place in actuators.places:
         rows = table[place * MOTOR_ROWS :]
         if actuators.play > 0.0:
-            force = press_loosely(actuators, pantographs, own, rows, command[place], place, lane)
+            force = press_loosely(actuators, pantographs, collector, own, rows, command[place], place, lane)
         else:
-            force = press(actuators, pantographs, own, rows, command[place], place, lane)
+            force = press(actuators, pantographs, collector, own, rows, command[place], place, lane)
         own[ROW.FRAME_FORCE + place] = force

@@ -71,10 +71,10 @@ class FlexibleWire(NamedTuple):
     displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, about the static shape (m)
     increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
     first_span: Index  # (lanes,): spans that the window has travelled
-    contact_row: Index  # (lanes, contacts): row of the first of the four nodes about a contact point
-    contact_segment: Index  # (lanes, contacts): its segment
-    contact_weight: Array  # (lanes, contacts, 4): of the four
-    unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
+    contact_row: Index  # (lanes, collectors): row of the first of the four nodes about a contact point
+    contact_segment: Index  # (lanes, collectors): its segment
+    contact_weight: Array  # (lanes, collectors, 4): of the four
+    unmoved_height: Array  # (lanes, collectors): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
     # Extensions are about static, less the gap of a link that is slack there.
     past_extension: Array  # (lanes, sets, WIDTH): before the step (m)

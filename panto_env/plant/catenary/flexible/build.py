@@ -13,7 +13,6 @@ from ....base.errors import InputError
 from ....base.remember import remembered
 from ...interpolation import stencil
 from ...numerics import Numerics
-from ...state import CONTACTS
 from ...valid_range import LARGEST_SPEED
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
 from .grid import missing_yield, nodes_per_span, spring_levels, stencil_weights
@@ -240,7 +239,7 @@ def _droppers(data: FlexibleCatenaryData, shape: StaticShape, spans: int) -> Lin
     )
 
 
-def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
+def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
     """Wires of all lanes in their static shape."""
     wires, real, sets = line.mobility.shape, line.stencil.dtype, line.link_yield.shape
     wire = FlexibleWire(
@@ -249,10 +248,10 @@ def at_rest(line: FlexibleLine, lanes: int) -> FlexibleWire:
         displacement=aligned_zeros((lanes, *wires), real),
         increment=aligned_zeros((lanes, *wires), real, place=21 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
-        contact_row=np.zeros((lanes, CONTACTS), dtype=np.int64),
-        contact_segment=np.zeros((lanes, CONTACTS), dtype=np.int64),
-        contact_weight=np.zeros((lanes, CONTACTS, 4)),
-        unmoved_height=np.zeros((lanes, CONTACTS)),
+        contact_row=np.zeros((lanes, collectors), dtype=np.int64),
+        contact_segment=np.zeros((lanes, collectors), dtype=np.int64),
+        contact_weight=np.zeros((lanes, collectors, 4)),
+        unmoved_height=np.zeros((lanes, collectors)),
         spring_past=np.zeros((lanes, len(line.spring_row), WIDTH), dtype=real),
         past_extension=np.zeros((lanes, *sets), dtype=real),
         extension=np.zeros((lanes, *sets), dtype=real),

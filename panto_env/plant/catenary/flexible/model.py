@@ -41,6 +41,7 @@ class FlexibleCatenary:
         data: FlexibleCatenaryData,
         *,
         lanes: int,
+        collectors: int,
         spans: int,
         numerics: Numerics,
         runs: Runs,
@@ -78,7 +79,7 @@ class FlexibleCatenary:
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
-        self.wire = at_rest(self.line, lanes)
+        self.wire = at_rest(self.line, lanes, collectors)
 
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int

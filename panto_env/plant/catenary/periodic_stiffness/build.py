@@ -33,6 +33,7 @@ class PeriodicStiffness:
         data: PeriodicStiffnessData,
         *,
         lanes: int,
+        collectors: int,
         spans: int,
         numerics: Numerics,
         runs: Runs,

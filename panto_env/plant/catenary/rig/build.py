@@ -53,6 +53,7 @@ class Rig:
         data: RigData,
         *,
         lanes: int,
+        collectors: int,
         spans: int,
         numerics: Numerics,
         runs: Runs,
@@ -78,7 +79,7 @@ class Rig:
         if numerics.time_step is None and data.line.kind == "three_span":
             numerics = numerics.model_copy(update={"time_step": computer.interval / STEPS})
         self.model: CatenaryModel = LINES[data.line.kind].model(
-            data.line, lanes=lanes, spans=spans, numerics=numerics, runs=own_runs
+            data.line, lanes=lanes, collectors=collectors, spans=spans, numerics=numerics, runs=own_runs
         )
         model = self.model
         self.time_step = model.time_step

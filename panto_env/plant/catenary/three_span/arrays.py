@@ -29,6 +29,6 @@ class ThreeSpanWire(NamedTuple):
     """What moves, in all lanes."""
 
     modal: Array  # (lanes, 2, modes): coordinates and their rates
-    contact_shape: Array  # (lanes, contacts, modes): mode shapes where the contact points are
+    contact_shape: Array  # (lanes, collectors, modes): mode shapes where the contact points are
     scratch: Array  # (lanes, 2, modes)
     central_span: Index  # (lanes,): number of the central span along the line

@@ -12,7 +12,6 @@ from ....base.arrays import Array
 from ....base.linear_algebra import one_thread
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
-from ...state import CONTACTS
 from ..protocol import StartPoint, check_speeds, refuse_defects
 from ..view import NOTHING, LineView
 from .arrays import MARGIN, ThreeSpanLine, ThreeSpanWire
@@ -37,6 +36,7 @@ class ThreeSpan:
         data: ThreeSpanData,
         *,
         lanes: int,
+        collectors: int,
         spans: int,
         numerics: Numerics,
         runs: Runs,
@@ -54,7 +54,7 @@ class ThreeSpan:
         with one_thread():
             frequency, self._vectors = modes(data)
             self.line: Any = _constants(data, frequency, self._vectors, self.time_step)
-        self.wire: Any = _at_rest(lanes, data.modes)
+        self.wire: Any = _at_rest(lanes, collectors, data.modes)
         self.contact_gain = contact_gain(self.line)
         self.usual_end = spans * data.span_length
         self.supports: Array = data.span_length * np.arange(1, spans)
@@ -168,10 +168,10 @@ def contact_gain(line: ThreeSpanLine) -> float:
     return max(0.0, float(np.max(line.shape**2 @ -alternating)))
 
 
-def _at_rest(lanes: int, size: int) -> ThreeSpanWire:
+def _at_rest(lanes: int, collectors: int, size: int) -> ThreeSpanWire:
     return ThreeSpanWire(
         modal=np.zeros((lanes, 2, size)),
-        contact_shape=np.zeros((lanes, CONTACTS, size)),
+        contact_shape=np.zeros((lanes, collectors, size)),
         scratch=np.zeros((lanes, 2, size)),
         central_span=np.zeros(lanes, dtype=np.int64),
     )

@@ -1,0 +1,83 @@
+"""The train: which collectors ride on the line, and where each of them is at a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from ..backend import inlined
+from ..base.errors import InputError
+from .actuators import ActuatorSettings, actuator_settings
+from .drift import drifted_way, drifting_stride
+from .pantograph.schema import PantographData
+from .sensors import SensorSettings, sensor_settings
+from .state import ROW
+
+
+@dataclass(frozen=True)
+class Collector:
+    """A pantograph of a train, with what drives it and what reads it."""
+
+    pantograph: PantographData
+    actuator: ActuatorSettings
+    sensors: SensorSettings
+    distance: float = 0.0  # behind the first collector (m)
+
+
+@dataclass(frozen=True)
+class Train:
+    """The collectors of a train, the first one in front."""
+
+    collectors: tuple[Collector, ...]
+
+    def __post_init__(self) -> None:
+        """Raise InputError unless there is one collector: waves between several are not computed yet."""
+        if len(self.collectors) != 1:
+            raise InputError(
+                f"A train must have one collector, not {len(self.collectors)}: several pantographs on one "
+                "line cannot be computed yet."
+            )
+
+    @classmethod
+    def of(
+        cls,
+        pantograph: PantographData,
+        actuator: ActuatorSettings | None = None,
+        sensors: SensorSettings | None = None,
+    ) -> Self:
+        """A train with one collector; actuator and sensors: ideal ones by default."""
+        actuator, sensors = actuator or actuator_settings("ideal"), sensors or sensor_settings("ideal")
+        return cls((Collector(pantograph, actuator, sensors),))
+
+    @property
+    def first(self) -> Collector:
+        """The collector in front."""
+        return self.collectors[0]
+
+
+@inlined
+def position(run, collector, lane, steps):
+    """Where a lane's collector is along the line (m) after a number of steps, which may be a fraction."""
+    x = run.table[collector, lane, ROW.STRIDE] * steps
+    if run.drift.shape[1] > 0:
+        x = drifted_way(run.drift[lane], x, steps)
+    return x - run.distance[collector]
+
+
+@inlined
+def stride(run, collector, lane, steps):
+    """Distance that a lane's collector covers in a step (m), by its speed after a number of steps."""
+    steady = run.table[collector, lane, ROW.STRIDE]
+    if run.drift.shape[1] > 0:
+        return drifting_stride(run.drift[lane], steady, steps)
+    return steady
+
+
+@inlined
+def mean_stride(run, collector, lane, steps):
+    """Mean distance that a lane's collector covers in each of the next steps (m)."""
+    if run.drift.shape[1] > 0:
+        begin = run.table[collector, lane, ROW.STEP]
+        end = begin + steps
+        return (position(run, collector, lane, end) - position(run, collector, lane, begin)) * (1.0 / steps)
+    return run.table[collector, lane, ROW.STRIDE]
