@@ -1,11 +1,9 @@
 """Static state of a flexible line with defects of its droppers, supports and wires.
 
-Droppers apart, the wires are linear, so only the change about the intact static shape is solved for:
+Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
-and taut droppers. Between two nodes, which stand at the supports, the droppers and the wire's own defects, a
-beam under an even load is a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) + e s (l - s) with
-kappa = sqrt(T/EI) and e the load per length over 2 T, so that elements of that shape are exact. Their matrix
-is banded, and a line of any length costs a few times its nodes.
+and taut droppers. Nodes of their exact elements (``beams``) stand at supports, droppers and defects of the
+contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
 """
 
 from __future__ import annotations
@@ -19,15 +17,14 @@ import numpy as np
 from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
-from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
+from .beams import GRAVITY, Beams
 from .schema import FlexibleCatenaryData
-from .static import GRAVITY, solve
+from .static import solve
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 
 HELD = 1e18  # N/m, that holds a wire at the anchor
-SHARPEST = 0.01  # m over which a wire without bending stiffness rounds a kink, as elements need one
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
@@ -73,19 +70,18 @@ class DefectiveLine:
         masts = UNKNOWNS * number[number % pieces == 0][1:-1]
         self._band = np.zeros((BAND, UNKNOWNS * len(number)))
         self._load = np.zeros(UNKNOWNS * len(number))
-        for w, wire in ((CONTACT, left.contact_wire), (MESSENGER, left.messenger_wire)):
-            shapes, stiffness = _elements(wire, np.diff(self.breaks))
-            unknowns = UNKNOWNS * number[:-1, None] + 2 * w + [0, 1, 4, 5]
-            _add(self._band, unknowns, np.tile(stiffness, (spans, 1, 1)))
-            if w == CONTACT:
-                self._unknowns = unknowns
-                self._shapes = np.tile(shapes, (spans, 1, 1))
+        lengths = np.tile(np.diff(self.breaks), spans)
+        self._unknowns: Any = UNKNOWNS * number[:-1, None] + 2 * CONTACT + [0, 1, 4, 5]
+        self._beams = Beams(left.contact_wire, lengths)
+        _add(self._band, self._unknowns, self._beams.stiffness)
+        above = Beams(left.messenger_wire, lengths)
+        _add(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
         self._band[0, masts] += data.steady_arm.stiffness
         self._band[0, masts + 2] += data.support.stiffness
         self._load[masts + 2] = data.support.stiffness * height
         self._lifted, self._support_stiffness = masts + 2, data.support.stiffness
         self._band[0, [0, 2, -4, -2]] = HELD
-        self.decay = _decay(left.contact_wire)
+        self.decay = self._beams.decay
         self._carry(data, left, own, spans)
 
     def _carry(
@@ -94,16 +90,13 @@ class DefectiveLine:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
         pieces, wire, span = len(self.breaks) - 1, left.contact_wire, data.span_length
         ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
-        length = np.tile(np.diff(self.breaks), spans)
-        self._bulge = GRAVITY * wire.mass * own.lightening(ends + length / 2) / (2 * wire.tension)
-        for piece in np.flatnonzero(self._bulge).tolist():
-            self._load[self._unknowns[piece]] += self._bulge[piece] * _bulging(wire, length[piece])
+        length = self._beams.lengths
+        self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
+        np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in own.spots:
             self._load[UNKNOWNS * int(np.argmin(np.abs(ends - spot.position)))] -= GRAVITY * spot.mass
-        # Beside the shapes of bare elements: the running surface, and what the bulge slopes at their ends.
         surface = own.surface(np.append(ends, spans * span))
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
-        self._slopes = np.outer(self._bulge * length, [0, 1, 0, -1])
         if left is not data:
             fit = misfit(data, left)
             self._error = self._error + np.tile(fit.too_long, spans)
@@ -154,8 +147,8 @@ class DefectiveLine:
             turned = wrong if rounds <= ROUNDS else wrong[-1:]
             taut[turned] = ~taut[turned]
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
-        bare = np.einsum("eij,ej->ei", self._shapes, change[self._unknowns] - self._slopes)
-        rise = np.concatenate([bare[:, :2] + self._surface, bare[:, 2:], self._bulge[:, None]], axis=1)
+        rise = self._beams.pieces(change[self._unknowns], self._bulge)
+        rise[:, :2] += self._surface
         return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
 
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
@@ -199,39 +192,6 @@ def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) ->
             )
         height[support - 1] = wrong
     return broken, error, height
-
-
-def _decay(wire: Wire) -> float:
-    """How fast bending dies out along a wire, kappa (1/m)."""
-    return float(np.sqrt(wire.tension / max(wire.bending_stiffness, wire.tension * SHARPEST**2)))
-
-
-def _elements(wire: Wire, lengths: Array) -> tuple[Array, Array]:
-    """Shapes and stiffness, each (n, 4, 4), of tensioned beams (m), (n,), by height and slope of their ends.
-
-    Shapes are a, b, c, d of each unknown. What the ends are held by follows from T u' - EI u''' = T b
-    and EI u'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
-    """
-    kappa = _decay(wire)
-    far, one = np.exp(-kappa * lengths), np.ones(len(lengths))
-    no = 0 * one
-    ends = [
-        [one, no, one, far],
-        [no, one, -kappa * one, kappa * far],
-        [one, lengths, far, one],
-        [no, one, -kappa * far, kappa * one],
-    ]
-    shapes = np.linalg.inv(np.moveaxis(np.array(ends), -1, 0))
-    held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])
-    return shapes, wire.tension * np.ascontiguousarray(np.moveaxis(held, -1, 0)) @ shapes
-
-
-def _bulging(wire: Wire, length: float) -> Array:
-    """Load on height and slope of the two ends of a beam (m), (4,), which an even load of 2 T bulges."""
-    stiffness = _elements(wire, np.array([length]))[1][0]
-    bending = 2 * wire.tension / _decay(wire) ** 2
-    held = [-wire.tension * length, bending, -wire.tension * length, -bending]
-    return np.asarray(stiffness @ [0, length, 0, -length] - held)
 
 
 def _add(band: Array, unknowns: Any, stiffness: Array) -> None:

@@ -14,6 +14,7 @@ from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
 from ..view import LineView
 from .arrays import CONTACT, MESSENGER, PAD
+from .beams import Profile
 from .build import at_rest, constants, dropper_positions, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
@@ -169,21 +170,13 @@ class FlexibleCatenary:
         if not line.rise.shape[1]:
             return np.zeros(len(x))
         row = min(lane, len(line.rise) - 1)
-        pieces, breaks, decay = line.rise[row], line.rise_breaks, line.rise_decay[row]
-        per_span = len(breaks) - 1
-        number = np.minimum((x / breaks[-1]).astype(int), len(pieces) // per_span - 1)
-        local = x - number * breaks[-1]
-        k = np.clip(np.searchsorted(breaks, local, side="right") - 1, 0, per_span - 1)
-        a, b, c, d, e = pieces[number * per_span + k].T
-        left, right = local - breaks[k], breaks[k + 1] - local
-        rise: Array = a + b * left + c * np.exp(-decay * left) + d * np.exp(-decay * right) + e * left * right
-        return rise
+        return Profile(line.rise_breaks, line.rise[row], line.rise_decay[row]).height(x)
 
 
 @lru_cache(maxsize=64)
 def messenger_heights(shape: StaticShape) -> Array:
     """Height (m) of the messenger wire at ``VIEW_POINTS`` places over a span."""
-    return shape.messenger.height(np.linspace(0.0, shape.messenger.span, VIEW_POINTS))
+    return shape.messenger.height(np.linspace(0.0, shape.messenger.breaks[-1], VIEW_POINTS))
 
 
 def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:

@@ -1,11 +1,7 @@
-"""Static shape of the two-wire catenary, solved in closed form for one span of a periodic line.
+"""Static shape of the two-wire catenary as it is designed: one span of a periodic line.
 
-A tensioned beam (T y'' - EI y'''' + p = 0) under its own weight and point forces, periodic in the
-span L, has the Green's function of a string less that of its bending layers::
-
-    G(x) = L/(2T) B2(|x|/L) - 1/T [cosh(kappa (L/2 - |x|)) / (2 kappa sinh(kappa L/2)) - 1/(L kappa^2)]
-
-with kappa = sqrt(T/EI) and B2(s) = s^2 - s + 1/6, the second Bernoulli polynomial.
+The contact wire is held at the catalogue's sags by droppers, which are cut so; the messenger wire hangs
+between its supports under the droppers' pull. Both are solved by exact beam elements (``beams``).
 """
 
 from __future__ import annotations
@@ -17,10 +13,9 @@ import numpy as np
 from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
-from ..schema import Wire
+from .beams import GRAVITY, PeriodicWire, Profile
 from .schema import FlexibleCatenaryData
 
-GRAVITY = 9.81  # m/s^2
 MOST_ROUNDS = 200
 """In which the droppers' weight, which depends on their length, must settle; real lines take about ten."""
 HEIGHT_RANGE = 0.5
@@ -33,44 +28,17 @@ POINTS = 401
 """Of a span, where heights are looked at."""
 
 
-@dataclass(frozen=True)
-class PeriodicWire:
-    """Height of a wire over one span: offset + sum of point forces times Green's function."""
-
-    wire: Wire
-    span: float
-    points: Array  # where the point forces act (m)
-    forces: Array  # upward point forces, weight of the wire balanced by them (N)
-    offset: float  # m
-
-    def height(self, x: Array) -> Array:
-        """Height (m) at positions x (m) along the line."""
-        return self.offset + green(self.wire, self.span, x, self.points) @ self.forces
-
-
 @dataclass(frozen=True, eq=False)
 class StaticShape:
     """One span in equilibrium; dropper arrays are in the order of the catalogue."""
 
-    contact: PeriodicWire
-    messenger: PeriodicWire
+    contact: Profile
+    messenger: Profile
+    arm_force: float  # of the steady arm where that holds the wire, upward (N)
     dropper_tension: Array  # at the contact wire (N)
     dropper_length: Array  # unloaded (m)
     dropper_stiffness: Array  # N/m
     dropper_mass: Array  # kg, without clamps
-
-
-def green(wire: Wire, span: float, x: Array, points: Array) -> Array:
-    """Deflection at x per unit force at points, (len(x), len(points)), in m/N."""
-    distance = np.abs(np.subtract.outer(x, points)) % span
-    s = distance / span
-    result = span / (2 * wire.tension) * (s * s - s + 1 / 6)
-    if wire.bending_stiffness > 0:
-        kappa = np.sqrt(wire.tension / wire.bending_stiffness)
-        # cosh(kappa (L/2 - d)) / sinh(kappa L/2), written so that large arguments don't overflow
-        decay = (np.exp(-kappa * distance) + np.exp(-kappa * (span - distance))) / (1 - np.exp(-kappa * span))
-        result -= (decay / (2 * kappa) - 1 / (span * kappa**2)) / wire.tension
-    return result
 
 
 @remembered
@@ -138,27 +106,25 @@ def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
 
 def _settle(line: FlexibleCatenaryData) -> StaticShape:
     """The static shape, by rounds in which the lengths of the droppers, and so their weights, settle."""
-    droppers = line.droppers
-    x = np.array(droppers.positions)
-    n = len(x)
-    length = np.full(n, line.encumbrance)
-    contact, messenger = line.contact_wire, line.messenger_wire
+    droppers, messenger = line.droppers, line.messenger_wire
+    x, sag = np.array(droppers.positions), np.array(droppers.sag)
+    breaks = np.concatenate([[0.0], x, [line.span_length]])
+    hung, support = np.arange(1, len(breaks) - 1), np.array([0])  # nodes
+    held, heights = hung, -sag
+    if line.steady_arm.holds_wire:
+        held, heights = np.append(hung, support), np.append(heights, 0.0)
+    lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
+    contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
+    lift, arm_force = lifts[: len(x)], float(lifts[len(x) :].sum())
+    length = np.full(len(x), line.encumbrance)
     for _ in range(MOST_ROUNDS):
         dropper_mass = droppers.mass * length
-        clamped = GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
-        held, height = x, -np.array(droppers.sag)
-        if line.steady_arm.holds_wire:
-            held, height = np.append(x, 0.0), np.append(height, 0.0)
-        lifted = _hold(contact, line.span_length, held, height)
-        tension = lifted.forces[:n] + clamped
-        pulled = -tension - GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
-        carried = messenger.mass * GRAVITY * line.span_length - pulled.sum()
-        points, forces = np.append(x, 0.0), np.append(pulled, carried)
-        deflection = green(messenger, line.span_length, np.zeros(1), points) @ forces
-        support = line.encumbrance - carried / line.support.stiffness
-        offset = support - float(deflection[0])
-        hung = PeriodicWire(messenger, line.span_length, points, forces, offset)
-        loaded_length = hung.height(x) + np.array(droppers.sag)
+        tension = lift + GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
+        pulled = tension + GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
+        carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
+        top = np.array([line.encumbrance - carried / line.support.stiffness])
+        above, _ = upper.hang(top, np.append(0.0, -pulled))
+        loaded_length = above[2 * hung] + sag
         new_length = _unloaded(line, loaded_length, tension)
         change = np.abs(new_length - length).max()
         length = new_length
@@ -169,7 +135,10 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
             f"The static shape of line '{line.name}' does not settle in {MOST_ROUNDS} rounds: its droppers "
             "or clamps are too heavy for its wires; give less mass, or more tension."
         )
-    return StaticShape(lifted, hung, tension, length, _stiffness(line, length), dropper_mass)
+    stiffness = _stiffness(line, length)
+    return StaticShape(
+        lower.profile(contact), upper.profile(above), arm_force, tension, length, stiffness, dropper_mass
+    )
 
 
 def _stiffness(line: FlexibleCatenaryData, length: Array) -> Array:
@@ -186,13 +155,3 @@ def _unloaded(line: FlexibleCatenaryData, loaded: Array, tension: Array) -> Arra
     if line.droppers.axial_stiffness is not None:
         return loaded / (1 + tension / line.droppers.axial_stiffness)
     return loaded - tension / _stiffness(line, loaded)
-
-
-def _hold(wire: Wire, span: float, x: Array, height: Array) -> PeriodicWire:
-    """Point forces at x that hold the wire at the given heights against its weight."""
-    n = len(x)
-    system = np.zeros((n + 1, n + 1))
-    system[:n, :n] = green(wire, span, x, x)
-    system[:n, n] = system[n, :n] = 1.0
-    solution = np.linalg.solve(system, np.append(height, wire.mass * GRAVITY * span))
-    return PeriodicWire(wire, span, x, solution[:n], float(solution[n]))

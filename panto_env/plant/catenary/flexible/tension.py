@@ -16,8 +16,9 @@ import numpy as np
 from ....base.arrays import Array
 from ....base.remember import remembered
 from ...line_condition import LineCondition
+from .beams import GRAVITY
 from .schema import FlexibleCatenaryData
-from .static import GRAVITY, StaticShape, solve
+from .static import StaticShape, solve
 
 
 class Misfit(NamedTuple):
@@ -61,7 +62,7 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
     lift = arm.stiffness * float((was.contact.height(support) - now.contact.height(support))[0])
     if arm.holds_wire:
-        lift += float(was.contact.forces[-1] - now.contact.forces[-1])
+        lift += was.arm_force - now.arm_force
     return Misfit(
         too_long=was.dropper_length - now.dropper_length + stretch,
         lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,

@@ -1,0 +1,117 @@
+"""A wire as tensioned beams from node to node, by elements of their exact shape.
+
+A tensioned beam obeys T y'' - EI y'''' + p = 0, up positive. Between two nodes a distance l apart, under an
+even load p per length, it has the shape ``a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) + e s (l - s)``,
+with s from the first node, kappa = sqrt(T/EI) and e = p / 2T. So elements of that shape are exact, however
+long they are, and nodes are needed only where a force or a spring acts on the wire.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....base.arrays import Array, Index
+from ..schema import Wire
+
+GRAVITY = 9.81  # m/s^2
+SHARPEST = 1e-7  # m over which a wire without bending stiffness rounds a kink, as elements need one
+
+
+class Profile(NamedTuple):
+    """Height along a wire in pieces of that shape; spans are divided alike."""
+
+    breaks: Array  # (pieces of a span + 1,): where pieces begin and end in a span (m)
+    pieces: Array  # (pieces, 5): a, b, c, d, e of each piece, span after span
+    decay: float  # kappa (1/m)
+
+    def height(self, x: Array) -> Array:
+        """Height (m) at positions x (m), (n,), along the line, which begins anew beyond its end."""
+        per_span = len(self.breaks) - 1
+        span, local = np.divmod(x, self.breaks[-1])
+        k = np.clip(np.searchsorted(self.breaks, local, side="right") - 1, 0, per_span - 1)
+        a, b, c, d, e = self.pieces[(span.astype(int) * per_span + k) % len(self.pieces)].T
+        left, right = local - self.breaks[k], self.breaks[k + 1] - local
+        bend = c * np.exp(-self.decay * left) + d * np.exp(-self.decay * right)
+        return np.asarray(a + b * left + bend + e * left * right)
+
+
+class Beams:
+    """A wire's elements; unknowns of each are height (m) and slope (-) of its first and its second end."""
+
+    def __init__(self, wire: Wire, lengths: Array) -> None:
+        """lengths: of the elements (m), (n,)."""
+        self.tension, self.lengths = wire.tension, lengths
+        self.decay = float(np.sqrt(wire.tension / max(wire.bending_stiffness, wire.tension * SHARPEST**2)))
+        far, gone = np.exp(-self.decay * lengths), -np.expm1(-self.decay * lengths)
+        # Height and slope of the ends, added (sum) or subtracted (lean), give the parts of the shape that are
+        # symmetric about the middle, A + C (...), and antisymmetric, B (s - l/2) + D (...).
+        half, no = np.full(len(lengths), 0.5), np.zeros(len(lengths))
+        rate = self.decay * (1 + far)
+        lean = -1 / (rate * lengths / 2 - gone) * np.array([half, lengths / 4, -half, lengths / 4])
+        tilt = np.array([no, half, no, half]) + rate * lean
+        even = -1 / (self.decay * gone) * np.array([no, half, no, -half])
+        level = np.array([half, no, half, no]) - (1 + far) * even
+        self._shapes = np.moveaxis(
+            np.array([level - tilt * lengths / 2, tilt, even + lean, even - lean]), -1, 0
+        )
+        # The ends are held by T y' - EI y''' = T b and EI y'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
+        one = np.ones(len(lengths))
+        held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])
+        self.stiffness = wire.tension * np.moveaxis(held, -1, 0) @ self._shapes
+        """Forces (N) and moments (N m) at the ends by the unknowns, (n, 4, 4)."""
+
+    def bulge(self, load: Array) -> Array:
+        """E (1/m), (n,), of elements under even loads (N/m), (n,)."""
+        return load / (2 * self.tension)
+
+    def end_loads(self, bulge: Array) -> Array:
+        """Forces (N) and moments (N m), (n, 4), that act on the ends as the even loads of a bulge do."""
+        bending = np.full(len(bulge), 2 / self.decay**2)
+        held = -self.tension * np.stack([self.lengths, -bending, self.lengths, bending], axis=1)
+        loads = np.einsum("eij,ej->ei", self.stiffness, self._end_slopes) - held
+        return np.asarray(bulge[:, None] * loads)
+
+    def pieces(self, unknowns: Array, bulge: Array) -> Array:
+        """a, b, c, d, e of each element, (n, 5), by its unknowns, (n, 4)."""
+        bare = np.einsum("eij,ej->ei", self._shapes, unknowns - bulge[:, None] * self._end_slopes)
+        return np.concatenate([bare, bulge[:, None]], axis=1)
+
+    @property
+    def _end_slopes(self) -> Array:
+        """Unknowns of s (l - s), (n, 4)."""
+        return np.outer(self.lengths, [0, 1, 0, -1])
+
+
+class PeriodicWire:
+    """A wire under its weight along a line on which everything repeats, held at some of its nodes."""
+
+    def __init__(self, wire: Wire, breaks: Array, held: Index) -> None:
+        """breaks: nodes (m), (n + 1,), of which the last is the first one again; held: their numbers."""
+        self.breaks, nodes, size = breaks, len(breaks) - 1, 2 * len(breaks) - 2
+        self.beams = Beams(wire, np.diff(breaks))
+        self._bulge = self.beams.bulge(np.full(nodes, -GRAVITY * wire.mass))
+        self._unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
+        self._stiffness, self._weight = np.zeros((size, size)), np.zeros(size)
+        at = self._unknowns[:, :, None], self._unknowns[:, None, :]
+        np.add.at(self._stiffness, at, self.beams.stiffness)
+        np.add.at(self._weight, self._unknowns, self.beams.end_loads(self._bulge))
+        self._held = 2 * held
+        self._free = np.delete(np.arange(size), self._held)
+        self._among_free = self._stiffness[np.ix_(self._free, self._free)]
+
+    def hang(self, heights: Array, forces: Array) -> tuple[Array, Array]:
+        """Unknowns of the wire with held nodes at ``heights`` (m), and the upward forces (N) that hold them.
+
+        forces: further upward forces at all nodes (N), (n,).
+        """
+        load, state = self._weight.copy(), np.zeros(len(self._weight))
+        load[::2] += forces
+        state[self._held] = heights
+        state[self._free] = np.linalg.solve(self._among_free, (load - self._stiffness @ state)[self._free])
+        return state, (self._stiffness @ state - load)[self._held]
+
+    def profile(self, state: Array) -> Profile:
+        """Height along the wire, by its unknowns."""
+        return Profile(self.breaks, self.beams.pieces(state[self._unknowns], self._bulge), self.beams.decay)
