@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from panto_env.base.errors import InputError
+from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
 
 from .gains import Source
@@ -60,7 +61,8 @@ class HInfinity(TunableLaw):
         interval = context.control_interval
         model = line_model(context, mean_line(context), delay + interval / 2, lag)
         plant = weighted(model, performance, 2 * np.pi * frequency, height * HEIGHT)
-        self.bound, controller = least_bound(plant)
+        with one_thread():
+            self.bound, controller = least_bound(plant)
         self._a, self._b, self._c, self._d, _ = cont2discrete(
             (*controller, np.zeros((1, len(OUTPUTS)))), interval, "bilinear"
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
 
 from .gains import Source
@@ -150,8 +151,9 @@ def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> A
 
     cost = np.outer(force, force)
     cost[-1, -1] += effort * (2 * np.pi * held) ** 2
-    p = solve_discrete_are(a, b[:, None], cost, np.array([[effort]]))
-    gains: Array = (b @ p @ a) / (effort + b @ p @ b)
+    with one_thread():
+        p = solve_discrete_are(a, b[:, None], cost, np.array([[effort]]))
+        gains: Array = (b @ p @ a) / (effort + b @ p @ b)
     return gains
 
 
@@ -159,6 +161,7 @@ def kalman(a: Array, c: Array, noise: Array, readings: Array) -> Array:
     """Gain, (states, readings), that corrects a prediction; variances of the states' noise and readings'."""
     from scipy.linalg import solve_discrete_are
 
-    p = solve_discrete_are(a.T, c.T, np.diag(noise) + 1e-14 * np.eye(len(a)), np.diag(readings))
-    gain: Array = np.linalg.solve(c @ p @ c.T + np.diag(readings), c @ p).T
+    with one_thread():
+        p = solve_discrete_are(a.T, c.T, np.diag(noise) + 1e-14 * np.eye(len(a)), np.diag(readings))
+        gain: Array = np.linalg.solve(c @ p @ c.T + np.diag(readings), c @ p).T
     return gain

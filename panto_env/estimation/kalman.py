@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
+from ..base.linear_algebra import one_thread
 from .model import Model
 
 SETTLED = 1e-10
@@ -54,9 +55,10 @@ def steady_covariance(model: Model) -> Array:
     from scipy.linalg import solve_discrete_are  # slow to import
 
     try:
-        found = solve_discrete_are(
-            model.transition.T, model.observed.T, model.process_noise, model.measurement_noise
-        )
+        with one_thread():
+            found = solve_discrete_are(
+                model.transition.T, model.observed.T, model.process_noise, model.measurement_noise
+            )
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
             "The filter has no steady gain for these intensities of noise, or they are too far apart to be "
