@@ -12,7 +12,7 @@ LONGEST = 300
 LONGEST_LINE = 1000
 """Letters of a message that is told whole: what a user gave may be a whole file."""
 _WORD = re.compile(r"\S+|\s+")
-_CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+_CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 """What tells a terminal to do something, or turns the direction of writing; line ends are none of it."""
 
 

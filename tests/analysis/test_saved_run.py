@@ -100,6 +100,28 @@ def test_the_force_may_differ_by_rounding_alone(kept, factor, same):
 
 
 @pytest.mark.parametrize(
+    ("what", "by"), [("speed_kmh", 1e-6), ("span_length", 1e-6), ("control_interval", 1e-6)]
+)
+def test_passes_above_each_other_differ_by_rounding_alone(kept, what, by):
+    """By a millionth, a run of 1200 m is 1 mm out of step; a tenth would be two spans."""
+    pytest.importorskip("cv2", reason="the extra 'render' is not installed")
+    from panto_env.render.filmed import Filmed, check_together
+
+    run, settings, _ = kept
+    first = Filmed("one", run.policy, settings, run.seed, run)
+
+    def beside(factor):
+        if what == "control_interval":
+            return first._replace(settings=settings | {what: factor * first.control_interval})
+        speed = {"position": factor * run.position} if what == "speed_kmh" else {}
+        return first._replace(run=replace(run, **{what: factor * getattr(run, what)}, **speed))
+
+    check_together([first, beside(1 + 1e-12)])
+    with pytest.raises(InputError, match=f"must have the same {what.split('_')[0]}"):
+        check_together([first, beside(1 + by)])
+
+
+@pytest.mark.parametrize(
     "change", [{"design": {}}, {"settings": {"version": "0.1", "control_interval": -1.0}}]
 )
 def test_a_file_of_another_version_is_refused(kept, tmp_path, change):

@@ -2,13 +2,15 @@
 
 import io
 import json
+import sys
+import unicodedata
 
 import pytest
 import rich.table
 
 from panto_baselines.report.command import report
 from panto_env.base.checked_json import read_checked, with_checksum
-from panto_env.base.shown import harmless
+from panto_env.base.shown import harmless, one_line
 from panto_env.base.standard_streams import say
 from panto_env.terminal import PlainConsole, alert
 
@@ -21,6 +23,20 @@ HEAD = ROOT / "docs" / "benchmark" / "head.json"
 
 def test_controls_are_escaped_and_line_ends_stay():
     assert harmless(f"a\n{HOSTILE}\nσ – 列") == f"a\n{ESCAPED}\nσ – 列"
+
+
+def test_every_control_and_every_turn_of_the_writing_is_escaped():
+    """Those of Unicode's categories, but for the line end, and of its property Bidi_Control."""
+    letters = map(chr, range(sys.maxunicode))
+    controls = {letter for letter in letters if unicodedata.category(letter) == "Cc"}
+    turning = {
+        chr(int(code, 16)) for code in ["061C", "200E", "200F", "202A", "202B", "202C", "202D", "202E"]
+    }
+    turning |= {chr(code) for code in range(0x2066, 0x206A)}
+    for letter in sorted(controls - {"\n"} | turning):
+        assert harmless(f"a{letter}b") == f"a{ascii(letter)[1:-1]}b"
+        assert one_line(f"a{letter}b") == f"a{ascii(letter)[1:-1]}b"
+    assert harmless("\n") == "\n"
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -16,9 +16,11 @@ ONES = Figures(*[1.0] * len(fields(Figures)))
 def row(policy="passive", seed=0, *, line="line", speed_kmh=300.0, pressed=(1.0, 1.0), **given):
     """A pass with these figures, under a nominal force of 120 N; pressed: σ and CF of the pressed passive."""
     terminated, rate = given.pop("terminated", False), given.pop("action_rate", 0.0)
+    power, saturation = given.pop("power", 0.0), given.pop("saturation", 0.0)
     figures = replace(ONES, **{"mean": 110.0} | given)
     own = (figures.std, figures.cost_function) if policy == "passive" else pressed
-    return Row(policy, line, "pantograph", speed_kmh, seed, 120.0, terminated, figures, rate, 0.0, 0.0, *own)
+    place = (policy, line, "pantograph", speed_kmh, seed, 120.0, terminated)
+    return Row(*place, figures, rate, saturation, power, *own)
 
 
 def test_interquartile_mean_leaves_out_the_ends():
@@ -153,6 +155,21 @@ def test_standings_are_over_all_cells():
     low, high = a.interval
     assert low < a.change < high
     assert found["passive"].interval is None
+
+
+def test_a_standing_s_effort_power_and_saturation_are_means_of_the_cells():
+    """Of figures that all differ, with other numbers of passes per cell."""
+    names, random = ("effort", "power", "saturation"), np.random.default_rng(0)
+    easy, hard = random.uniform(0.1, 0.9, (2, 3)), random.uniform(0.1, 0.9, (1, 3))
+    rows = [
+        row(name, k, line=line, **dict(zip(names, values, strict=True)))
+        for name in ("passive", "a")
+        for line, passes in (("easy", easy), ("hard", hard))
+        for k, values in enumerate(passes)
+    ]
+    _, found = standings(rows, statistics.compare(rows))
+    expected = (easy.mean(axis=0) + hard[0]) / 2
+    assert (found.effort, found.power, found.saturation) == pytest.approx(tuple(expected))
 
 
 def test_who_does_not_qualify_in_one_cell_has_no_standing():

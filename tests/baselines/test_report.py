@@ -155,6 +155,17 @@ def test_nothing_of_a_result_becomes_markup():
     assert HOSTILE not in html()
 
 
+def test_a_browser_is_to_fetch_nothing_for_the_page():
+    """The policy stands before whatever it is to bind, and allows what stands in the page alone."""
+    tags = Reader(html()).tags
+    policy = {"http-equiv": "Content-Security-Policy"}
+    place = next(k for k, (tag, its) in enumerate(tags) if tag == "meta" and policy.items() <= its.items())
+    rules = dict(each.split(maxsplit=1) for each in tags[place][1]["content"].split("; "))
+    inline = "'unsafe-inline'"
+    assert rules == {"default-src": "'none'", "style-src": inline, "script-src": inline}
+    assert {tag for tag, _ in tags[:place]} <= {"html", "head", "meta"}
+
+
 def test_the_page_is_one_file_and_always_the_same():
     text = html()
     assert not re.search(r"https?:|\bsrc=|<link|@import|url\(", text)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from panto_baselines.benchmark import seeds
 from panto_baselines.policies.fitted_fb_ff import FittedFeedback
 from panto_baselines.policies.gains import GAINS_FOLDER, find_gains, gain_file, load_gains
+from panto_baselines.policies.lanes_law import LanesLaw, Observations
 from panto_baselines.policies.linear_feedback import COMMANDS, HISTORY, SIGNALS
 from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.skyhook import Skyhook
@@ -200,6 +201,24 @@ def test_a_linear_problem_is_solved_at_once_a_bent_one_in_some_iterations() -> N
     assert fit(rosenbrock, np.array([-0.5, 0.5]), np.full(2, 1e-4), 60).gains == pytest.approx(1, abs=0.02)
 
 
+def test_a_ridge_draws_gains_to_zero_in_units_of_their_steps() -> None:
+    """Of a linear problem, from a start far off: ridge regression in closed form."""
+    rng = np.random.default_rng(2)
+    matrix, target, steps, start = (
+        rng.normal(size=(30, 3)),
+        rng.normal(size=30),
+        [0.1, 0.5, 2.0],
+        [3.0, -2.0, 1.0],
+    )
+    found = fit(lambda x: x @ matrix.T - target, np.array(start), np.array(steps), 8, ridge=5.0)
+    normal = matrix.T @ matrix + 5.0 * np.diag(1 / np.square(steps))
+    expected = np.linalg.solve(normal, matrix.T @ target)
+    assert found.gains == pytest.approx(expected, abs=2e-3)
+    left = target - matrix @ expected
+    least = left @ left + 5.0 * np.sum((expected / steps) ** 2)
+    assert found.history[-1] == pytest.approx(least, rel=1e-4)
+
+
 def test_candidates_that_fail_are_not_taken() -> None:
     def residuals(x: Array) -> Array:
         return np.where(np.abs(x) < 0.5, x - 2.0, np.nan)
@@ -235,6 +254,22 @@ def test_a_batch_is_what_single_passes_are(drift: float) -> None:
         figures = simulate(policy=policy, seed=1001, **settings).summary()
         assert force.mean[row, 1] == pytest.approx(figures.mean, rel=2e-3 if drift else 1e-3)
         assert force.std[row, 1] == pytest.approx(figures.std, rel=1e-2)
+
+
+class Push(LanesLaw):
+    """Upwards with all that the actuator has."""
+
+    def forces(self, observations: Observations) -> Array:
+        """Force of each lane, (lanes,), (N)."""
+        return np.full(len(observations), 1e4)
+
+
+def test_a_pass_that_ends_early_has_no_figures_beside_others_that_have() -> None:
+    settings: dict[str, Any] = {"distance": 660.0, "spans": 19, "accuracy": "fast", "speed_kmh": 300.0}
+    force = run_batch(run_settings(settings | {"actuator": {"force_limit": 1000}}), [Still(), Push()], [1, 2])
+    assert np.isfinite(force.values[0]).all()
+    assert np.isnan(force.values[1]).all()
+    assert np.isnan([force.mean[1], force.std[1]]).all()
 
 
 def test_residuals_are_of_sigma_and_of_the_mean_beside_the_passive_ones() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import optimize, stats
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from typer.testing import CliRunner
@@ -97,6 +98,61 @@ def test_threshold_reckons_with_few_passes_that_differ():
             found.append((later > limit(seen, 1, SPAN, wanted)).mean() / (SPAN / 1e3))
     assert np.mean(plain) > 1.5 * wanted
     assert 0.4 * wanted < np.mean(cautious) < 1.3 * wanted
+
+
+@pytest.mark.parametrize("passes", [3, 5, 20])
+def test_the_spread_between_passes_counts_as_in_a_prediction_interval(passes):
+    """By parts: from span to span by the normal quantile, between passes by Student's t of one more."""
+    random = np.random.default_rng(passes)
+    log = random.normal(0, 0.4, (passes, 1)) + random.gumbel(0, 0.3, (passes, 15))
+    plain, cautious = (np.log(each(np.exp(log), 1, SPAN)) for each in (threshold, cautious_threshold))
+    alarm = 1 - np.exp(-0.1 * SPAN / 1e3)
+    own = sum((pass_.mean() - log.mean()) ** 2 for pass_ in log) / (passes - 1)
+    share = min(1.0, own / np.mean((log - log.mean()) ** 2))
+    enlarged = stats.t.ppf(1 - alarm, passes - 1) ** 2 * (passes + 1) / passes
+    usual = stats.norm.ppf(1 - alarm) ** 2
+    ratio = (share * enlarged + (1 - share) * usual) / usual
+    assert (cautious - log.mean()) ** 2 == pytest.approx(ratio * (plain - log.mean()) ** 2)
+
+
+def test_the_threshold_is_a_quantile_of_gumbel_s_by_maximum_likelihood():
+    log = np.random.default_rng(4).gumbel(0.4, 0.3, 300)
+
+    def unlikely(values):
+        z = (log - values[0]) / values[1]
+        return np.sum(z + np.exp(-z)) + len(log) * np.log(values[1])
+
+    place, scale = optimize.minimize(unlikely, [0.0, 1.0], method="Nelder-Mead", tol=1e-10).x
+    alarms = 0.5 * SPAN / 1e3  # Poisson's mean in a span; of none at all: exp(-alarms)
+    expected = place - scale * np.log(alarms)
+    assert np.log(threshold(np.exp(log)[None], 1, SPAN, 0.5)) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(("count", "spread"), [(1, 0.25), (4, 0.4)])
+def test_the_whole_line_has_changed_where_a_further_pass_would_hardly_be_so_loud(learned, count, spread):
+    """12 healthy levels of known spread in the logarithm: Student's t of further passes, at 1 in 1000."""
+    passes = made_up(count, np.random.default_rng(6))
+    levels = np.log(learned.weigh(passes, 1.0)[1])
+    healthy = spread * np.sqrt(11 / 12) * np.array([-1.0, 1.0] * 6)
+    assert np.std(healthy, ddof=1) == pytest.approx(spread)
+    limit = stats.t.ppf(0.999, 11) * spread * np.sqrt(1 / count + 1 / 12)
+    assert limit > np.log(2)  # below which no line counts as changed
+    for above in (0.98 * limit, 1.02 * limit):
+        found = judge(passes, replace(learned, levels=np.exp(healthy + levels.mean() - above)))
+        assert found.changed == (above > limit)
+        assert found.level == pytest.approx(np.exp(above))
+
+
+def test_healthy_passes_held_against_each_other_are_as_loud_as_further_ones():
+    """Of noise alone. The mean of three others is off by more than that of all four: by 3 % of the level."""
+    random, healthy, later = np.random.default_rng(7), [], []
+    for _ in range(12):
+        passes = made_up(8, random)
+        noise = replace(passes, force=100 + random.standard_normal(passes.force.shape))
+        one = Healthy.of(noise.only(0, 1, 2, 3))
+        healthy.append(one.levels.mean())
+        later += [one.weigh(noise.only(k), 1.0)[1][0] for k in range(4, 8)]
+    assert np.mean(healthy) == pytest.approx(np.mean(later), rel=0.012)
 
 
 def test_threshold_of_passes_that_do_not_differ_is_left_as_it_is():

@@ -1,8 +1,10 @@
 """Filters, smoother and likelihood against one dense Gaussian; their tests against chi-squared."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from scipy.stats import chi2, kstest, multivariate_normal
+from scipy.stats import chi2, kstest, multivariate_normal, norm
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
@@ -203,6 +205,32 @@ def test_whiteness_is_that_of_numbers_whose_correlation_is_known():
         abs(whiteness(each).largest) > whiteness(each).bound for each in random.standard_normal((300, 800, 2))
     ]
     assert np.mean(refused) < 0.04  # 1 % are refused, though all are white
+
+
+def test_whiteness_is_ljung_and_box_s_sum_term_by_term():
+    """Of so few samples that each factor counts: n (n + 2) / (n - lag), and the number of quantities."""
+    values = np.random.default_rng(0).standard_normal((60, 2))
+    values[1:, 0] += 0.25 * values[:-1, 0]
+    sums = []
+    for column in values.T - values.mean(axis=0)[:, None]:
+        shifted = np.correlate(column, column, "full")[len(column) :]
+        correlation = shifted[:20] / (column @ column)
+        sums.append(60 * 62 * sum(r**2 / (60 - lag) for lag, r in enumerate(correlation, 1)))
+    found = whiteness(values)
+    assert found.probability == pytest.approx(2 * chi2.sf(max(sums), 20))
+    assert 0.001 < found.probability < 0.9
+    assert found.bound == pytest.approx(norm.isf((1 - 0.99 ** (1 / 40)) / 2) / np.sqrt(60))
+
+
+def test_the_size_of_innovations_is_judged_piece_by_piece():
+    """A record of 3 s whose last second is twice as loud, in pieces of half a second."""
+    time, sizes = 0.01 * np.arange(300), np.repeat([1.0, 1.0, 2.0], 100)
+    innovations = sizes[:, None] * np.random.default_rng(1).choice([-1.0, 1.0], (300, 2))
+    unit = Gains(np.zeros((1, 4, 2)), np.eye(2)[None], np.zeros((1, 4)))
+    found = consistency(SimpleNamespace(innovations=innovations, gains=unit), time)
+    np.testing.assert_allclose(found.window_nis, [1, 1, 1, 1, 4, 4])
+    np.testing.assert_allclose(found.window_time, 0.245 + 0.5 * np.arange(6))
+    assert found.nis == pytest.approx(2.0)
 
 
 def test_normalised_innovations_are_independent():
