@@ -100,7 +100,9 @@ def train(
 
 def export(
     model: Annotated[Path, typer.Argument(help="Model file that `panto train` wrote.")],
-    output: Annotated[str, typer.Argument(help="Model file to write (.zip).", callback=writable((".zip",)))],
+    output: Annotated[
+        str, typer.Argument(help="Model file to write (.safetensors).", callback=writable((".safetensors",)))
+    ],
 ) -> None:
     """Write a model file for others: what a policy needs, arrays and JSON, and nothing that is pickled.
 

@@ -1,49 +1,30 @@
-"""The model file: a Stable-Baselines3 zip with what a policy and a resumed training need in addition.
+"""The model file: arrays and a table of facts, as safetensors, so that no code runs from it.
 
-``panto.json`` holds the facts below, ``actor.npz`` the deterministic policy, and ``replay.npz``, in a
-checkpoint of SAC, the replay buffer; ``sha256.json`` the checksums of all other parts. A policy is read from
-the first two alone, so that running a model file needs no torch and unpickles nothing.
+The table holds the facts below. The arrays under ``actor/`` are the deterministic policy, which runs without
+torch. Those under ``learner/`` and ``replay/`` are what a resumed training goes on with (``learner.py``).
 """
 
 from __future__ import annotations
 
-import json
-import os
-import zipfile
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError, field_validator
 
 from panto_baselines.policies.washout import WashoutSettings
-from panto_env.base.checked_json import warn_unchecked
+from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
-from panto_env.base.files import write_whole
 from panto_env.base.settings import Settings
 from panto_env.base.version import __version__
 from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
-from .model_parts import (
-    READ_ERRORS,
-    check_checksums,
-    check_sizes,
-    layers_of,
-    read_arrays,
-    read_part,
-    write_arrays,
-    write_checksums,
-)
+from .learner import Arrays, learn_again, learnt
 
-FACTS, ACTOR, REPLAY = "panto.json", "actor.npz", "replay.npz"
-MOST_FACTS, MOST_ACTOR = 2**20, 2**28
-"""Bytes that facts and network may unpack to."""
 DRIVEN = ((0,), (1,), (0, 1))
 """What the actions of a policy can drive: frame, head, or both."""
-REPLAY_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
 class Needs(Settings):
@@ -113,62 +94,24 @@ def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool
 
     Raises InputError where it can't be written.
     """
-    with write_whole(path) as temporary:
-        try:
-            model.save(temporary)
-        except RuntimeError as error:  # torch's, where the disk is full
-            raise InputError(f"{path} cannot be written: {str(error).splitlines()[0]}") from error
-        with zipfile.ZipFile(temporary, "a") as archive:
-            archive.writestr(FACTS, facts.model_dump_json(indent=1))
-            write_arrays(archive, ACTOR, _arrays_of(actor))
-            if replay:
-                buffer = model.replay_buffer
-                filled = buffer.buffer_size if buffer.full else buffer.pos
-                arrays = {name: getattr(buffer, name)[:filled] for name in REPLAY_ARRAYS}
-                arrays["position"] = np.array([buffer.pos, buffer.full])
-                write_arrays(archive, REPLAY, arrays)
-            write_checksums(archive)
+    _write(path, facts, layers(actor) | learnt(model, replay))
 
 
 def export_model(source: Path, target: Path) -> None:
-    """Write the parts of a model file that a policy needs, facts and arrays, and nothing that is pickled.
+    """Write what a policy needs of a model file, facts and layers, and nothing to go on learning with.
 
     Raises InputError, naming the file, where ``source`` is damaged or ``target`` cannot be written.
     """
     facts, actor = read_model(source)
-    with write_whole(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(FACTS, facts.model_dump_json(indent=1))
-        write_arrays(archive, ACTOR, _arrays_of(actor))
-        write_checksums(archive)
+    _write(target, facts, layers(actor))
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:
-    """The parts of a model file that a policy needs.
+    """Facts and policy of a model file.
 
-    UncheckedWarning where it is of an older version, without checksums. Raises InputError, naming the file,
-    where it is damaged, would unpack to far more than it is, or `panto train` did not write it.
+    Raises InputError, naming the file, where it is damaged, or `panto train` did not write it.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            check_sizes(archive, os.path.getsize(path))
-            checked = check_checksums(archive)
-            if FACTS not in archive.namelist():
-                raise ValueError(f"it holds no {FACTS}, so `panto train` has not written it")
-            facts = Facts.model_validate(json.loads(read_part(archive, FACTS, MOST_FACTS)))
-            arrays = read_arrays(archive, ACTOR, MOST_ACTOR)
-        weights, biases = layers_of(arrays, len(facts.needs.entries), len(facts.needs.channels))
-        actor = Actor(weights, biases, facts.activation, facts.squashed)
-    except FileNotFoundError as error:
-        raise InputError(f"The model file {path} does not exist; check the path.") from error
-    except READ_ERRORS as error:
-        reason = f"its {FACTS} is not valid" if isinstance(error, ValidationError) else str(error)
-        reason = reason.partition("\n")[0].rstrip(".") or type(error).__name__
-        raise InputError(
-            f"{path} is not a whole model file ({reason}); take another, such as an earlier "
-            "checkpoint, or train anew with `panto train`."
-        ) from error
-    if not checked:
-        warn_unchecked(path)
+    facts, actor, _ = _read(path)
     return facts, actor
 
 
@@ -177,30 +120,54 @@ def restore(path: Path, model: Any) -> Facts:
 
     Raises InputError where the file is damaged or of another algorithm or shape.
     """
-    from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
-
-    facts, _ = read_model(path)
+    facts, _, arrays = _read(path)
     try:
-        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
-        model.set_parameters(parameters)
-        for name, value in (variables or {}).items():
-            recursive_setattr(model, f"{name}.data", value.data)
-        model.num_timesteps, model._n_updates = facts.steps, facts.updates
-        with zipfile.ZipFile(path) as archive:
-            if REPLAY in archive.namelist():
-                buffer = model.replay_buffer
-                stores = {name: getattr(buffer, name) for name in REPLAY_ARRAYS}
-                most = sum(store.nbytes for store in stores.values()) + MOST_FACTS
-                arrays = read_arrays(archive, REPLAY, most)
-                for name, store in stores.items():
-                    store[: len(arrays[name])] = arrays[name]
-                buffer.pos, buffer.full = int(arrays["position"][0]), bool(arrays["position"][1])
-    except (*READ_ERRORS, UnpicklingError) as error:
+        learn_again(model, arrays)
+    except (LookupError, RuntimeError, TypeError, ValueError) as error:
         reason = str(error).partition("\n")[0].rstrip(".")
         raise InputError(f"{path} does not fit the training's settings: {reason}.") from error
+    model.num_timesteps, model._n_updates = facts.steps, facts.updates
     return facts
 
 
-def _arrays_of(actor: Actor) -> dict[str, Any]:
-    weights = {f"weight_{k}": weight for k, weight in enumerate(actor.weights)}
-    return weights | {f"bias_{k}": bias for k, bias in enumerate(actor.biases)}
+def _write(path: Path, facts: Facts, arrays: Arrays) -> None:
+    write_arrays(path, facts.model_dump(mode="json"), arrays)
+
+
+def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
+    try:
+        table, arrays = read_arrays(path)
+        facts = Facts.model_validate(table)
+        return facts, actor_of(arrays, facts), arrays
+    except FileNotFoundError as error:
+        raise InputError(f"The model file {path} does not exist; check the path.") from error
+    except (OSError, ValueError) as error:
+        reason = "its facts are not valid" if isinstance(error, ValidationError) else str(error)
+        raise InputError(
+            f"{path} is not a whole model file ({reason.rstrip('.')}); take another, such as an earlier "
+            "checkpoint, or train anew with `panto train`."
+        ) from error
+
+
+def layers(actor: Actor) -> Arrays:
+    """Weights and biases of a policy's network, as they are named in a model file."""
+    weights = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
+    return weights | {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
+
+
+def actor_of(arrays: Arrays, facts: Facts) -> Actor:
+    """The policy's network. Raises ValueError unless its layers fit each other and what the facts say."""
+    own = {name: array for name, array in arrays.items() if name.startswith("actor/")}
+    count, width = len(own) // 2, len(facts.needs.entries)
+    if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
+        raise ValueError("its network has no layers, or not a weight and a bias in each")
+    weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))
+    for k, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+        if not all(each.dtype.kind == "f" and np.isfinite(each).all() for each in (weight, bias)):
+            raise ValueError(f"layer {k} of its network holds something else than finite numbers")
+        if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+            raise ValueError(f"layer {k} of its network does not fit the one before, or what it observes")
+        width = len(bias)
+    if width != len(facts.needs.channels):
+        raise ValueError("its network has another shape than it says")
+    return Actor(weights, biases, facts.activation, facts.squashed)

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from panto_env.base.checked_json import read_checked, write_checked
+from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import make_folder, write_whole
 from panto_env.base.locks import alone_in
@@ -34,8 +34,8 @@ class RunFolder:
         check_path(path)
         self.path = Path(path)
         self.settings = self.path / "settings.json"
-        self.model = self.path / "model.zip"  # at the end of the training
-        self.best = self.path / "best.zip"  # at the best evaluation
+        self.model = self.path / "model.safetensors"  # at the end of the training
+        self.best = self.path / "best.safetensors"  # at the best evaluation
         self.cloning = self.path / "cloning.json"  # how near the start came to another policy, if asked for
         self.evaluations = self.path / "evaluations.csv"
         self.tensorboard = self.path / "tensorboard"
@@ -79,10 +79,7 @@ class RunFolder:
 
     def read_settings(self) -> Training:
         """Settings of the run. Raises InputError where the file is damaged."""
-        table = read_checked(self.settings)
-        if not isinstance(table, dict):
-            raise InputError(f"{self.settings} holds no settings; train into another --output.")
-        return parse_training(table, str(self.settings))
+        return parse_training(read_checked(self.settings), str(self.settings))
 
     def write_settings(self, training: Training) -> None:
         """Note what the run is; with it a new run begins."""
@@ -96,11 +93,11 @@ class RunFolder:
 
     def checkpoint(self, steps: int) -> Path:
         """Path of the checkpoint at ``steps``."""
-        return self.checkpoints / f"step-{steps:09d}.zip"
+        return self.checkpoints / f"step-{steps:09d}.safetensors"
 
     def newest_checkpoint(self) -> Path | None:
         """Newest checkpoint that is not damaged, if there is one."""
-        for path in sorted(self.checkpoints.glob("step-*.zip"), reverse=True):
+        for path in sorted(self.checkpoints.glob("step-*.safetensors"), reverse=True):
             try:
                 read_model(path)
             except InputError:
@@ -110,7 +107,7 @@ class RunFolder:
 
     def drop_old_checkpoints(self) -> None:
         """Keep only the newest checkpoints."""
-        for path in sorted(self.checkpoints.glob("step-*.zip"))[:-CHECKPOINTS_KEPT]:
+        for path in sorted(self.checkpoints.glob("step-*.safetensors"))[:-CHECKPOINTS_KEPT]:
             path.unlink()
 
     def add_evaluation(self, steps: int, pairs: list[Pair]) -> None:

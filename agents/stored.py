@@ -16,7 +16,7 @@ def known_line() -> TrainedPolicy:
     It began as ``fitted-fb+ff`` and learnt on by PPO; realistic actuator and sensors. It knows its line by
     heart and is of no use on another one.
     """
-    return load(FOLDER / "known-line.zip")
+    return load(FOLDER / "known-line.safetensors")
 
 
 def head() -> TrainedPolicy:
@@ -24,7 +24,7 @@ def head() -> TrainedPolicy:
 
     It began as ``periodic`` of the head and learnt on by PPO; realistic sensors.
     """
-    return load(FOLDER / "head.zip")
+    return load(FOLDER / "head.safetensors")
 
 
 def high_speed() -> TrainedPolicy:
@@ -32,4 +32,4 @@ def high_speed() -> TrainedPolicy:
 
     It learnt by PPO from nothing but rewards; realistic actuator, on the frame, and sensors.
     """
-    return load(FOLDER / "high-speed.zip")
+    return load(FOLDER / "high-speed.safetensors")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
-from panto_env.base.checked_json import write_checked
+from panto_env.base.checksums import write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import TABLES, check_output, finite, write_rows
 from panto_env.base.machine import cores

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from panto_env.base.checksums import sha256_of
 from panto_env.base.errors import InputError
-from panto_env.base.files import sha256_of, write_whole
+from panto_env.base.files import write_whole
 from panto_env.base.paths import check_path
 
 LIST = "SHA256SUMS"

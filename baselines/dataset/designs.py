@@ -12,8 +12,8 @@ from panto_env import simulate
 from panto_env.analysis.parameters import change_together
 from panto_env.analysis.sweep import SPEED
 from panto_env.base.arrays import Array
+from panto_env.base.checksums import write_checked
 from panto_env.base.errors import AccuracyWarning, InputError
-from panto_env.base.files import write_rows
 from panto_env.base.settings import Settings
 from panto_env.metrics.figures import Figures
 
@@ -43,13 +43,13 @@ def draw(settings: DesignsSettings, first: int, last: int) -> Array:
 
 
 def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Path) -> None:
-    """Rows of the designs first to last - 1, into a Parquet file."""
+    """Rows of the designs first to last - 1, into a JSON file, whole or not at all."""
     values = draw(settings, first, last).tolist()
     rows = [
         design(settings, first + k, dict(zip(settings.ranges, each, strict=True)))
         for k, each in enumerate(values)
     ]
-    write_rows(rows, path)
+    write_checked(path, {"rows": rows})
 
 
 def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> Row:

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.shown import shortly
 from panto_env.control.action import numbers
@@ -71,7 +72,7 @@ def check_places(settings: EpisodesSettings) -> None:
 
 
 def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> None:
-    """Record episodes one after another into a file, as ``read_episodes`` reads them."""
+    """Record episodes one after another into a file that ``read_episodes`` reads, whole or not at all."""
     arrays: dict[str, NDArray[Any]] = {}
     stage = Stage(settings)
     for plan in plans:
@@ -80,21 +81,26 @@ def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> Non
             values = value if isinstance(value, dict) else {"": value}
             for key, array in values.items():
                 arrays[f"{plan.number}|{name}|{key}"] = np.asarray(array)
-    with path.open("wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
+    write_arrays(path, {}, arrays)
+
+
+def read_part(path: Path) -> dict[str, NDArray[Any]]:
+    """Arrays that ``record`` wrote. Raises InputError where the file is missing or damaged."""
+    try:
+        return read_arrays(path)[1]
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} could not be read: {error}; give the same command again.") from error
 
 
 def read_episodes(path: Path, plans: Sequence[Plan]) -> list[Episode]:
-    """Episodes that ``record`` wrote, in the order of the plans."""
-    with np.load(path) as file:
-        tables: dict[int, dict[str, Any]] = {plan.number: {"infos": {}, "figures": {}} for plan in plans}
-        for key in file.files:
-            number, name, part = key.split("|")
-            value = file[key]
-            if part == "":
-                tables[int(number)][name] = value
-            else:
-                tables[int(number)][name][part] = value if name == "infos" else float(value)
+    """Episodes that ``record`` wrote, in the order of the plans. Raises InputError as ``read_part`` does."""
+    tables: dict[int, dict[str, Any]] = {plan.number: {"infos": {}, "figures": {}} for plan in plans}
+    for key, value in read_part(path).items():
+        number, name, part = key.split("|")
+        if part == "":
+            tables[int(number)][name] = value
+        else:
+            tables[int(number)][name][part] = value if name == "infos" else float(value)
     return [Episode(**tables[plan.number]) for plan in plans]
 
 

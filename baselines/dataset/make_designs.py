@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress
+from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 from panto_env.base.locks import alone_in
 from panto_env.cluster.parts import (
@@ -78,8 +79,8 @@ def make_designs(
             jobs: dict[Path, Job] = {}
             for first in range(0, settings.count, PER_PART):
                 last = min(first + PER_PART, settings.count)
-                jobs[parts / f"{first:07d}.parquet"] = partial(simulate_designs, settings, first, last)
-            make_parts(jobs, workers=workers, ray=ray, progress=progress)
+                jobs[parts / f"{first:07d}.json"] = partial(simulate_designs, settings, first, last)
+            make_parts(jobs, read_checked, workers=workers, ray=ray, progress=progress)
             _assemble(settings, folder, list(jobs), made_of)
             remove_parts(parts)
             remove_if_empty(output / PARTS)
@@ -116,9 +117,7 @@ def _assemble(
         ],
         metadata={KEY: json.dumps(made_of)},
     )
-    # Columns that are all null in a part have no type of their own there.
-    tables = [pq.read_table(path).cast(schema) for path in parts]
-    table = pa.concat_tables(tables).replace_schema_metadata(schema.metadata)
+    table = pa.Table.from_pylist([row for path in parts for row in read_checked(path)["rows"]], schema=schema)
     pq.write_table(table, unfinished / TABLE, compression="zstd")
     (unfinished / "card.md").write_text(card(settings, told, table, made_of), encoding="utf-8")
     write_checksums(unfinished)

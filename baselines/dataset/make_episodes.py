@@ -26,7 +26,7 @@ from panto_env.cluster.parts import (
 )
 
 from .checksums import LIST, write_checksums
-from .episodes import Episode, check_places, make, read_episodes, record
+from .episodes import Episode, check_places, make, read_episodes, read_part, record
 from .episodes_card import card, description, summary
 from .minari_set import KEY, check_minari, write_minari
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
@@ -75,7 +75,7 @@ def make_episodes(
             if not there:
                 open_parts(one.parts, one.made_of)
                 jobs |= one.jobs(settings)
-        make_parts(jobs, workers=workers, ray=ray, progress=progress)
+        make_parts(jobs, read_part, workers=workers, ray=ray, progress=progress)
         for one, there in zip(wanted, kept, strict=True):
             if not there:
                 _assemble(settings, one)
@@ -101,7 +101,7 @@ class _Wanted:
         parts = output / PARTS / name.replace("/", "_")
         plans = list(settings.plans(policy_set))
         groups = {
-            parts / f"{first:06d}.npz": plans[first : first + PER_PART]
+            parts / f"{first:06d}.safetensors": plans[first : first + PER_PART]
             for first in range(0, len(plans), PER_PART)
         }
         table = settings.model_copy(update={"sets": (policy_set,)}).model_dump(mode="json")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from panto_env.base.checked_json import read_checked, with_checksum
+from panto_env.base.checksums import read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
@@ -128,11 +128,11 @@ def read(path: str | Path) -> dict[str, Any]:
     data = read_checked(path)
     try:
         [one["fingerprint"] for one in (each["asked"] for each in data["cells"])]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (LookupError, TypeError) as error:
         raise InputError(
             f"{path} holds no oracles of this version; remove it, or name another file."
         ) from error
-    return dict(data)
+    return data
 
 
 @cache

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from panto_env.base.checked_json import read_checked
+from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 
 Number = Annotated[
@@ -117,7 +117,7 @@ class Result(Part):
     spans: tuple[tuple[int, int], ...]
     standings: tuple[Standing, ...]
     cells: tuple[Cell, ...]
-    traces: tuple[Trace, ...] = ()  # none in files of before they were kept
+    traces: tuple[Trace, ...]
 
     @property
     def title(self) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress
-from panto_env.base.checked_json import read_checked, write_checked
+from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.locks import alone_in
 from panto_env.cluster import spread
 from panto_env.cluster.parts import identity, open_parts

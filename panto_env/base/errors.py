@@ -1,4 +1,4 @@
-"""The one error that bad input of any kind raises, and the warnings of ours."""
+"""The one error that bad input of any kind raises, and our one warning."""
 
 from .shown import one_line
 
@@ -13,7 +13,3 @@ class InputError(ValueError):
 
 class AccuracyWarning(UserWarning):
     """Figures are less accurate than usual: one sentence that says why and by how much."""
-
-
-class UncheckedWarning(UserWarning):
-    """A file holds no checksum, so damage to it would not be noticed: one sentence that names it."""

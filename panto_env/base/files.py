@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import stat
@@ -51,12 +50,6 @@ def _reach_the_disk(path: Path) -> None:
     """Wait until a file is on the disk: else a power failure may leave its name without its content."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def regular_file(path: str | Path) -> Path:

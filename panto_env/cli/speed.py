@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.checked_json import with_checksum
+from ..base.checksums import with_checksum
 from ..base.errors import InputError
 from ..base.files import finite
 from ..base.table import Table

@@ -11,13 +11,14 @@ from typing import Any
 
 from ..analysis.pool import Progress
 from ..backend.cache import source_hash
+from ..base.checksums import read_checked, write_checked
 from ..base.errors import InputError
-from ..base.files import make_folder, sha256_of, write_whole
+from ..base.files import make_folder
 from ..base.version import __version__, commit
 from .spread import spread
 
 Job = Callable[[Path], None]
-"""Work that writes its result to a path; ``functools.partial`` of a function of a module."""
+"""Work that writes its result to a path, whole or not at all; a ``functools.partial``, to go elsewhere."""
 PARTS = ".parts"
 """Folder in the output with one for each data set's parts; hidden, so that Minari does not look into it."""
 IDENTITY = "identity.json"
@@ -37,17 +38,9 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
     make_folder(folder)
     path = folder / IDENTITY
     if not path.is_file():
-        with write_whole(path) as temporary:
-            temporary.write_text(json.dumps(made_of, indent=1) + "\n", encoding="utf-8")
+        write_checked(path, made_of)
         return
-    try:
-        before = json.loads(path.read_text(encoding="utf-8"))
-        difference = first_difference(before, made_of)
-    except (OSError, ValueError, AttributeError, TypeError, RecursionError) as error:
-        raise InputError(
-            f"{path} is damaged, so it does not say what the parts beside it are of; remove the folder, or "
-            "take another --output."
-        ) from error
+    difference = first_difference(read_checked(path), made_of)
     if difference:
         raise InputError(
             f"{folder} holds parts of another work ({difference}); finish that one, remove the folder, or "
@@ -57,22 +50,24 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
 
 def make_parts(
     jobs: Mapping[Path, Job],
+    read: Callable[[Path], object],
     *,
     workers: int | None = None,
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Make all files, each by its job; those that are there and fit their checksum are kept.
+    """Make all files, each by its job; those that are there and whole are kept.
 
+    read: reads a file, and raises InputError where it is missing or damaged; such a file is made again.
     workers, ray: as ``spread`` takes them. progress: called with the files there, and of all.
     """
-    missing = {path: job for path, job in jobs.items() if not _whole(path)}
+    missing = {path: job for path, job in jobs.items() if not _whole(path, read)}
     kept = len(jobs) - len(missing)
     if progress is not None:
         progress(kept, len(jobs))
     if missing:
         spread(
-            [partial(_write, job, path) for path, job in missing.items()],
+            [partial(job, path) for path, job in missing.items()],
             workers=workers,
             ray=ray,
             progress=None if progress is None else lambda done, _: progress(kept + done, len(jobs)),
@@ -99,25 +94,15 @@ def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     return ""
 
 
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _write(job: Job, path: Path) -> None:
-    with write_whole(path) as temporary:
-        job(temporary)
-    with write_whole(_checksum_file(path)) as temporary:
-        temporary.write_text(sha256_of(path), encoding="utf-8")
-
-
-def _whole(path: Path) -> bool:
+def _whole(path: Path, read: Callable[[Path], object]) -> bool:
     """Whether a part is there as it was written."""
     try:
-        return _checksum_file(path).read_text(encoding="utf-8") == sha256_of(path)
-    except (OSError, UnicodeDecodeError):
+        read(path)
+        return True
+    except InputError:
         return False
 
 
-def _checksum_file(path: Path) -> Path:
-    return path.with_name(f"{path.name}.sha256")
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,48 +1,32 @@
-"""Results of runs that are kept on disk: each under a hash of what it was made of, with a check of itself."""
+"""Results of runs that are kept on disk, each under a checksum of what it was made of."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from pathlib import Path
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from ..backend import cache_folder
+from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
-from ..base.files import write_whole
 
 
-def kept_file(folder: str, inputs: Any) -> Path | None:
-    """Where the result of these inputs, plain data, is kept: in a folder of the sources' own cache.
+def kept(folder: str, inputs: Any, compute: Callable[[], Any]) -> Any:
+    """What ``compute`` gives for these inputs, both plain data; from the disk where a process kept it before.
 
-    None where nothing can be kept.
+    It is kept in a folder beside the compiled kernels of the same sources, where something can be kept.
     """
-    cache, text = cache_folder(), json.dumps(inputs, sort_keys=True)
-    return cache and cache / folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
-
-
-def keep(file: Path | None, name: str, value: Any) -> None:
-    """Keep a value, plain data, under a name, where something can be kept."""
-    if file is None:
-        return
-    try:
+    cache = cache_folder()
+    if cache is None:
+        return compute()
+    made_of = checksum(inputs)
+    file = cache / folder / f"{made_of}.json"
+    with suppress(InputError):  # nothing is there, or it is damaged
+        found = read_checked(file)
+        if found["made_of"] == made_of:
+            return found["value"]
+    value = compute()
+    with suppress(InputError, OSError):  # no room: the next process works it out again
         file.parent.mkdir(exist_ok=True)
-        with write_whole(file) as temporary:
-            temporary.write_text(json.dumps({name: value, "check": _check(file, value)}))
-    except (InputError, OSError):
-        pass  # no room: the next process works it out again
-
-
-def read_kept(file: Path | None, name: str) -> Any:
-    """What was kept; None where there is nothing or it is damaged."""
-    if file is None:
-        return None
-    try:
-        kept: dict[str, Any] = json.loads(file.read_text())
-        return kept[name] if kept["check"] == _check(file, kept[name]) else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-
-
-def _check(file: Path, value: Any) -> str:
-    return hashlib.sha256(f"{file.stem} {value!r}".encode()).hexdigest()
+        write_checked(file, {"made_of": made_of, "value": value})
+    return value

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..base.errors import InputError
 from ..base.units import to_kmh
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
-from .kept import keep, kept_file, read_kept
+from .kept import kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
 
@@ -67,11 +66,14 @@ def trim_of_pass(
     low, high = settings.speeds
     if low != high or target_mean(settings, low) is None:
         return None
-    file = _file(settings, seed, spans)
-    force = read_kept(file, "static_force")
-    if force is None:
-        force = _solve(settings, passive_mean(settings, seed, spans))
-        keep(file, "static_force", force)
+    inputs = {
+        # As any: of a line all values, not those alone that every kind has.
+        "settings": settings.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True),
+        "target": target_mean(settings, low),
+        "seed": seed,
+        "spans": spans,
+    }
+    force = kept("mean_force", inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
     return Trim((low,), (force,))
 
 
@@ -115,15 +117,3 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
         f"{target:.1f} N on '{settings.catenary.name}' at {settings.speed_kmh[0]:g} km/h; give the static "
         "force itself."
     )
-
-
-def _file(settings: RunSettings, seed: int, spans: SpanChoice) -> Path | None:
-    speed = settings.speeds[0]
-    inputs = {
-        # As any: of a line all values, not those alone that every kind has.
-        "settings": settings.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True),
-        "target": target_mean(settings, speed),
-        "seed": seed,
-        "spans": spans,
-    }
-    return kept_file("mean_force", inputs)

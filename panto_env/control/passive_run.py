@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from ..base.units import to_kmh
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.sensors import Reading
-from .kept import keep, kept_file, read_kept
+from .kept import kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
 
@@ -65,12 +64,9 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
-    file = _file(designed)
-    kept: list[list[float]] | None = read_kept(file, "values")
-    if kept is None:
-        kept = _measured(run(designed))
-        keep(file, "values", kept)
-    return kept
+    inputs = designed.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
+    values: list[list[float]] = kept("passive_run", inputs, lambda: _measured(run(designed)))
+    return values
 
 
 def _measured(run: Trajectory) -> list[list[float]]:
@@ -82,9 +78,3 @@ def _measured(run: Trajectory) -> list[list[float]]:
     filtered = low_pass(run.contact_force, run.time_step)
     series = [run.head, run.frame, run.head_velocity, run.frame_velocity, run.contact_force, filtered]
     return [[float(each[inside].mean()) for each in series], [float(each[inside].std()) for each in series]]
-
-
-def _file(settings: RunSettings) -> Path | None:
-    return kept_file(
-        "passive_run", settings.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
-    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import math
 import os
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base import machine
 from ..base.arrays import Array
-from ..base.checked_json import NOT_AS_WRITTEN, warn_unchecked
+from ..base.checksums import with_checksum, without_checksum
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
 from ..base.units import to_kmh
@@ -29,8 +28,8 @@ from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
 
 FORMAT = 3
-KEY, CHECKSUM = b"panto_env", b"panto_env.sha256"
-"""Of the file's own table of texts: the facts as JSON, and the checksum of them and all columns."""
+KEY = b"panto_env"
+"""Of the file's metadata, under which the facts stand as JSON, with the checksum of them and all columns."""
 LARGEST = 0.5
 """Share of the machine's memory that a file may unpack to."""
 DAMAGED = (
@@ -212,17 +211,13 @@ class Trajectory:
         }
         facts["line"] = vars(self.line)
         facts["alignment"] = self.alignment.supports, self.alignment.pitch
-        told, table = json.dumps(facts).encode(), pa.table(columns)
-        table = table.replace_schema_metadata({KEY: told, CHECKSUM: _checksum(table, told)})
+        table = pa.table(columns, metadata={KEY: json.dumps(with_checksum(facts, columns))})
         with write_whole(path) as temporary:
             pq.write_table(table, temporary, write_page_checksum=True)
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
-        """Read what ``save`` wrote; UncheckedWarning where a file of an older version has no checksum.
-
-        Raises InputError where the file is not a whole trajectory, or is damaged.
-        """
+        """Read what ``save`` wrote. Raises InputError where it is not a whole trajectory, or is damaged."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -232,10 +227,8 @@ class Trajectory:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 _check_size(file.metadata)
                 table = file.read()
-            told, checksum = table.schema.metadata[KEY], table.schema.metadata.get(CHECKSUM)
-            if checksum not in (None, _checksum(table, told)):
-                raise ValueError(f"it is damaged or was changed: {NOT_AS_WRITTEN}")
-            facts = json.loads(told)
+            columns = {name: table[name].to_numpy() for name in table.column_names}
+            facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
             if facts.pop("format") != FORMAT:
                 raise ValueError("it has another format")
             for name in ("support_position", "dropper_position"):
@@ -243,26 +236,23 @@ class Trajectory:
             facts["line"] = LineFacts(**facts["line"])
             supports, pitch = facts["alignment"]
             facts["alignment"] = Alignment(tuple(supports), pitch)
-            series = {name: table[name].to_numpy() for name in SERIES}
+            series = {name: columns[name] for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),
                 ("dropper_force", "dropper_position"),
             ):
-                count = sum(column.startswith(f"{name}_") for column in table.column_names)
-                columns = [table[f"{name}_{k}"].to_numpy() for k in range(count)]
-                series[name] = np.array(columns).T if columns else np.zeros((table.num_rows, 0))
+                count = sum(column.startswith(f"{name}_") for column in columns)
+                own = [columns[f"{name}_{k}"] for k in range(count)]
+                series[name] = np.array(own).T if own else np.zeros((table.num_rows, 0))
                 if count and count != len(facts[places]):
                     raise ValueError(f"columns of {name} are missing")
-            run = cls(**series, **facts)
+            return cls(**series, **facts)
         except (pa.ArrowException, *DAMAGED) as error:
             reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
             raise InputError(
                 f"{path} is not a whole trajectory file ({reason}); write it anew with "
                 "Trajectory.save or `panto simulate --output`."
             ) from error
-        if checksum is None:
-            warn_unchecked(path)
-        return run
 
 
 def _check_size(metadata: Any) -> None:
@@ -274,15 +264,6 @@ def _check_size(metadata: Any) -> None:
     size = max(unpacked, 8 * metadata.num_rows * metadata.num_columns)
     if not 0 <= size <= LARGEST * machine.memory():
         raise ValueError(f"it would take {size / 1e9:,.1f} GB of memory")
-
-
-def _checksum(table: Any, told: bytes) -> bytes:
-    """SHA-256 of a Parquet table's columns, by name, type and values, and of the facts, as bytes."""
-    check = hashlib.sha256(told)
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        check.update(f"{name} {column.type} {len(column)} ".encode())
-        check.update(np.ascontiguousarray(column.to_numpy()).tobytes())
-    return check.hexdigest().encode()
 
 
 def _facts() -> tuple[str, ...]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..analysis.plots import save
-from ..base.checked_json import with_checksum
-from ..base.files import check_output, finite, make_folder, write_whole
+from ..base.checksums import write_checked
+from ..base.files import check_output, finite, make_folder
 from ..base.table import Table
 
 if TYPE_CHECKING:
@@ -82,9 +81,7 @@ def write(outcome: Outcome, folder: str | Path) -> list[Path]:
     folder = Path(folder)
     make_folder(folder)
     files = [folder / NUMBERS]
-    with write_whole(files[0]) as temporary:
-        text = json.dumps(with_checksum(outcome.as_dict()), indent=1, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_checked(files[0], outcome.as_dict())
     for name, plot in outcome.plots.items():
         files.append(folder / f"{name}.png")
         save(plot, files[-1])

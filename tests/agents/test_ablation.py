@@ -78,7 +78,9 @@ def test_runs_are_kept_and_compared(config, tmp_path, monkeypatch):
     folder = RunFolder(tmp_path / "runs" / "one-harmonic" / "seed4")
     assert folder.read_settings().environment == {"id": "PantographStiffness-v0", "distance": 80.0}
     before = folder.model.stat().st_mtime_ns
-    (tmp_path / "runs" / "one-harmonic" / "seed3" / "model.zip").unlink()  # as if it had been broken off
+    (
+        tmp_path / "runs" / "one-harmonic" / "seed3" / "model.safetensors"
+    ).unlink()  # as if it had been broken off
     again = CliRunner().invoke(make_app(), arguments)
     assert json.loads(again.stdout)["variants"] == told
     assert folder.model.stat().st_mtime_ns == before

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tomllib
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,18 +20,19 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-import stable_baselines3
+from safetensors.numpy import load_file, save_file
 
 from panto_agents import command, packages, train
 from panto_agents.demonstrations import Demonstrations, returns
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
 from panto_agents.lanes import lane_seeds
-from panto_agents.model_file import read_model
+from panto_agents.model_file import read_model, restore
 from panto_agents.policy import TrainedPolicy, load
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
 from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env import InputError, simulate
+from panto_env.base.array_file import write_arrays
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS
@@ -91,8 +91,13 @@ class TestRun:
     def test_folder(self, finished):
         names = sorted(path.name for path in finished.path.iterdir() if path.name != ".lock")
         assert names == [
-            "best.zip", "checkpoints", "evaluations.csv", "model.zip", "settings.json", "tensorboard",
-        ]  # fmt: skip
+            "best.safetensors",
+            "checkpoints",
+            "evaluations.csv",
+            "model.safetensors",
+            "settings.json",
+            "tensorboard",
+        ]
         steps = [read_model(path)[0].steps for path in sorted(finished.checkpoints.iterdir())]
         assert steps == [128, 256]
         assert finished.read_settings() == settings(algorithm_of(finished))
@@ -147,23 +152,33 @@ class TestResume:
         assert [row["steps"] for row in rows(copied)] == ["128", "256", "384", "512"]
         assert not np.array_equal(before[0], weights(copied.model)[0])
         kept = sorted(path.name for path in copied.checkpoints.iterdir())
-        assert kept == [f"step-{steps:09d}.zip" for steps in (256, 384, 512)]
+        assert kept == [f"step-{steps:09d}.safetensors" for steps in (256, 384, 512)]
 
     def test_restores_networks_optimisers_and_replay(self, finished):
         training = settings(algorithm_of(finished))
         run = train.Run(training, finished, train.make_lanes(training))
         run.restore()
         ours = run.model.get_parameters()
-        theirs = getattr(stable_baselines3, training.algorithm.upper()).load(finished.model)
-        for name, parameters in theirs.get_parameters().items():
-            assert str(parameters) == str(ours[name]), name
-        assert run.model.num_timesteps == theirs.num_timesteps == 256
+        saved = load_file(finished.checkpoint(256))
+        for key, tensor in ours["policy"].items():
+            np.testing.assert_array_equal(tensor, saved[f"learner/policy/{key}"])
+        optimisers = [name for name in ours if name.endswith("optimizer")]
+        for name in optimisers:
+            for k, moments in ours[name]["state"].items():
+                assert moments["step"] > 0
+                assert moments["exp_avg"].abs().max() > 0
+                for key, tensor in moments.items():
+                    np.testing.assert_array_equal(tensor, saved[f"learner/{name}/{k}/{key}"])
+            assert len(ours[name]["state"]) == len(ours[name]["param_groups"][0]["params"])
+        assert len(optimisers) == (3 if training.algorithm == "sac" else 1)
+        assert run.model.num_timesteps == 256
         if training.algorithm == "sac":
-            assert run.model.log_ent_coef.item() == theirs.log_ent_coef.item() != 0
+            assert run.model.log_ent_coef.item() == saved["learner/log_ent_coef"].item() != 0
             buffer = run.model.replay_buffer
             assert buffer.pos == 128
             assert not buffer.full
             assert np.abs(buffer.observations[:128]).max(axis=(1, 2)).min() > 0
+            np.testing.assert_array_equal(buffer.rewards[:128], saved["replay/rewards"])
 
     def test_after_an_interruption(self, copied):
         """The newest checkpoint is half-written: the one before it serves."""
@@ -192,7 +207,9 @@ class TestResume:
 
 class TestPolicy:
     def test_acts_as_stable_baselines_does(self, finished):
-        model = getattr(stable_baselines3, algorithm_of(finished).upper()).load(finished.model)
+        training = settings(algorithm_of(finished))
+        model = train.Run(training, finished, train.make_lanes(training)).model
+        restore(finished.model, model)
         policy = load(finished.model)
         task = Task(run_settings(settings(algorithm_of(finished)).arguments))
         policy.reset(task.context(0))
@@ -247,24 +264,21 @@ class TestPolicy:
     def test_broken_files(self, copied, tmp_path):
         whole = copied.model.read_bytes()
         damaged = bytearray(whole)
-        place = whole.index(b"weight_0.npy") + 200
-        damaged[place : place + 8] = b"\xff" * 8
-        for content in (b"", b"no zip", whole[: len(whole) // 2], whole[:-30], bytes(damaged)):
-            path = tmp_path / "broken.zip"
+        damaged[-100:-92] = b"\xff" * 8
+        for content in (b"", b"no model", whole[: len(whole) // 2], whole[:-30], bytes(damaged)):
+            path = tmp_path / "broken.safetensors"
             path.write_bytes(content)
-            with pytest.raises(InputError, match=r"broken.zip is not a whole model file"):
+            with pytest.raises(InputError, match=r"broken.safetensors is not a whole model file"):
                 load(path)
-        other = tmp_path / "other.zip"
-        with zipfile.ZipFile(other, "w") as archive:
-            archive.writestr("notes.txt", "no model")
-        with pytest.raises(InputError, match="`panto train` has not written it"):
+        other = tmp_path / "other.safetensors"
+        save_file({"notes": np.zeros(3)}, other)
+        with pytest.raises(InputError, match="it was not written by panto-env"):
             simulate(policy=str(other))
-        with zipfile.ZipFile(other, "a") as archive:
-            archive.writestr("panto.json", '{"format": 9}')
-        with pytest.raises(InputError, match=r"panto.json is not valid"):
+        write_arrays(other, {"format": 9}, {})
+        with pytest.raises(InputError, match="its facts are not valid"):
             load(other)
-        with pytest.raises(InputError, match=r"none.zip does not exist"):
-            load(tmp_path / "none.zip")
+        with pytest.raises(InputError, match=r"none.safetensors does not exist"):
+            load(tmp_path / "none.safetensors")
 
 
 class TestSettings:

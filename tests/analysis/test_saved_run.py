@@ -75,7 +75,10 @@ def kept(tmp_path_factory):
     [
         ({"policy": "p"}, "with its settings and policy 'p' the run is another one today"),
         ({"policy": "pd:gain=0.7"}, "differs by"),
-        ({"policy": "runs/none/model.zip"}, "The model file runs/none/model.zip does not exist"),
+        (
+            {"policy": "runs/none/model.safetensors"},
+            "The model file runs/none/model.safetensors does not exist",
+        ),
         ({"policy": "OfMine"}, "Unknown policy 'OfMine'"),
         ({"time": np.zeros(5), "position": np.zeros(5)}, "instead of"),
     ],
@@ -133,7 +136,7 @@ def test_a_file_of_another_version_is_refused(kept, tmp_path, change):
 
 def test_saved_runs_are_told_from_policies():
     assert is_saved_run("runs/one.parquet")
-    assert not any(map(is_saved_run, ("pd", "model.zip", "mine.py:Class", object())))
+    assert not any(map(is_saved_run, ("pd", "model.safetensors", "mine.py:Class", object())))
 
 
 def film(*arguments):

@@ -10,7 +10,7 @@ import pytest
 
 import panto_env
 from panto_env.base import machine
-from panto_env.base.checked_json import with_checksum
+from panto_env.base.checksums import with_checksum
 from panto_env.base.errors import InputError
 from panto_env.cli import speed
 from panto_env.envs import IDS

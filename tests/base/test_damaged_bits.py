@@ -3,24 +3,23 @@
 import json
 import random
 import shutil
-import warnings
-import zipfile
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from panto_agents.add_checksums import add_checksum
 from panto_agents.model_file import read_model
-from panto_agents.model_parts import CHECKSUMS
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER
+from panto_baselines.dataset.episodes import Episode, read_episodes
+from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
 from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate
-from panto_env.base.checked_json import CHECKSUM, read_checked, with_checksum
-from panto_env.base.errors import UncheckedWarning
+from panto_env.base.array_file import write_arrays
+from panto_env.base.checksums import CHECKSUM, read_checked
 from panto_env.base.files import read_toml
 from panto_env.metrics import trajectory
 from panto_env.studies import Comparison, Outcome
@@ -55,9 +54,7 @@ def flipped(source, target, read, places=None):
         changed[bit // 8] ^= 1 << bit % 8
         target.write_bytes(changed)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UncheckedWarning)  # the checksum's own name was hit
-                now = said(read(target))
+            now = said(read(target))
         except InputError:
             refused += 1
         else:
@@ -112,13 +109,28 @@ def test_the_settings_of_a_training(tmp_path):
     assert refused + same == FLIPS
 
 
-@pytest.mark.parametrize("part", ["anywhere", "the directory"])
+@pytest.mark.parametrize("part", ["anywhere", "the header"])
 def test_a_model_file(part, tmp_path):
-    file = FOLDER / "head.zip"
-    size = file.stat().st_size
-    places = range(8 * (size - 400), 8 * size) if part == "the directory" else None
-    refused, same = flipped(file, tmp_path / "flipped.zip", read_model, places)
+    file = FOLDER / "head.safetensors"
+    header = 8 + int.from_bytes(file.read_bytes()[:8], "little")
+    places = range(8 * header) if part == "the header" else None
+    refused, same = flipped(file, tmp_path / "flipped.safetensors", read_model, places)
     assert refused > FLIPS / 4
+    assert refused + same == FLIPS
+
+
+def test_a_part_of_a_data_set(tmp_path):
+    plans = load_episodes(ROOT / "configs" / "dataset-known-line.toml")
+    plans = list(islice(plans.plans(plans.sets[0]), 2))
+    arrays = {
+        f"{plan.number}|{name}|{'std' if name in ('infos', 'figures') else ''}": np.array(float(plan.number))
+        for plan in plans
+        for name in Episode._fields
+    }
+    source = tmp_path / "part.safetensors"
+    write_arrays(source, {}, arrays)
+    refused, same = flipped(source, tmp_path / "flipped", lambda path: read_episodes(path, plans))
+    assert refused > FLIPS / 2
     assert refused + same == FLIPS
 
 
@@ -139,74 +151,36 @@ def test_a_bit_of_a_column_is_told_as_damage(run, tmp_path):
         Trajectory.load(path)
 
 
-class TestWithoutChecksum:
-    """Files of before there were checksums are read, with a warning; a command of the module adds them."""
+def test_what_has_no_checksum_is_refused(saved, tmp_path):
+    import pyarrow.parquet as pq
 
-    def test_a_saved_run(self, run, saved, tmp_path):
-        import pyarrow.parquet as pq
-
-        path = tmp_path / "old.parquet"
-        table = pq.read_table(saved)
-        facts = table.schema.metadata[trajectory.KEY]
-        pq.write_table(table.replace_schema_metadata({trajectory.KEY: facts}), path)
-        with pytest.warns(UncheckedWarning, match="old.parquet has no checksum") as caught:
-            assert said(Trajectory.load(path)) == said(run)
-        assert len(caught) == 1
-        self.mended(path, Trajectory.load, run)
-
-    def test_a_result(self, tmp_path):
-        table = {"cells": [{"asked": {"fingerprint": "ab"}}]}
-        for name, text in (("a", json.dumps(table)), ("b", json.dumps(table, indent=1) + "\n")):
-            path = tmp_path / f"{name}.json"
-            path.write_text(text)
-            with pytest.warns(UncheckedWarning, match=".json has no checksum"):
-                assert stored.read(path) == table
-            self.mended(path, stored.read, table)
-            rest = path.read_text().replace(with_checksum(table)[CHECKSUM], "")
-            assert rest.replace(f'"{CHECKSUM}":', "").replace('"",', "").replace(" ", "").split() == (
-                text.replace(" ", "").split()
-            )
-
-    def test_a_model_file(self, tmp_path):
-        path = tmp_path / "old.zip"
-        with zipfile.ZipFile(FOLDER / "head.zip") as source, zipfile.ZipFile(path, "w") as archive:
-            for name in set(source.namelist()) - {CHECKSUMS}:
-                archive.writestr(name, source.read(name))
-        with pytest.warns(UncheckedWarning, match="old.zip has no checksum"):
-            facts, actor = read_model(path)
-        self.mended(path, read_model, (facts, actor))
-
-    def mended(self, path, read, whole):
-        add_checksum(path)
-        before = path.read_bytes()
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            assert said(read(path)) == said(whole)
-        add_checksum(path)
-        if path.suffix == ".json":
-            assert path.read_bytes() == before
+    table = pq.read_table(saved)
+    facts = json.loads(table.schema.metadata[trajectory.KEY])
+    del facts[CHECKSUM]
+    path = tmp_path / "run.parquet"
+    pq.write_table(table.replace_schema_metadata({trajectory.KEY: json.dumps(facts)}), path)
+    with pytest.raises(InputError, match="its checksum does not fit"):
+        Trajectory.load(path)
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps({"cells": [{"asked": {"fingerprint": "ab"}}]}))
+    with pytest.raises(InputError, match="its checksum does not fit"):
+        stored.read(path)
 
 
-def test_what_comes_with_the_project_is_checked():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for path in FOLDER.glob("*.zip"):
-            read_model(path)
-        for path in (ROOT / "docs" / "benchmark").glob("*.json"):
-            read_result(path)
-        stored.read(stored.RESULTS)
+def test_what_comes_with_the_project_is_whole():
+    for path in FOLDER.glob("*.safetensors"):
+        read_model(path)
+    for path in (ROOT / "docs" / "benchmark").glob("*.json"):
+        read_result(path)
+    stored.read(stored.RESULTS)
     assert read_toml(ROOT / "pyproject.toml")
 
 
-def test_a_model_whose_parts_were_exchanged_is_refused(tmp_path):
-    """Each zip is whole; together they are not what was written."""
-    path = tmp_path / "mixed.zip"
-    shutil.copy(FOLDER / "head.zip", path)
-    with zipfile.ZipFile(FOLDER / "head.zip") as one, zipfile.ZipFile(FOLDER / "high-speed.zip") as other:
-        parts = {name: one.read(name) for name in one.namelist()}
-        parts["actor.npz"] = other.read("actor.npz")
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in parts.items():
-            archive.writestr(name, data)
-    with pytest.raises(InputError, match=r"its part actor\.npz is damaged or was changed"):
+def test_a_model_with_the_network_of_another_is_refused(tmp_path):
+    """Each model is whole; together they are not what was written."""
+    one, other = ((FOLDER / f"{name}.safetensors").read_bytes() for name in ("head", "known-line"))
+    begin = 8 + int.from_bytes(one[:8], "little")
+    path = tmp_path / "mixed.safetensors"
+    path.write_bytes(one[:begin] + other[-(len(one) - begin) :])
+    with pytest.raises(InputError, match="it is damaged or was changed"):
         read_model(path)

@@ -136,8 +136,8 @@ def test_a_model_is_whole_or_not_there(full, tmp_path):
     from panto_agents.model_file import export_model
     from panto_agents.stored import FOLDER
 
-    (tmp_path / "out.zip").write_text("old")
-    with pytest.raises(InputError, match=r"out\.zip cannot be written: No space left on device"):
-        export_model(FOLDER / "head.zip", tmp_path / "out.zip")
-    assert (tmp_path / "out.zip").read_text() == "old"
-    assert os.listdir(tmp_path) == ["out.zip"]
+    (tmp_path / "out.safetensors").write_text("old")
+    with pytest.raises(InputError, match=r"out\.safetensors cannot be written: No space left on device"):
+        export_model(FOLDER / "head.safetensors", tmp_path / "out.safetensors")
+    assert (tmp_path / "out.safetensors").read_text() == "old"
+    assert os.listdir(tmp_path) == ["out.safetensors"]

@@ -133,8 +133,8 @@ def test_every_output_of_every_command_is_tried():
 
 
 def test_an_argument_that_can_t_be_written_is_refused(folder):
-    assert "there is no folder nowhere" in refused(["export", "model.zip", "nowhere/out.zip"])
-    assert "must end in .zip" in refused(["export", "model.zip", "out.onnx"])
+    assert "there is no folder nowhere" in refused(["export", "model.safetensors", "nowhere/out.safetensors"])
+    assert "must end in .safetensors" in refused(["export", "model.safetensors", "out.onnx"])
 
 
 def test_the_command_ends_with_2_and_one_line(folder):

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from panto_baselines.oracle import stored
 from panto_baselines.policies.gains import load_gains
 from panto_env import InputError
-from panto_env.base.checked_json import with_checksum
+from panto_env.base.checksums import with_checksum
 from panto_env.cli import make_app
 
 LINE = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass"]

@@ -9,7 +9,7 @@ import pytest
 import rich.table
 
 from panto_baselines.report.command import report
-from panto_env.base.checked_json import read_checked, with_checksum
+from panto_env.base.checksums import read_checked, with_checksum
 from panto_env.base.shown import harmless, one_line
 from panto_env.base.standard_streams import say
 from panto_env.terminal import PlainConsole, alert

@@ -21,7 +21,7 @@ from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_ben
 from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
-from panto_env.base.checked_json import read_checked
+from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
@@ -153,7 +153,7 @@ def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> Non
         ({"policies": ["pp"]}, "Unknown policy 'pp'"),
         ({"policies": ["p:gain=-1"]}, "'p:gain=-1' cannot be made"),
         ({"policies": ["p", "p"]}, "key 'policies': 'p' is given twice"),
-        ({"policies": ["model.zip"]}, "model.zip does not exist"),
+        ({"policies": ["model.safetensors"]}, "model.safetensors does not exist"),
         ({"seeds": 0}, "key 'seeds'"),
         ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
         ({"seeds": [-1]}, "key 'seeds.0'"),

@@ -19,10 +19,12 @@ from panto_baselines.benchmark.controls import OTHER_SEED
 from panto_baselines.dataset import designs, make_designs, make_episodes
 from panto_baselines.dataset.checksums import LIST, verify
 from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs
-from panto_baselines.dataset.episodes import Stage
+from panto_baselines.dataset.episodes import Stage, read_part
 from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
 from panto_configs import names
 from panto_env import InputError, simulate
+from panto_env.base.array_file import write_arrays
+from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.locks import alone_in
 from panto_env.base.settings import parse
 from panto_env.cluster import parts
@@ -224,7 +226,7 @@ class TestEpisodes:
 class TestParts:
     def test_killed_in_the_middle_it_goes_on_and_ends_the_same(self, minari, tmp_path, monkeypatch):
         monkeypatch.setattr(make_episodes, "PER_PART", 1)
-        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz.sha256")
+        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.safetensors")
         (tmp_path / "tiny.toml").write_text(
             f"""
             title = "tiny"
@@ -239,7 +241,7 @@ class TestParts:
         assert killed.returncode == 2
         assert "A worker process died" in killed.stderr
         assert (tmp_path / "deadly.dead").exists()
-        kept = tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.npz"
+        kept = tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.safetensors"
         before = kept.stat().st_mtime_ns
         assert not (tmp_path / "out/pantograph").exists()
         other = panto(*command, "--episodes", 13, cwd=tmp_path)
@@ -263,19 +265,19 @@ class TestParts:
         )
         command = [PANTO, "dataset", "designs", "few.toml", "--output", "out", "--workers", "1"]
         process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
-        first = tmp_path / "out/.parts/designs/0000000.parquet"
-        while not first.with_name(f"{first.name}.sha256").exists():
+        first = tmp_path / "out/.parts/designs/0000000.json"
+        while not first.exists():
             assert process.poll() is None
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         made = first.stat().st_mtime_ns
         assert not (tmp_path / "out/designs").exists()
-        shutil.copy(first, tmp_path / "first.parquet")
+        rows = read_checked(first)["rows"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         table = pq.read_table(tmp_path / "out/designs/designs.parquet")
         assert table["design"].to_pylist() == list(range(200))
-        assert table["std"].to_pylist()[:64] == pq.read_table(tmp_path / "first.parquet")["std"].to_pylist()
+        assert table["std"].to_pylist()[:64] == [row["std"] for row in rows]
         assert made < (tmp_path / "out/designs").stat().st_mtime_ns
 
     def test_two_processes_do_not_make_data_in_one_folder(self, tmp_path):
@@ -400,18 +402,24 @@ def test_without_minari_its_extra_is_named(monkeypatch, tmp_path):
 
 
 def test_kept_parts_count_as_done_and_damaged_ones_are_made_again(tmp_path):
-    told, path = [], tmp_path / "0.txt"
-    parts.make_parts({path: partial(_text, "whole")}, workers=1)
-    parts.make_parts({path: _never}, workers=1, progress=lambda *done: told.append(done))
+    told, path = [], tmp_path / "0.json"
+    parts.make_parts({path: partial(_part, "whole")}, read_checked, workers=1)
+    parts.make_parts({path: _never}, read_checked, workers=1, progress=lambda *done: told.append(done))
     assert told == [(1, 1)]
-    for damage in (lambda: path.write_text("Whole"), path.unlink):
+    for damage in (lambda: path.write_text(path.read_text().replace("whole", "Whole")), path.unlink):
         damage()
-        parts.make_parts({path: partial(_text, "again")}, workers=1)
-        assert path.read_text() == "again"
+        parts.make_parts({path: partial(_part, "again")}, read_checked, workers=1)
+        assert read_checked(path) == {"text": "again"}
+    named = tmp_path / "0.safetensors"
+    write_arrays(named, {}, {"0|rewards|": np.ones(3)})
+    parts.make_parts({named: _never}, read_part, workers=1)
+    named.write_bytes(named.read_bytes()[:-1])
+    with pytest.raises(AssertionError, match="is not made again"):
+        parts.make_parts({named: _never}, read_part, workers=1)
 
 
-def _text(text, path):
-    path.write_text(text)
+def _part(text, path):
+    write_checked(path, {"text": text})
 
 
 def _never(path):

@@ -411,7 +411,6 @@ def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.Monkey
     assert stored.asked(settings) != [before]
 
 
-@pytest.mark.filterwarnings("ignore::panto_env.base.errors.UncheckedWarning")
 @pytest.mark.parametrize("text", ["", "[]", '{"cells": [{"fingerprint": "0"}]}'])
 def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
     file = tmp_path / "o.json"

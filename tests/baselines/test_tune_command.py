@@ -129,6 +129,8 @@ def test_parts_of_another_tuning_are_not_taken(tmp_path: Path) -> None:
     assert parts.tune(tmp_path, "skyhook", settings, seeds=1, **given) == first
     with pytest.raises(InputError, match=r"holds parts of another work \(its seeds is 1, this is 2\)"):
         parts.tune(tmp_path, "skyhook", settings, seeds=2, **given)
+    with pytest.raises(InputError, match=r"holds parts of another work \(its passes is 11, this is 12\)"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=1, **given | {"passes": 12})
     part = tmp_path / "250.0.json"
     part.write_text(part.read_text().replace("0.", "1.", 1))
     with pytest.raises(InputError, match="damaged or was changed"):

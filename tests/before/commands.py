@@ -105,7 +105,8 @@ def _train(algorithm: str, tape: Tape) -> None:
         text = TRAINING.format(algorithm=algorithm, steps=steps, hyperparameters=hyperparameters)
         (Path(folder) / "training.toml").write_text(text, encoding="utf-8")
         _panto(("train", "training.toml", "--output", "run"), folder)
-        _json(("evaluate", "run/model.zip", "--seeds", "2"), tape, folder)
+        (model,) = Path(folder).glob("run/model.*")  # earlier versions had zips
+        _json(("evaluate", str(model), "--seeds", "2"), tape, folder)
 
 
 def _reproduce(study: str, tape: Tape) -> None:

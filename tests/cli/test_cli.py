@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from panto_env import Trajectory
-from panto_env.base.checked_json import read_checked
+from panto_env.base.checksums import read_checked
 from panto_env.studies.en50318 import reference
 
 PANTO = Path(sys.executable).with_name("panto")
@@ -79,7 +79,7 @@ def test_list_shows_entries_sources_and_policies():
         (["simulate", "--catenary", "broken.toml"], "broken.toml is not valid TOML"),
         (["simulate", "--policy", "best"], "Unknown policy 'best'"),
         (["simulate", "--policy", "p:gain=much"], "Policy 'p:gain=much'"),
-        (["simulate", "--policy", "half.zip"], "half.zip"),
+        (["simulate", "--policy", "half.safetensors"], "half.safetensors"),
         (["simulate", "--spans", "five"], "--spans must read first-last"),
         (["simulate", "--spans", "5-60"], "but the run ends at"),
         (["simulate", "--plot", "run.doc"], "must end in one of"),
@@ -90,7 +90,7 @@ def test_list_shows_entries_sources_and_policies():
 )
 def test_bad_input_is_one_line_and_status_2(arguments, message, tmp_path):
     (tmp_path / "broken.toml").write_text("kind = [")
-    (tmp_path / "half.zip").write_bytes(b"PK\x03\x04half")
+    (tmp_path / "half.safetensors").write_bytes(b"PK\x03\x04half")
     before = sorted(tmp_path.iterdir())
     result = panto(*arguments, cwd=tmp_path)
     assert result.returncode == 2

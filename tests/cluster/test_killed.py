@@ -75,20 +75,20 @@ def same_weights(one: Path, other: Path) -> bool:
 @pytest.mark.slow
 def test_a_training_killed_between_two_checkpoints_loses_only_what_came_after_the_first(tmp_path):
     folder = tmp_path / "run"
-    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.zip")
+    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.safetensors")
     (tmp_path / "tiny.toml").write_text(CONFIG.format(more=f'residual_of = "{policy}"'))
     command = ("train", "tiny.toml", "--output", folder)
     killed = panto(*command, cwd=tmp_path)
     assert killed.returncode == -signal.SIGKILL
     assert (tmp_path / "deadly.dead").exists()
-    assert not (folder / "model.zip").exists()
+    assert not (folder / "model.safetensors").exists()
     newest = RunFolder(folder).newest_checkpoint()
     assert newest is not None
-    assert newest.name == "step-000000256.zip"
+    assert newest.name == "step-000000256.safetensors"
     assert panto(*command, cwd=tmp_path).returncode == 2  # it is not trained over
     resumed = panto(*command, "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
-    assert read_model(folder / "model.zip")[0].steps == 768
+    assert read_model(folder / "model.safetensors")[0].steps == 768
     assert steps_evaluated(folder) == [128 * k for k in range(7)]
 
 
@@ -137,15 +137,15 @@ class TestTrainings:
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
         planned = {tmp_path / "one": settings(), tmp_path / "other": settings(seed=2)}
         train.train(settings(), tmp_path / "one", progress=False)
-        before = (tmp_path / "one" / "model.zip").read_bytes()
+        before = (tmp_path / "one" / "model.safetensors").read_bytes()
         with pytest.raises(InputError, match="exists already"):
             train_all(planned, workers=1)
         assert not (tmp_path / "other").exists()
         outcomes = train_all(planned, resume=True, workers=1)
-        assert (tmp_path / "one" / "model.zip").read_bytes() == before
+        assert (tmp_path / "one" / "model.safetensors").read_bytes() == before
         assert [outcome.seed for outcome in outcomes] == [1, 2]
         alone = train.train(settings(seed=2), tmp_path / "alone", progress=False)
-        assert same_weights(alone.model, tmp_path / "other" / "model.zip")
+        assert same_weights(alone.model, tmp_path / "other" / "model.safetensors")
         assert outcomes[1].ratio == read_model(alone.best)[0].ratio
 
     def test_configurations_times_seeds(self, tmp_path):
@@ -165,8 +165,8 @@ class TestTrainings:
         command = ("trainings", "tiny.toml", "--seed", 0, "--seed", 1, "--steps", 128, "--workers", 1)
         done = panto(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-        assert "runs/tiny-ppo-seed0/best.zip" in done.stdout
-        assert "runs/tiny-ppo-seed1/best.zip" in done.stdout
+        assert "runs/tiny-ppo-seed0/best.safetensors" in done.stdout
+        assert "runs/tiny-ppo-seed1/best.safetensors" in done.stdout
         again = panto(*command, cwd=tmp_path)
         assert (again.returncode, again.stdout) == (2, "")
         assert "exists already" in again.stderr

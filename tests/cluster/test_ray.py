@@ -188,7 +188,7 @@ def training(seed: int, **changes) -> Training:
 
 
 def weights(folder: Path) -> list[np.ndarray]:
-    _, actor = read_model(folder / "model.zip")
+    _, actor = read_model(folder / "model.safetensors")
     return [*actor.weights, *actor.biases]
 
 
@@ -210,9 +210,9 @@ def test_trainings_learn_what_they_learn_in_processes(two_nodes, tmp_path):
 
 def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, tmp_path):
     folder = tmp_path / "run"
-    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.zip")
+    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.safetensors")
     train_all({folder: training(1, residual_of=policy), tmp_path / "other": training(2)}, ray=two_nodes)
     assert (tmp_path / "deadly.dead").exists()
-    assert read_model(folder / "model.zip")[0].steps == 768
+    assert read_model(folder / "model.safetensors")[0].steps == 768
     with (folder / "evaluations.csv").open(newline="") as file:
         assert [row["steps"] for row in csv.DictReader(file)] == [str(128 * k) for k in range(7)]

@@ -102,7 +102,7 @@ def test_what_was_found_is_kept_and_found_again(empty_store):
     assert len(runs) == tried + 1
     np.testing.assert_array_equal(first.contact_force, again.contact_force)
     (file,) = folder.iterdir()
-    assert json.loads(file.read_text())["static_force"] == first.nominal_force
+    assert json.loads(file.read_text())["value"] == first.nominal_force
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_it_is_kept_under_the_hash_of_the_sources():
 def test_it_is_written_whole_or_not_at_all(empty_store, monkeypatch):
     folder, _ = empty_store
 
-    def interrupted(path, text):
+    def interrupted(path, text, encoding):
         path.write_bytes(text.encode()[:10])
         raise KeyboardInterrupt
 

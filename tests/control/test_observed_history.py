@@ -162,7 +162,7 @@ def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, mon
     assert len(runs) == 1
     (file,) = (tmp_path / "passive_run").iterdir()
     table = json.loads(file.read_text())
-    table["values"][0][0] += 1.0
+    table["value"][0][0] += 1.0
     file.write_text(json.dumps(table))
     assert make() == first
     assert len(runs) == 2

@@ -30,7 +30,7 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("ablation",): ("ablation.toml", "--workers", "1"),
     ("benchmark",): ("passive", *QUICK, "--speed", "300", "--seeds", "1", "--workers", "1"),
     ("evaluate",): ("passive", *QUICK, "--speed", "300"),
-    ("export",): ("nowhere.zip", "model.zip"),
+    ("export",): ("nowhere.safetensors", "model.safetensors"),
     ("oracle",): (*QUICK, "--spans", "1-1", "--hops", "0"),
     ("report",): ("nowhere.json",),
     ("train",): ("training.toml", "--output", "run"),

@@ -72,7 +72,10 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
         "settings of a training": Subject("JSON", run.settings, _settings, checked=True),
     }
-    models = {f"model {path.stem}": Subject("model", path, read_model, True) for path in MODELS.glob("*.zip")}
+    models = {
+        f"model {path.stem}": Subject("model", path, read_model, True)
+        for path in MODELS.glob("*.safetensors")
+    }
     return found | models
 
 

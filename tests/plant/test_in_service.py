@@ -201,7 +201,7 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_presses_less_hard(tmp_p
         training = parse_training(usual | {"environment": environment}, name)
         folder = train(training, tmp_path / name, progress=False)
         pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), range(1000, 1002)).run(
-            str(folder.path / "model.zip")
+            str(folder.path / "model.safetensors")
         )
         moved.append(np.mean([pair.policy.mean / pair.passive.mean - 1 for pair in pairs]))
         ratios.append(verdict(pairs)[0])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...backend import WIDTH
-from ...base.checked_json import read_checked
+from ...base.checksums import read_checked
 from ...base.errors import InputError
 from ...base.version import __version__
 from ...envs import IDS
@@ -50,6 +50,6 @@ def read(path: Path) -> dict[str, Any]:
     """What ``run`` found on some machine, as it was stored. Raises InputError where a file holds none."""
     result = read_checked(path)
     parts = {"machine", "repeats", "plants", "roofline", "scaling", "environments"}
-    if not (isinstance(result, dict) and parts <= set(result)):
+    if not parts <= set(result):
         raise InputError(f"{path} is no result of 'panto speed --json'.")
     return result
