@@ -8,7 +8,7 @@ contact wire itself. The matrix is banded, and a line of any length costs a few 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,8 +50,10 @@ class DefectiveLine:
         spans: int,
         condition: LineCondition,
         tensions: tuple[float, float] = (1.0, 1.0),
+        nodes: Sequence[float] = (),
     ) -> None:
-        """data: the line as designed. tensions: as ``DrawnLine`` has them.
+        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further places at which a force
+        may act (m), in every span.
 
         Raises InputError for what a line of so many spans has not.
         """
@@ -62,7 +64,7 @@ class DefectiveLine:
         self._broken, self._error, height = _locate(data, spans, condition)
         own = locate(data, spans, condition)
 
-        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length])
+        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length], nodes)
         pieces = len(self.breaks) - 1
         number = np.arange(spans * pieces + 1)
         hung = np.isin(number % pieces, np.searchsorted(self.breaks, data.droppers.positions))
@@ -89,12 +91,12 @@ class DefectiveLine:
     ) -> None:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
         pieces, wire, span = len(self.breaks) - 1, left.contact_wire, data.span_length
-        ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
+        self._places = ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
         length = self._beams.lengths
         self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
         np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in own.spots:
-            self._load[UNKNOWNS * int(np.argmin(np.abs(ends - spot.position)))] -= GRAVITY * spot.mass
+            self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
         surface = own.surface(np.append(ends, spans * span))
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
         if left is not data:
@@ -125,15 +127,28 @@ class DefectiveLine:
         line.rise_decay[row] = self.decay
         return state
 
-    def solve(self, scatter: Array | None = None, heights: Array | None = None) -> StaticState:
+    def _height_at(self, position: float) -> int:
+        """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
+        return UNKNOWNS * int(np.argmin(np.abs(self._places - position))) + 2 * CONTACT
+
+    def solve(
+        self,
+        scatter: Array | None = None,
+        heights: Array | None = None,
+        pushed: tuple[float, float] | None = None,
+    ) -> StaticState:
         """Static state; scatter: length error of every dropper, heights: of every support's height (m), both
-        added to those of the condition.
+        added to those of the condition. pushed: position (m) of a node of the contact wire, and an upward
+        force (N) on it.
         """
         error = self._error if scatter is None else self._error + scatter
         load = self._load
         if heights is not None:
             load = load.copy()
             load[self._lifted] += self._support_stiffness * heights
+        if pushed is not None:
+            load = load.copy()
+            load[self._height_at(pushed[0])] += pushed[1]
         taut = ~self._broken
         rounds = 0
         while True:

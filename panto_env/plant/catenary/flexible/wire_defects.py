@@ -58,9 +58,11 @@ class WireDefects(NamedTuple):
         """Mass of the most worn wire as a share of a new one's."""
         return 1 - max((stretch.share for stretch in self.stretches), default=0.0)
 
-    def breaks(self, span: float, own: Sequence[float]) -> Array:
-        """Where pieces of a span begin and end (m): at its own places, and where any span has a defect."""
-        wanted = [spot.position for spot in self.spots]
+    def breaks(self, span: float, own: Sequence[float], further: Sequence[float] = ()) -> Array:
+        """Where pieces of a span begin and end (m): at its own and further places, and where any span has a
+        defect.
+        """
+        wanted = [*further, *(spot.position for spot in self.spots)]
         for begin, end, _, _ in self.stretches:
             wanted += [begin, begin + RAMP, end - RAMP, end]
         breaks = list(own)
