@@ -1,4 +1,4 @@
-"""Static state of a flexible line with defects of its droppers, supports and wires.
+"""Static state of a whole line at rest, with defects of its droppers, supports and wires.
 
 Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
@@ -28,13 +28,13 @@ HELD = 1e18  # N/m, that holds a wire at the anchor
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
-UNKNOWNS = 4  # a node: height and slope of the contact wire, then of the messenger (m, -)
+UNKNOWNS = 4  # per node: height and slope of the contact wire, then of the messenger (m, -)
 BAND = 6  # diagonals of the matrix: a wire's unknowns at the next node are at most 5 away
 
 
 @dataclass(frozen=True)
 class StaticState:
-    """Static state of a defective line; droppers of the whole line in their order."""
+    """A defective line at rest; droppers are those of the whole line, in their order."""
 
     tension: Array  # (droppers,): N
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
@@ -52,8 +52,8 @@ class DefectiveLine:
         tensions: tuple[float, float] = (1.0, 1.0),
         nodes: Sequence[float] = (),
     ) -> None:
-        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further places at which a force
-        may act (m), in every span.
+        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further places in each span
+        at which a force may act (m).
 
         Raises InputError for what a line of so many spans has not.
         """
@@ -183,7 +183,7 @@ class DefectiveLine:
 
 
 def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> tuple[Any, Array, Array]:
-    """Broken droppers, (droppers,), their length errors (m), and errors of support height (m)."""
+    """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m)."""
     each = len(data.droppers.positions)
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
@@ -210,7 +210,7 @@ def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) ->
 
 
 def _add(band: Array, unknowns: Any, stiffness: Array) -> None:
-    """Add elements' stiffness (elements, 4, 4) to the lower diagonals of the matrix."""
+    """Add the elements' stiffness matrices, (elements, 4, 4), to the lower diagonals of the line's matrix."""
     row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
     lower = row >= column
     np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])
