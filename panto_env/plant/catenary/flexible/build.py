@@ -1,21 +1,21 @@
-"""Constants of a flexible catenary on its grid: wires, springs to the ground, and links between wires."""
+"""Constants of a flexible catenary on its grid, and its wires at rest."""
 
 from __future__ import annotations
 
-from collections import Counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
-from ....base.arrays import Array, Index
+from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ...interpolation import stencil
 from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
-from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER, FlexibleLine, FlexibleWire
-from .grid import missing_yield, nodes_per_span, spring_levels, stencil_weights
+from .arrays import CONTACT, LOWER, PAD, UPPER, FlexibleLine, FlexibleWire
+from .attached import Sets, links_of, springs_of
+from .grid import missing_yield, nodes_per_span, stencil_weights
 from .resolution import Resolution
 from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
@@ -32,24 +32,6 @@ QUIET = 1e-25
 less than 1e-15 m."""
 
 
-class Springs(NamedTuple):
-    """What holds wires to the ground."""
-
-    wire: Index  # (springs,)
-    node: Index  # (springs,): of that wire
-    levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
-    mass: Array  # (springs,): that moves with the wire (kg)
-
-
-class Links(NamedTuple):
-    """What joins two wires at one place along the line, and pulls only."""
-
-    wires: Index  # (links, 2): the lower and the upper one
-    position: Array  # (links,): m
-    stiffness: Array  # (links,): in tension (N/m)
-    mass: Array  # (links, 2): that moves with its lower and upper end (kg)
-
-
 @remembered
 def constants(
     data: FlexibleCatenaryData,
@@ -61,8 +43,8 @@ def constants(
 ) -> FlexibleLine:
     """Constants of a line of ``spans`` spans, each of a static shape, at a stable resolution.
 
-    own: defects of the contact wire itself, whose places count along the whole line: a window that travels
-    cannot have any. Raises InputError where the nodes are too many.
+    own: defects of the contact wire itself, at positions along the whole line; a window that travels cannot
+    have any. Raises InputError for more nodes than ``MOST_NODES``.
     """
     window = min(resolution.window or spans, spans)
     step, damping = resolution.time_step, data.damping
@@ -77,7 +59,7 @@ def constants(
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
     x = dx * (np.arange(nodes) - PAD)
-    springs, links = _springs(data, masts, step, own.springs_of_nodes(x, dx)), _droppers(data, shape, window)
+    springs, links = springs_of(data, masts, step, own.springs_of_nodes(x, dx)), links_of(data, shape, window)
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
@@ -156,15 +138,15 @@ def constants(
 
 
 class Tensioned(NamedTuple):
-    """What the wires' tension changes of a line's constants: a row of each, as ``FlexibleLine`` has them."""
+    """Constants of a line that depend on the wires' tension: a row of those in ``FlexibleLine``."""
 
-    shape: Array
-    stencil: Array
-    absorbing: Array
+    shape: Array  # (n,)
+    stencil: Array  # (wires, 5)
+    absorbing: Array  # (wires,)
 
 
 def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: float) -> Tensioned:
-    """Of a line on its grid (m) and time step (s)."""
+    """Constants that depend on tension, for a grid of spacing ``dx`` (m) and a time step (s)."""
     damping, wires = data.damping, (data.contact_wire, data.messenger_wire)
     settle = 1.0 + damping.alpha * step / 2
     keep = (1.0 - damping.alpha * step / 2) / settle
@@ -177,65 +159,6 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),
         stencil=np.array(stencil),
         absorbing=(courant - 1) / (courant + 1),
-    )
-
-
-class Sets:
-    """What hangs on the wires, in sets: one per segment, all on the same wires and in the same rows."""
-
-    def __init__(self, wires: Index, node: Index, rows: int) -> None:
-        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
-        row, self.segment = places(node, rows)
-        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
-        self.number = np.zeros(len(node), dtype=np.int64)
-        there: Counter[tuple[int, ...]] = Counter()
-        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
-            own = (*place, int(self.segment[k]))
-            self.number[k] = found.setdefault((*place, there[own]), len(found))
-            there[own] += 1
-        keys = np.array(list(found), dtype=np.int64).reshape(len(found), -1)
-        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
-
-    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
-        """Values (things, ...) as (sets, ..., WIDTH); where a set has nothing stands ``empty``."""
-        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
-        array[self.number, self.segment] = values
-        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
-
-
-def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
-    """Positions (m), (droppers,), of the droppers of so many spans."""
-    offsets = np.array(data.droppers.positions)
-    return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
-
-
-def _springs(data: FlexibleCatenaryData, masts: Index, step: float, spots: Array) -> Springs:
-    """At each mast the steady arm of the contact wire, then the support of the messenger; last hard spots.
-
-    spots: stiffness by which they hold the nodes of the contact wire (N/m), (nodes,).
-    """
-    arm, support = data.steady_arm, data.support
-    levels = [
-        spring_levels(arm.stiffness, 0.0, step),
-        spring_levels(support.stiffness, support.damping, step),
-    ]
-    hard = np.flatnonzero(spots)
-    held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
-    return Springs(
-        wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(masts)), 0 * hard + CONTACT),
-        node=np.append(np.repeat(masts.astype(np.int64), 2), hard),
-        levels=np.concatenate([np.tile(levels, (len(masts), 1)), np.array(held).reshape(-1, 3)]),
-        mass=np.append(np.tile([arm.mass, 0.0], len(masts)), np.zeros(len(hard))),
-    )
-
-
-def _droppers(data: FlexibleCatenaryData, shape: StaticShape, spans: int) -> Links:
-    droppers, half = data.droppers, np.tile(shape.dropper_mass / 2, spans)
-    return Links(
-        wires=np.tile(np.array([CONTACT, MESSENGER], dtype=np.int64), (len(half), 1)),
-        position=dropper_positions(data, spans),
-        stiffness=np.tile(shape.dropper_stiffness, spans),
-        mass=np.stack([half + droppers.contact_clamp_mass, half + droppers.messenger_clamp_mass], axis=1),
     )
 
 
@@ -272,7 +195,7 @@ def settle(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
 
 
 def _take_links(line: FlexibleLine, wire: FlexibleWire, lanes: slice) -> None:
-    """Give lanes the links of the line's first window, at rest."""
+    """Put the links of these lanes at rest, as they are in the line's first window."""
     rows, links = lanes if len(line.link_static) > 1 else slice(None), len(line.link_set)
     wire.static[lanes][:, line.link_set, line.link_segment] = line.link_static[rows, :links]
     wire.gap[lanes][:, line.link_set, line.link_segment] = line.link_gap[rows, :links]

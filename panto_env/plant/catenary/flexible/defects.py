@@ -1,4 +1,4 @@
-"""Static state of a flexible line with defects of its droppers, supports and wires.
+"""Static state of a whole line at rest, with defects of its droppers, supports and wires.
 
 Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
@@ -8,7 +8,7 @@ contact wire itself. The matrix is banded, and a line of any length costs a few 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,13 +28,13 @@ HELD = 1e18  # N/m, that holds a wire at the anchor
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
-UNKNOWNS = 4  # a node: height and slope of the contact wire, then of the messenger (m, -)
+UNKNOWNS = 4  # per node: height and slope of the contact wire, then of the messenger (m, -)
 BAND = 6  # diagonals of the matrix: a wire's unknowns at the next node are at most 5 away
 
 
 @dataclass(frozen=True)
 class StaticState:
-    """Static state of a defective line; droppers of the whole line in their order."""
+    """A defective line at rest; droppers are those of the whole line, in their order."""
 
     tension: Array  # (droppers,): N
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
@@ -50,8 +50,10 @@ class DefectiveLine:
         spans: int,
         condition: LineCondition,
         tensions: tuple[float, float] = (1.0, 1.0),
+        nodes: Sequence[float] = (),
     ) -> None:
-        """data: the line as designed. tensions: as ``DrawnLine`` has them.
+        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further places in each span
+        at which a force may act (m).
 
         Raises InputError for what a line of so many spans has not.
         """
@@ -62,7 +64,7 @@ class DefectiveLine:
         self._broken, self._error, height = _locate(data, spans, condition)
         own = locate(data, spans, condition)
 
-        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length])
+        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length], nodes)
         pieces = len(self.breaks) - 1
         number = np.arange(spans * pieces + 1)
         hung = np.isin(number % pieces, np.searchsorted(self.breaks, data.droppers.positions))
@@ -89,12 +91,12 @@ class DefectiveLine:
     ) -> None:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
         pieces, wire, span = len(self.breaks) - 1, left.contact_wire, data.span_length
-        ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
+        self._places = ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
         length = self._beams.lengths
         self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
         np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in own.spots:
-            self._load[UNKNOWNS * int(np.argmin(np.abs(ends - spot.position)))] -= GRAVITY * spot.mass
+            self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
         surface = own.surface(np.append(ends, spans * span))
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
         if left is not data:
@@ -125,15 +127,28 @@ class DefectiveLine:
         line.rise_decay[row] = self.decay
         return state
 
-    def solve(self, scatter: Array | None = None, heights: Array | None = None) -> StaticState:
+    def _height_at(self, position: float) -> int:
+        """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
+        return UNKNOWNS * int(np.argmin(np.abs(self._places - position))) + 2 * CONTACT
+
+    def solve(
+        self,
+        scatter: Array | None = None,
+        heights: Array | None = None,
+        pushed: tuple[float, float] | None = None,
+    ) -> StaticState:
         """Static state; scatter: length error of every dropper, heights: of every support's height (m), both
-        added to those of the condition.
+        added to those of the condition. pushed: position (m) of a node of the contact wire, and an upward
+        force (N) on it.
         """
         error = self._error if scatter is None else self._error + scatter
         load = self._load
         if heights is not None:
             load = load.copy()
             load[self._lifted] += self._support_stiffness * heights
+        if pushed is not None:
+            load = load.copy()
+            load[self._height_at(pushed[0])] += pushed[1]
         taut = ~self._broken
         rounds = 0
         while True:
@@ -168,7 +183,7 @@ class DefectiveLine:
 
 
 def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> tuple[Any, Array, Array]:
-    """Broken droppers, (droppers,), their length errors (m), and errors of support height (m)."""
+    """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m)."""
     each = len(data.droppers.positions)
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
@@ -195,7 +210,7 @@ def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) ->
 
 
 def _add(band: Array, unknowns: Any, stiffness: Array) -> None:
-    """Add elements' stiffness (elements, 4, 4) to the lower diagonals of the matrix."""
+    """Add the elements' stiffness matrices, (elements, 4, 4), to the lower diagonals of the line's matrix."""
     row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
     lower = row >= column
     np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])

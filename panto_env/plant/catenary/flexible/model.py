@@ -14,8 +14,9 @@ from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds
 from ..view import LineView
 from .arrays import CONTACT, MESSENGER, PAD
+from .attached import dropper_positions
 from .beams import Profile
-from .build import at_rest, constants, dropper_positions, of_tension, settle
+from .build import at_rest, constants, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
 from .resolution import resolution

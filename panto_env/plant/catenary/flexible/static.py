@@ -17,15 +17,15 @@ from .beams import GRAVITY, PeriodicWire, Profile
 from .schema import FlexibleCatenaryData
 
 MOST_ROUNDS = 200
-"""In which the droppers' weight, which depends on their length, must settle; real lines take about ten."""
+"""Rounds in which the droppers' weight, which depends on their length, must settle; usual lines take ten."""
 HEIGHT_RANGE = 0.5
-"""Difference of the contact wire's heights (m) that is still a contact wire's; pantographs follow 0.3 m."""
+"""Maximum difference of the contact wire's heights along a span (m); pantographs follow 0.3 m."""
 STEEPEST = 0.2
 """Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
 SETTLED, USABLE = 1e-12, 1e-9
-"""Changes of the droppers' lengths in a round (m): the one ends the rounds, the other may be rounding."""
+"""Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
 POINTS = 401
-"""Of a span, where heights are looked at."""
+"""Number of points of a span at which heights are checked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +47,8 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
 
     The contact wire hangs from the droppers, and from the steady arm where that holds it at height 0
     (any arm balances its own weight). The messenger's support, unloaded, stands ``encumbrance`` above
-    height 0 and yields under the load. Raises InputError where no shape is found. What is found may be
-    impossible, as with a dropper that pushes: ``hang`` says so.
+    height 0 and yields under the load. Raises InputError where no shape is found. The shape may be one that
+    no line can have, such as with a dropper that pushes; ``hang`` refuses that.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _settle(line)
@@ -56,7 +56,7 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
 
 @remembered
 def hang(line: FlexibleCatenaryData) -> StaticShape:
-    """Static shape of a line that can hang so at rest: every dropper pulls, wires are in order and level.
+    """Static shape of a line that can exist: every dropper pulls, wires do not cross and are level.
 
     Raises InputError, naming the dropper or the wire, where it can't.
     """
@@ -151,7 +151,7 @@ def _stiffness(line: FlexibleCatenaryData, length: Array) -> Array:
 
 
 def _unloaded(line: FlexibleCatenaryData, loaded: Array, tension: Array) -> Array:
-    """Length (m) of each dropper without load, of which its stiffness is that of ``_stiffness``."""
+    """Length (m) of each dropper without load, from its length under tension (m) and that tension (N)."""
     if line.droppers.axial_stiffness is not None:
         return loaded / (1 + tension / line.droppers.axial_stiffness)
     return loaded - tension / _stiffness(line, loaded)

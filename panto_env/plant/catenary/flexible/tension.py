@@ -1,9 +1,7 @@
-"""A line of another tension than its design's.
+"""A line under another tension than the one it was designed for.
 
-Droppers and steady arms stay as they were cut and set for the design's.
-Less tension lets the wires hang lower between droppers and supports than a line that was hung with it. The
-static shape that the tension left and the design's sag would have wants droppers of other lengths: those that
-are there are too long or too short by the difference.
+Its droppers and steady arms were cut and set for the design's tension. A line designed for the tension
+that is left would have other droppers: the real ones are too long or too short by the difference.
 """
 
 from __future__ import annotations
@@ -22,19 +20,19 @@ from .static import StaticShape, solve
 
 
 class Misfit(NamedTuple):
-    """What keeps a line whose tension is lost from hanging as one hung with the tension left."""
+    """Differences of a line that has lost tension from one that was designed for the tension left."""
 
-    too_long: Array  # (droppers of a span,): lengths of the droppers (m)
-    lighter: Array  # (droppers of a span,): force by which each end of a dropper weighs less (N)
-    lift: float  # force of each steady arm (N)
+    too_long: Array  # (droppers of a span,): by which droppers are too long (m)
+    lighter: Array  # (droppers of a span,): by which each half of a dropper weighs less (N)
+    lift: float  # additional upward force of each steady arm (N)
 
 
 def with_tension_left(
     data: FlexibleCatenaryData, condition: LineCondition, errors: tuple[float, float] = (1.0, 1.0)
 ) -> FlexibleCatenaryData:
-    """The line with the tension that a condition leaves it, hung anew; itself where it is the design's.
+    """The line designed for the tension that a condition leaves; the same object where none is lost.
 
-    errors: contact and messenger wire's tension over that.
+    errors: tension of the contact wire and of the messenger wire, as shares of that.
     """
     contact, messenger = errors
     left = {
@@ -51,13 +49,13 @@ def with_tension_left(
 
 @remembered
 def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
-    """Static shape that a line with the tension left would be hung in, with the design's droppers in it."""
+    """Static shape of a line designed for the tension left, with the mass and stiffness of real droppers."""
     was = solve(designed)
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 
 
 def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit:
-    """How the line as designed differs from the shape that ``shape_left`` gives."""
+    """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
     was, now, arm, support = solve(designed), solve(left), designed.steady_arm, np.zeros(1)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
     lift = arm.stiffness * float((was.contact.height(support) - now.contact.height(support))[0])

@@ -20,11 +20,11 @@ from ..schema import Wire
 from .schema import FlexibleCatenaryData
 
 RAMP = 1.0
-"""Over which the running surface rises at either end of a worn stretch (m), own choice."""
+"""Length over which the running surface rises at either end of a worn stretch (m), own choice."""
 COPPER = 8900.0
 """Density of a contact wire (kg/m^3), by which its mass gives its diameter."""
 NEAREST = 0.02
-"""Between two places of one span (m): nearer ones are one place."""
+"""Minimum distance of two nodes (m): nearer places share one."""
 
 
 class Spot(NamedTuple):
@@ -45,7 +45,7 @@ class Stretch(NamedTuple):
 
 
 class WireDefects(NamedTuple):
-    """Those of a line."""
+    """Hard spots and worn stretches of a line's contact wire, in positions along the line (m)."""
 
     spots: tuple[Spot, ...] = ()
     stretches: tuple[Stretch, ...] = ()
@@ -58,9 +58,11 @@ class WireDefects(NamedTuple):
         """Mass of the most worn wire as a share of a new one's."""
         return 1 - max((stretch.share for stretch in self.stretches), default=0.0)
 
-    def breaks(self, span: float, own: Sequence[float]) -> Array:
-        """Where pieces of a span begin and end (m): at its own places, and where any span has a defect."""
-        wanted = [spot.position for spot in self.spots]
+    def breaks(self, span: float, own: Sequence[float], further: Sequence[float] = ()) -> Array:
+        """Where pieces of a span begin and end (m): at its own and further places, and where any span has a
+        defect.
+        """
+        wanted = [*further, *(spot.position for spot in self.spots)]
         for begin, end, _, _ in self.stretches:
             wanted += [begin, begin + RAMP, end - RAMP, end]
         breaks = list(own)
@@ -108,7 +110,7 @@ NO_DEFECTS = WireDefects()
 
 
 def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> WireDefects:
-    """Those of a condition. Raises InputError for a place that a line of so many spans has not."""
+    """Defects of the contact wire in a condition. Raises InputError for a place beyond the line."""
 
     def position(span: int, offset: float) -> float:
         if span > spans or offset > data.span_length:
@@ -149,5 +151,5 @@ def worn_depth(wire: Wire, share: float) -> float:
 
 
 def _shares(x: Array, spacing: float, position: float) -> Array:
-    """What the two nodes nearest to a position (m) have of what hangs there, (n,)."""
+    """Shares, (n,), of a load at a position (m) that act on nodes at x (m): on the two nearest ones."""
     return np.asarray(np.maximum(1 - np.abs(x - position) / spacing, 0.0))
