@@ -14,26 +14,12 @@ from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, any_of, choose, larger, root, smaller
 from .memory import CACHE_LINE, aligned_zeros, copy_whole
 from .packed import bind, open_packed, pack
-from .shares import (
-    ALONE,
-    HELPER,
-    LEADER,
-    found_anywhere,
-    hand_out,
-    new_shares,
-    next_share,
-    results_of,
-    share_done,
-)
 from .threads import LaneThreads
 from .vectors import WIDTH, load_row, shift_down, shift_up, store_row
 
 __all__ = [
-    "ALONE",
     "CACHE_LINE",
-    "HELPER",
     "JIT",
-    "LEADER",
     "NOT_NEGATIVE",
     "WIDTH",
     "LaneThreads",
@@ -44,22 +30,16 @@ __all__ = [
     "choose",
     "constants",
     "copy_whole",
-    "found_anywhere",
-    "hand_out",
     "implements",
     "inlined",
     "kernel",
     "larger",
     "load_row",
-    "new_shares",
-    "next_share",
     "open_packed",
     "operation",
     "pack",
     "python_function",
-    "results_of",
     "root",
-    "share_done",
     "shift_down",
     "shift_up",
     "smaller",

@@ -4,18 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..backend import (
-    HELPER,
-    LEADER,
-    found_anywhere,
-    hand_out,
-    inlined,
-    kernel,
-    next_share,
-    open_packed,
-    results_of,
-    share_done,
-)
+from ..backend import inlined, kernel, open_packed
 from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import PLACE, ROW
@@ -84,7 +73,7 @@ def control_lane(packed, entries, values, flags, lane):
 
     Returns whether its episode has ended.
     """
-    line, wire, pantographs, actuators, run, sensors, samples, episode, running, _ = open_packed(packed)
+    line, wire, pantographs, actuators, run, sensors, samples, episode, running = open_packed(packed)
     own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
     take_action(run, episode, task, now, lane)
     ended = False
@@ -126,38 +115,27 @@ def all_finite(action):
 
 
 @kernel
-def control_steps(packed, entries, values, flags, first, last, size, role, patience):
+def control_steps(packed, entries, values, flags, first, last):
     """Control steps of the lanes from ``first`` to before ``last`` under ``episode.action``.
 
     Returns 0 where no episode has ended, 1 where one has, and -1, having done nothing, where an action is not
     finite. Results go to entries, values and flags, as of ``Results``. A lane that is idle stays as it is.
-    size, role, patience: of shares, as of ``LaneThreads``. packed: line, wire, pantographs, actuators, run,
-    sensors, samples, episode, running figures, shares.
+    packed: line, wire, pantographs, actuators, run, sensors, samples, episode, running figures.
     """
-    _, _, _, _, _, _, _, episode, _, shares = open_packed(packed)
-    if role != HELPER and not all_finite(episode.action):
+    _, _, _, _, _, _, _, episode, _ = open_packed(packed)
+    if not all_finite(episode.action):
         return -1
-    if role == LEADER:
-        hand_out(shares, first, last, size, entries, values, flags)
-    taken, ended = 0, False
-    while True:
-        begin, end = next_share(shares, role, taken, patience, first, last, size)
-        if begin < 0:
-            break
-        taken += 1
-        entries, values, flags = results_of(shares, role, entries, values, flags)
-        for lane in range(begin, end):
-            if not episode.idle[lane]:
-                here = control_lane(packed, entries[lane], values[lane], flags[lane], lane)
-                ended = ended or here
-        share_done(shares, role, ended)
-    return 1 if found_anywhere(shares, role, ended) else 0
+    answer = 0
+    for lane in range(first, last):
+        if not episode.idle[lane] and control_lane(packed, entries[lane], values[lane], flags[lane], lane):
+            answer = 1
+    return answer
 
 
 @kernel
 def observe_start(packed, entries, values, flags, first, last):
     """Results of the lanes from ``first`` to before ``last`` at their start, but of idle ones; as above."""
-    _, _, _, _, run, sensors, _, episode, _, _ = open_packed(packed)
+    _, _, _, _, run, sensors, _, episode, _ = open_packed(packed)
     for lane in range(first, last):
         if not episode.idle[lane]:
             own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..backend import ALONE, LaneThreads, bind, copy_whole, new_shares, pack
+from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.plant import Plant
@@ -57,12 +57,11 @@ class Stepping:
 
     def _bind(self) -> None:
         """Bind the kernels to the arrays."""
-        shares = new_shares()
-        packed = pack(*self.plant.arrays, *self._arrays, shares)
-        run = bind(control_steps, packed, *self.results, 0, self.lanes, self.lanes, ALONE, 0)
-        self._threads = threads = LaneThreads(run, self.lanes, shares)
-        alone, usual = (0, self.lanes, self.lanes, ALONE, 0), self.results
-        self._plain_step = partial(run, *usual, *alone) if self.lanes == 1 else partial(threads.step, *usual)
+        packed = pack(*self.plant.arrays, *self._arrays)
+        run = bind(control_steps, packed, *self.results, 0, self.lanes)
+        self._threads = threads = LaneThreads(run, self.lanes)
+        alone = partial(run, *self.results, 0, 1)
+        self._plain_step = alone if self.lanes == 1 else partial(threads.step, *self.results)
         self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
 
     def __getstate__(self) -> dict[str, Any]:
