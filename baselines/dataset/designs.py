@@ -93,6 +93,6 @@ def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Setti
     if SPAN_LENGTH in line:
         data = entries["catenary"]
         positions = getattr(getattr(data, "droppers", None), "positions", ())
-        ratio = line[SPAN_LENGTH] / data.span_length
+        ratio = line[SPAN_LENGTH] / data.alignment().mean_length
         line |= {f"{DROPPERS}.{k}": ratio * place for k, place in enumerate(positions)}
     return change_together(entries["catenary"], line), change_together(entries["pantograph"], pantograph)

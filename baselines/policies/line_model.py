@@ -50,7 +50,7 @@ def mean_line(context: Context) -> MeanLine:
         )
     wires = line.contact_wire, line.messenger_wire
     tension, mass = sum(wire.tension for wire in wires), sum(wire.mass for wire in wires)
-    return MeanLine(2 * float(np.sqrt(tension * mass)), 6 * tension / line.span_length)
+    return MeanLine(2 * float(np.sqrt(tension * mass)), 6 * tension / line.alignment().mean_length)
 
 
 @dataclass(frozen=True)

@@ -162,8 +162,8 @@ def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> 
     """Force along the spans, and its spectrum."""
     first, last = spans
     begin, end = traces[0].position[0], traces[0].position[-1]
-    span_length = (end - begin) / (last - first + 1)
-    inner = [begin + k * span_length for k in range(last - first + 2)]
+    span = (end - begin) / (last - first + 1)
+    inner = [begin + k * span for k in range(last - first + 2)]
     return [
         curves(
             f"Contact force, seed {traces[0].seed}; dotted: nominal force",

@@ -104,7 +104,7 @@ def estimate(
 
     known = load_pantograph(pantograph)
     metres = None if speed is None else from_kmh(speed)
-    motion = read_motion(file, 0.0, speed=metres, span_length=span, units=pairs(unit or []))
+    motion = read_motion(file, 0.0, speed=metres, span=span, units=pairs(unit or []))
     motion = dataclasses.replace(motion, lift=_lift(known, metres, lift, motion))
     if free_zero:
         motion = rezeroed(motion, known)

@@ -111,10 +111,8 @@ class Task(Stepping):
         from ..estimation.readings import estimating  # slow: it imports SciPy
 
         speed = 0.5 * sum(self.length.speed_range)
-        span_length = plant.alignment.mean_length
-        return estimating(
-            settings.sensors, settings.estimator, self.known_pantograph, speed, span_length, *form
-        )
+        span = plant.alignment.mean_length
+        return estimating(settings.sensors, settings.estimator, self.known_pantograph, speed, span, *form)
 
     def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
         """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.

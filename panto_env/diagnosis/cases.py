@@ -73,7 +73,8 @@ class Defect:
 def draw_defect(track: Track, kind: str, severity: float, span: int, random: np.random.Generator) -> Defect:
     """A defect at a place drawn in a span, counted from 1."""
     data = track.data
-    begin, number = (span - 1) * data.span_length, int(random.integers(len(data.droppers.positions)))
+    alignment = data.alignment()
+    begin, number = alignment.support(span - 1), int(random.integers(len(data.droppers.positions)))
     at = begin + data.droppers.positions[number]
     if kind == TENSION:
         lost = {"lost_contact_tension": severity, "lost_messenger_tension": severity}
@@ -85,8 +86,8 @@ def draw_defect(track: Track, kind: str, severity: float, span: int, random: np.
         return Defect(kind, severity, {"miscut_droppers": [(span, number + 1, wrong)]}, at)
     if kind in (RAISED, SUNK):
         height = severity if kind == RAISED else -severity
-        return Defect(kind, severity, {"raised_supports": [(span, height)]}, begin + data.span_length)
-    offset = float(random.uniform(0, data.span_length))
+        return Defect(kind, severity, {"raised_supports": [(span, height)]}, alignment.support(span))
+    offset = float(random.uniform(0, alignment.length_at(begin)))
     if kind == SPOT:
         return Defect(kind, severity, {"hard_spots": [(span, offset, severity, 0.0)]}, begin + offset)
     stretch = [(span, offset, WORN_LENGTH, severity)]
@@ -115,7 +116,7 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
         line_condition=LineCondition(**fair),
         seed=track.seed,
         spans=SPANS,
-        distance=(SPANS - 2) * data.span_length,
+        distance=data.alignment().support(SPANS - 2),
         window=0,  # for all: worn wire and hard spots want it
         accuracy="fast",
         record_droppers=False,
@@ -124,4 +125,6 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
 
 
 def _droppers(data: FlexibleCatenaryData) -> Array:
-    return np.asarray(np.add.outer(np.arange(SPANS) * data.span_length, data.droppers.positions).ravel())
+    return np.asarray(
+        np.add.outer(data.alignment().support(np.arange(SPANS)), data.droppers.positions).ravel()
+    )

@@ -93,6 +93,6 @@ def _as_recorded(run: Trajectory) -> Motion:
         head_force=run.head_force,
         lift=run.nominal_force,
         speed=run.speed,
-        span_length=run.alignment.mean_length,
+        span=run.alignment.mean_length,
         start=float(run.time[0]),
     )

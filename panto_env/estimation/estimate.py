@@ -77,7 +77,7 @@ def model_of(motion: Motion, pantograph: PantographData, settings: EstimatorSett
     """The estimator's model for a motion. Raises InputError where the motion lacks what the settings need."""
     if settings.observation != "displacements" and motion.head_velocity is None:
         raise InputError("The motion has no velocities; take the observation 'displacements'.")
-    process = settings.force_model.process(motion.speed, motion.span_length)
+    process = settings.force_model.process(motion.speed, motion.span)
     return build_model(pantograph, process, settings, motion.time_step)
 
 

@@ -37,7 +37,7 @@ class RandomWalk(Settings):
     kind: Literal["random-walk"] = "random-walk"
     intensity: Intensity = Field(250.0, description="change over a second, rms (N/s^0.5)")
 
-    def process(self, speed: float | None, span_length: float | None) -> ForceProcess:
+    def process(self, speed: float | None, span: float | None) -> ForceProcess:
         """One state, the force."""
         return _walk(self.intensity)
 
@@ -55,7 +55,7 @@ class Shaped(Settings):
         0.95, description="damping ratio of the coloured part, the wider its band"
     )
 
-    def process(self, speed: float | None, span_length: float | None) -> ForceProcess:
+    def process(self, speed: float | None, span: float | None) -> ForceProcess:
         """Three states: slow part, coloured part, and its rate over its angular frequency."""
         frequency = (
             2 * np.pi * _known(speed, "The shaped force model needs the speed of the train") / self.wavelength
@@ -79,10 +79,10 @@ class Periodic(Settings):
         20.0, description="frequency of the highest harmonic at most (Hz)"
     )
 
-    def process(self, speed: float | None, span_length: float | None) -> ForceProcess:
+    def process(self, speed: float | None, span: float | None) -> ForceProcess:
         """One state, then two for each harmonic."""
         moving = _known(speed, "The periodic force model needs the speed of the train")
-        passing = moving / _known(span_length, "The periodic force model needs the length of a span")
+        passing = moving / _known(span, "The periodic force model needs the length of a span")
         count = int(self.highest / passing)
         if count < 1:
             raise InputError(

@@ -28,7 +28,7 @@ class Motion:
     head_force: Array  # (n,): of an actuator between head and the mass below it, as above (N)
     lift: float  # static force and aerodynamic uplift on the lowest mass (N)
     speed: float | None = None  # of the train (m/s); None: not known
-    span_length: float | None = None  # m; None: not known
+    span: float | None = None  # m; None: not known
     start: float = 0.0  # time of the first sample (s)
     contact_force: Array | None = None  # (n,): the true one (N), where known; no estimator looks at it
 
@@ -89,7 +89,7 @@ def measure(
         head_force=mean(run.head_force, time, time + step),
         lift=run.nominal_force,
         speed=run.speed,
-        span_length=run.alignment.mean_length,
+        span=run.alignment.mean_length,
         start=float(time[0]),
         contact_force=mean(run.contact_force, time - step / 2, time + step / 2),
     )

@@ -33,12 +33,12 @@ def read_motion(
     lift: float,
     *,
     speed: float | None = None,
-    span_length: float | None = None,
+    span: float | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Motion:
     """Read a motion: columns time, head and frame, and where measured those of velocities and forces.
 
-    lift: static force and aerodynamic uplift (N); speed: of the train (m/s); span_length: m; units: of
+    lift: static force and aerodynamic uplift (N); speed: of the train (m/s); span: m; units: of
     columns whose header has none. The file is read as ``read_columns`` does. Raises InputError, naming the
     line and the column, for anything missing or not a number, and for time that does not go in equal steps.
     """
@@ -58,7 +58,7 @@ def read_motion(
         head_force=values.get("head_force", none),
         lift=lift,
         speed=speed,
-        span_length=span_length,
+        span=span,
         start=float(values["time"][0]),
         contact_force=values.get("contact_force"),
     )

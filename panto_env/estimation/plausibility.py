@@ -94,9 +94,9 @@ def _check_time(motion: Motion) -> None:
         raise InputError(f"The record has {samples:,} samples; give a part of {MOST_SAMPLES:,} at most.")
     if duration < SHORTEST:
         raise InputError(f"The record is {duration:.3g} s long; give {SHORTEST:g} s at least.")
-    if motion.speed and motion.span_length and duration * motion.speed < motion.span_length:
+    if motion.speed and motion.span and duration * motion.speed < motion.span:
         raise InputError(
-            f"The record covers {duration * motion.speed:.3g} m, less than a span of {motion.span_length:g} "
+            f"The record covers {duration * motion.speed:.3g} m, less than a span of {motion.span:g} "
             "m; give a longer one."
         )
 

@@ -63,7 +63,7 @@ def estimating(
     estimator: EstimatorSettings,
     pantograph: PantographData,
     speed: float,
-    span_length: float,
+    span: float,
     time_step: float,
     control_steps: int,
     lanes: int,
@@ -71,11 +71,11 @@ def estimating(
 ) -> tuple[SensorArrays, tuple[float, ...] | None]:
     """Sensors with an estimator of the contact force, and the rms of each number of their noise, if any.
 
-    pantograph: that the estimator knows. speed (m/s), span_length (m): for force models that need them;
+    pantograph: that the estimator knows. speed (m/s), span (m): for force models that need them;
     time_step: of the plant (s). Raises InputError where the filter has no steady gain.
     """
     every = max(n for n in range(1, control_steps + 1) if _fits(n, control_steps, time_step))
-    process = estimator.force_model.process(speed, span_length)
+    process = estimator.force_model.process(speed, span)
     model = build_model(pantograph, process, estimator, every * time_step)
     gain = steady_gain(model)
     size, measured = len(model.transition), len(model.observed)

@@ -155,7 +155,7 @@ def computer_response(
     impulse = np.zeros(len(time))
     computer = RigComputer(rig, speed_kmh, force=mean, numerics=Numerics(precision="double"))
     for place in range(PLACES):
-        begin = (SPAN - 1 + place / PLACES) * rig.span_length
+        begin = rig.alignment().support(SPAN - 1 + place / PLACES)
         for pulse in (PULSE, -PULSE):
             computer.reset()
             while computer.position < begin:

@@ -59,7 +59,7 @@ def test_a_measurement_is_the_run_with_noise(run):
     begin, end = clean.time[0] - 5e-4, clean.time[-1] + 5e-4
     inside = (run.time > begin) & (run.time < end)
     assert clean.contact_force.sum() * 1e-3 == pytest.approx(run.contact_force[inside].sum() * 5e-4, rel=1e-4)
-    assert (clean.lift, clean.span_length, clean.speed) == (120.0, 60.0, pytest.approx(250 / 3.6))
+    assert (clean.lift, clean.span, clean.speed) == (120.0, 60.0, pytest.approx(250 / 3.6))
     assert len(measure(run, rate=200.0).head) == pytest.approx(len(clean.head) / 5, abs=2)
 
 
@@ -89,7 +89,7 @@ def test_the_bar_of_the_estimator(run):
 
 
 def test_a_motion_survives_its_file(motion, record):
-    again = read_motion(record, lift=120.0, speed=motion.speed, span_length=60.0)
+    again = read_motion(record, lift=120.0, speed=motion.speed, span=60.0)
     for name in ("head", "frame", "head_velocity", "frame_velocity", "frame_force", "contact_force", "time"):
         np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
 

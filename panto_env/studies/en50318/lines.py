@@ -62,7 +62,7 @@ def check_line(name: str, speed_kmh: float) -> list[LineCheck]:
 
     def figures(numerics: Numerics) -> Figures:
         pantograph = OWN_PANTOGRAPH.get(name, REFERENCE_MODEL)
-        distance = (SPANS[1] + 1) * load_catenary(name).span_length
+        distance = load_catenary(name).alignment().support(SPANS[1] + 1)
         with warnings.catch_warnings(action="ignore"):
             run = simulate(
                 name, pantograph, speed_kmh, distance=distance, record_droppers=False, **numerics.model_dump()

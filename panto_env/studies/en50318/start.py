@@ -55,7 +55,9 @@ def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> l
 def _errors(line: FlexibleCatenaryData, speed_kmh: float, first_spans: Sequence[int]) -> Array:
     """Errors of σ (%), (first spans,), on one line."""
     _, end = SETTLED
-    run = simulate(line, REFERENCE_MODEL, speed_kmh, distance=end * line.span_length, record_droppers=False)
+    run = simulate(
+        line, REFERENCE_MODEL, speed_kmh, distance=line.alignment().support(end), record_droppers=False
+    )
     true = run.summary(SETTLED).std
     return np.array([100 * (run.summary((first, LAST_USUAL)).std / true - 1) for first in first_spans])
 

@@ -70,7 +70,7 @@ def records(cases: Sequence[Case], pantograph: str | PantographData = PANTOGRAPH
             "speed_kmh": first.speed_kmh,
             "actuator": ACTUATORS[first.actuator],
             "control_interval": first.control_interval,
-            "distance": RUN_SPANS * line.span_length,
+            "distance": line.alignment().support(RUN_SPANS),
         }
         | (FINE if first.fine else USUAL)
     )

@@ -135,7 +135,7 @@ def _located(case: Case, defect: Defect, found: Diagnosis) -> Case:
 def is_outer(track: Track, position: float) -> bool:
     """Whether the first or the last dropper of a span is at a position (m)."""
     data = track.data
-    offset = position % data.span_length
+    offset = float(data.alignment().place(position))
     return min(abs(offset - data.droppers.positions[k]) for k in (0, -1)) < 1e-6
 
 

@@ -28,8 +28,8 @@ class Equations:
         self._mean: float = line.mean_stiffness  # type: ignore[attr-defined]
         self._variation: float = line.stiffness_variation  # type: ignore[attr-defined]
         speed = from_kmh(speed_kmh)
-        self.span_length = line.span_length
-        self.span_time = self.span_length / speed
+        self.span = line.alignment().mean_length
+        self.span_time = self.span / speed
         self.shown = np.linspace(SPANS[0] - 1, SPANS[1], POINTS) * self.span_time
         self._inertia = np.array(data.masses)[:, None]
         springs, dampers = _chain(data.stiffnesses), _chain(data.dampings)

@@ -55,7 +55,7 @@ class Pass:
     """One pass over 500 to 600 m. Force and displacement are raw, as the paper shows them."""
 
     speed_kmh: float
-    span_length: float  # m
+    span: float  # m
     position: Array  # (n,): m
     force: Array  # (n,): F_C, Eq. 8 (N)
     displacement: Array  # (n,): of the head, z_1 (m)
@@ -129,7 +129,7 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     nq = arcing(run.contact_force[shown], run.time_step)
     return Pass(
         speed_kmh=speed_kmh,
-        span_length=run.alignment.mean_length,
+        span=run.alignment.mean_length,
         position=run.position[shown],
         force=run.contact_force[shown],
         displacement=run.head[shown],

@@ -61,7 +61,7 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
             handles.append(Line2D([], [], color=series_colour(k), linestyle=":", label=label))
     if any(getattr(one_pass, quantity).min() < 0 for one_pass in pulling):
         axis.axhline(0.0, color="0.5", linewidth=0.8)
-    span = pulling[0].span_length
+    span = pulling[0].span
     masts = [span * k for k in range(SPANS[0] - 1, SPANS[1] + 1)]
     axis.set(xlim=(masts[0], masts[-1]), xlabel="distance (m); grey lines: masts")
     for mast in masts:

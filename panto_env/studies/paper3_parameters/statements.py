@@ -61,7 +61,7 @@ def _speed(passes: Sequence[Pass]) -> list[Comparison]:
     ]
     for one_pass in passes[-2:]:
         for name, values in (("F_C", one_pass.force), ("z_1", one_pass.displacement)):
-            place = float(one_pass.position[np.argmax(values)] / one_pass.span_length % 1)
+            place = float(one_pass.position[np.argmax(values)] / one_pass.span % 1)
             compared.append(
                 Comparison(
                     f"place of the largest {name} in its span, {one_pass.speed_kmh:g} km/h",
@@ -139,7 +139,7 @@ def _extremes(what: str, passes: Sequence[Pass], better: str) -> list[Comparison
 def _along_the_span(passes: Sequence[Pass]) -> list[Comparison]:
     """Figs 8 and 9: where along the span a stiffer line helps."""
     soft, stiff = passes[0], passes[-1]
-    along = stiff.position / stiff.span_length % 1
+    along = stiff.position / stiff.span % 1
     middle = (along >= MIDDLE[0]) & (along < MIDDLE[1])
     drop, relief = soft.displacement - stiff.displacement, soft.force - stiff.force
     focus = float(drop[middle].mean() / drop.mean())

@@ -157,7 +157,7 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     shares = [row["std"] / row["nominal_force"] for row in rows]
     period = 1 / equations.natural_frequency()
     # Length of a span over the natural period, km/h.
-    resonant = to_kmh(equations.span_length) / period
+    resonant = to_kmh(equations.span) / period
     high = [row["speed_kmh"] > 200 for row in rows]
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),

@@ -43,9 +43,12 @@ class PeriodicStiffness:
         check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
-        self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, 1 / data.span_length)
+        alignment = data.alignment(spans)
+        self.line: Any = PeriodicLine(
+            data.mean_stiffness, data.stiffness_variation, alignment.arrays.per_metre
+        )
         self.wire: Any = PeriodicWire(np.zeros(lanes))
-        self.usual_end = spans * data.span_length
+        self.usual_end = alignment.length
         self.supports: Array = np.zeros(0)
         self.droppers: Array = np.zeros(0)
         stiffness = self.line.mean * (1.0 + self.line.variation)

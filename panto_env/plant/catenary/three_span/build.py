@@ -56,8 +56,9 @@ class ThreeSpan:
             self.line: Any = _constants(data, frequency, self._vectors, self.time_step)
         self.wire: Any = _at_rest(lanes, collectors, data.modes)
         self.contact_gain = contact_gain(self.line)
-        self.usual_end = spans * data.span_length
-        self.supports: Array = data.span_length * np.arange(1, spans)
+        alignment = data.alignment(spans)
+        self.usual_end = alignment.length
+        self.supports: Array = alignment.support(np.arange(1, spans))
         self.droppers: Array = np.zeros(0)
         compliance = float(self.line.at_support[0] ** 2 @ self.line.softness)
         self.start_point = StartPoint(0.0, compliance, 0.0)
