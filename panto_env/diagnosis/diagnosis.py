@@ -115,11 +115,11 @@ def judge(
 
 
 def _finding(evidence: Evidence, answer: Answer, score: float) -> Finding:
-    position, span = answer.place.position, evidence.span
-    number = math.floor(position / span + 1e-9)
-    offset = position - number * span
-    own = evidence.droppers - number * span
-    own = own[(own > 0) & (own < span)]
+    position, alignment = answer.place.position, evidence.alignment
+    number = math.floor(alignment.in_spans(position) + 1e-9)
+    begin, end = alignment.limits((number + 1, number + 1))
+    offset = position - begin
+    own = evidence.droppers[(evidence.droppers > begin) & (evidence.droppers < end)] - begin
     return Finding(
         kind=answer.kind,
         shares=answer.shares,

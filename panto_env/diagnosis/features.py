@@ -39,8 +39,9 @@ def candidates(evidence: Evidence, region: Region) -> list[Candidate]:
     """Droppers, supports, and places of the wire metre by metre, about the region's greatest score."""
     peak = float(evidence.position[region.peak])
     droppers = evidence.droppers[np.abs(evidence.droppers - peak) < AHEAD]
-    supports = evidence.span * np.arange(round(evidence.position[-1] / evidence.span) + 2)
-    supports = supports[np.abs(supports - peak) < max(SUPPORTS, 0.6 * evidence.span)]
+    alignment = evidence.alignment
+    near = max(SUPPORTS, 0.6 * alignment.length_at(peak))
+    supports = alignment.support(alignment.supports_within(peak - near, peak + near))
     wire = np.arange(np.ceil(peak - AHEAD), peak + AHEAD)
     return [
         Candidate(float(position), sort)
@@ -56,7 +57,7 @@ def features(evidence: Evidence, region: Region, places: list[Candidate]) -> Arr
     scale = float(np.sqrt((rest[np.abs(x - x[peak]) < SCALE] ** 2).mean()))
     at = np.array([place.position for place in places])
     seen = at[:, None] + OFFSETS
-    angle = 2 * np.pi * at / evidence.span
+    angle = 2 * np.pi * evidence.alignment.in_spans(at)
     common = [
         np.log(scale),
         np.log(score[peak] / evidence.threshold),

@@ -90,7 +90,7 @@ class Healthy:
             rest=rest.mean(axis=0),
             score=score,
             threshold=threshold,
-            span=passes.span,
+            alignment=passes.alignment,
             droppers=passes.droppers,
             speed=passes.speed,
             wave_speed=passes.wave_speed,

@@ -15,6 +15,7 @@ from ..base.units import from_kmh
 from ..metrics.low_pass import CUTOFF
 from ..metrics.spans import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory
+from ..plant.alignment import Alignment
 from ..plant.pantograph.schema import PantographData
 from .force import check_clock, estimated_force
 
@@ -38,9 +39,9 @@ class Passes:
     """Forces of several passes along spans that all of them cover; the first leads in, and is not judged."""
 
     force: Array  # (passes, places): estimated (N)
-    start: float  # of the first place (m)
-    step: float  # between two places (m)
-    per_span: int  # places in a span
+    alignment: Alignment  # of the line
+    first: int  # spans before the first place
+    per_span: int  # places in a span, as many in each
     droppers: Array  # (droppers,): positions along the line (m)
     line: str
     speed: float  # mean (m/s)
@@ -49,7 +50,7 @@ class Passes:
     @property
     def position(self) -> Array:
         """Of all places (m), (places,)."""
-        return self.start + self.step * np.arange(self.force.shape[1])
+        return places_of(self.alignment, self.first, self.per_span, self.force.shape[1])
 
     @property
     def lead(self) -> int:
@@ -62,8 +63,18 @@ class Passes:
 
     @property
     def span(self) -> float:
-        """Length of a span (m)."""
-        return self.step * self.per_span
+        """Mean length of a span (m)."""
+        return self.alignment.mean_length
+
+    @property
+    def step(self) -> float:
+        """Mean distance between two places (m)."""
+        return self.span / self.per_span
+
+
+def places_of(alignment: Alignment, first: int, per_span: int, count: int) -> Array:
+    """Positions (m), (count,), of places, so many in each span, from a number of spans on."""
+    return np.asarray(alignment.support(first + np.arange(count) / per_span))
 
 
 def side_by_side(
@@ -102,11 +113,11 @@ def side_by_side(
         raise InputError(
             f"The shortest run ends at {min(run.distance for run in everything):.4g} m, but a run's start is "
             f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
-            f"{FIRST_SETTLED * span + END:g} m or more."
+            f"{alignment.support(FIRST_SETTLED) + END:g} m or more."
         )
     per_span = math.ceil(span / min(STEP, from_kmh(speed) / CUTOFF / PER_WAVE) - 1e-9)
-    step, start = span / per_span, (FIRST_SETTLED - 1 - LEAD) * span
-    places = start + step * np.arange((last - FIRST_SETTLED + 1 + LEAD) * per_span)
+    before = FIRST_SETTLED - 1 - LEAD
+    places = places_of(alignment, before, per_span, (last - before) * per_span)
     force = np.zeros((len(everything), len(places)))
     random = np.random.default_rng(seed)
     for own, name, run in zip(force, names, everything, strict=True):
@@ -118,7 +129,7 @@ def side_by_side(
         raise InputError(
             "No run says where the line's droppers are; record one run with them, as `panto simulate` does."
         )
-    facts = (start, step, per_span, droppers, first.catenary, from_kmh(speed), first.line.wave_speed)
+    facts = (alignment, before, per_span, droppers, first.catenary, from_kmh(speed), first.line.wave_speed)
     return Passes(force[: len(runs)], *facts), Passes(force[len(runs) :], *facts)
 
 
@@ -133,7 +144,7 @@ def _named(run: str) -> Iterator[None]:
 
 def _check_alike(run: Trajectory, first: Trajectory, speed: float) -> None:
     """Raise InputError for a run that can't be compared with the others, whose mean speed is given (km/h)."""
-    if run.catenary != first.catenary or run.alignment.lengths[0] != first.alignment.lengths[0]:
+    if run.catenary != first.catenary or not run.alignment.same_spans(first.alignment):
         raise InputError(
             f"Passes of different lines, '{run.catenary}' and '{first.catenary}', cannot be compared; give "
             "healthy passes of the line that is judged."

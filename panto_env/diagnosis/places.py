@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..plant.alignment import Alignment
 
 ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
 """Distance (spans) from a defect up to which less than such a share of its score counts as its own waves, as
@@ -22,7 +23,7 @@ class Evidence:
     rest: Array  # (places,): force beside what healthy passes would have (N)
     score: Array  # (places,): 0 where the line is not judged
     threshold: float  # of the score
-    span: float  # m
+    alignment: Alignment  # of the line
     droppers: Array  # (droppers,): positions (m)
     speed: float  # m/s
     wave_speed: float  # m/s
@@ -54,6 +55,6 @@ def regions(evidence: Evidence) -> list[Region]:
 
 def _echo(region: Region, greater: Region, evidence: Evidence) -> bool:
     """Whether a region may be the waves of a greater one."""
-    apart = abs(evidence.position[region.peak] - evidence.position[greater.peak]) / evidence.span
+    apart = abs(np.diff(evidence.alignment.in_spans(evidence.position[[region.peak, greater.peak]]))[0])
     share = next((share for within, share in ECHOES if apart <= within), 0.0)
     return bool(evidence.score[region.peak] < share * evidence.score[greater.peak])

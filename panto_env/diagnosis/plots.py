@@ -32,8 +32,8 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
-        for support in np.arange(diagnosis.begin, diagnosis.end + 1e-6, evidence.span):
-            axis.axvline(support, color="0.85", linewidth=0.8, zorder=0)
+        for number in evidence.alignment.supports_within(diagnosis.begin, diagnosis.end):
+            axis.axvline(evidence.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
         for finding in diagnosis.findings:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:

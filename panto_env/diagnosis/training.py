@@ -57,10 +57,9 @@ def examples(track: Track) -> tuple[Array, Index]:
     for k, (defect, _) in enumerate(whole):
         evidence, _ = model.weigh(passes.only(k), level)
         for region in regions(evidence):
-            if (
-                defect.kind in KINDS
-                and abs(evidence.position[region.peak] - defect.position) < 0.75 * evidence.span
-            ):
+            if defect.kind in KINDS and abs(
+                evidence.position[region.peak] - defect.position
+            ) < 0.75 * evidence.alignment.length_at(defect.position):
                 own, which = _learn_from(evidence, region, defect)
                 shown.append(own)
                 classes.append(which)

@@ -77,6 +77,10 @@ class Alignment:
         per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
         return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
 
+    def same_spans(self, other: Alignment) -> bool:
+        """Whether the spans that both have are alike."""
+        return all(one == two for one, two in zip(self.supports, other.supports, strict=False))
+
     def span_of(self, x: Any) -> Any:
         """Number of the span at positions (m), an integer or an array of them."""
         index = np.floor_divide(x, self.pitch) if self.pitch is not None else np.floor(self.in_spans(x))
@@ -149,15 +153,23 @@ def mean_over_own_length(alignment, counted):
     """Mean length of a span over that of the one at a position in spans; 1 where all have one length."""
     if alignment.per_metre > 0.0:
         return 1.0
-    k = min(max(int(counted), 0), alignment.supports.size - 2) & NOT_NEGATIVE
+    k = min(max(int(counted), 0), spans_of(alignment) - 1) & NOT_NEGATIVE
     return alignment.mean_length / (alignment.supports[k + 1] - alignment.supports[k])
 
 
 @inlined
+def spans_of(alignment):
+    """Number of spans."""
+    return alignment.supports.size - 1
+
+
+@inlined
 def span_index(alignment, x):
-    """Number, counted from 0, of the span at a position (m) of a line whose spans differ in length."""
-    last = alignment.supports.size - 2
-    k = min(max(int(x / alignment.mean_length), 0), last)
+    """Number, counted from 0, of the span at a position (m)."""
+    last, k = spans_of(alignment) - 1, int(x / alignment.mean_length)
+    if alignment.per_metre > 0.0:
+        return k
+    k = min(max(k, 0), last)
     while k > 0 and x < alignment.supports[k & NOT_NEGATIVE]:
         k -= 1
     while k < last and x >= alignment.supports[(k + 1) & NOT_NEGATIVE]:

@@ -22,6 +22,7 @@ from panto_env.diagnosis.passes import Passes, side_by_side
 from panto_env.diagnosis.places import Evidence, regions
 from panto_env.diagnosis.threshold import cautious_threshold, threshold
 from panto_env.diagnosis.training import NEAR, examples, fit, save
+from panto_env.plant.alignment import Alignment
 from panto_env.studies.paper2.diagnosis_cases import within_interval
 from panto_env.terminal import console
 
@@ -36,7 +37,7 @@ def made_up(count, random, spans=SPANS):
     noise = lfilter([1.0], [1.0, -0.8], random.standard_normal((count, len(x)))) * 0.6
     force = mean + random.standard_normal((count, 1)) * pattern + size * noise
     droppers = np.add.outer(np.arange(spans) * SPAN, [5, 17, 30, 43, 55]).ravel()
-    return Passes(force, 0.0, SPAN / PER_SPAN, PER_SPAN, droppers, "made up", 70.0, 120.0)
+    return Passes(force, Alignment.equal(SPAN, spans), 0, PER_SPAN, droppers, "made up", 70.0, 120.0)
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +185,9 @@ def evidence_of(score, rest=None):
     x = np.arange(len(score)) * 0.5
     rest = np.sin(x) if rest is None else rest
     droppers = np.add.outer(np.arange(12) * SPAN, [5, 17, 30, 43, 55]).ravel()
-    return Evidence(x, rest, np.asarray(score, dtype=float), 5.0, SPAN, droppers, 70.0, 120.0, 2.0)
+    return Evidence(
+        x, rest, np.asarray(score, dtype=float), 5.0, Alignment.equal(SPAN, SPANS), droppers, 70.0, 120.0, 2.0
+    )
 
 
 def test_waves_of_a_defect_are_no_defects_of_their_own():

@@ -117,7 +117,7 @@ def _case(track: Track, defect: Defect | None, own: Passes, healthy: Healthy, ra
 
 def _located(case: Case, defect: Defect, found: Diagnosis) -> Case:
     """With the nearest finding, if it is near enough to be of the defect."""
-    span = found.evidence.span
+    span = found.evidence.alignment.mean_length
     near = [each for each in found.findings if abs(each.position - defect.position) < NEAR * span]
     if not near:
         return case

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ....base.arrays import Array, Index
+from ...alignment import AlignmentArrays
 
 PAD = 2  # rows beyond each end of the segments, for the five-point stencil
 CONTACT, MESSENGER = 0, 1
@@ -30,8 +31,7 @@ class FlexibleLine(NamedTuple):
     """
 
     spacing: float  # of the grid (m)
-    span: float  # m
-    spans: int  # of the whole line
+    alignment: AlignmentArrays  # of the whole line, whose spans have one length
     window: int  # spans that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # (rows, n): static height of the contact wire over a span, every span/(n - 1) m (m)

@@ -101,8 +101,7 @@ def constants(
     pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
     return FlexibleLine(
         spacing=dx,
-        span=data.span_length,
-        spans=spans,
+        alignment=data.alignment(spans).arrays,
         window=window,
         rows=rows,
         shape=tensioned.shape[None],

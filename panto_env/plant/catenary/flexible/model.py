@@ -69,9 +69,10 @@ class FlexibleCatenary:
         self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; for pictures alone
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
-        self.length = spans * data.span_length
-        self.usual_end = (spans - 1) * data.span_length  # the anchor of the last span reflects waves
-        self.supports = data.span_length * np.arange(1, spans)
+        self._alignment = alignment = data.alignment(spans)
+        self.length = alignment.length
+        self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
+        self.supports = alignment.support(np.arange(1, spans))
         self.droppers = dropper_positions(data, spans)
         self._tension = np.tile(shape.dropper_tension, (1, spans))
         # The anchor does not yield: the pantograph is at rest there exactly.
@@ -108,7 +109,7 @@ class FlexibleCatenary:
             self._write_tension(row, drawn)
         if drawn.tensions != (1.0, 1.0):
             assert self._designed is not None
-            defective = DefectiveLine(self._designed, self.line.spans, drawn.condition, drawn.tensions)
+            defective = DefectiveLine(self._designed, self._alignment.spans, drawn.condition, drawn.tensions)
         state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
 
@@ -142,15 +143,16 @@ class FlexibleCatenary:
         """
         line, wire = self.line, self.wire
         first_span = int(wire.first_span[lane])
-        start, links = first_span * line.span, line.link_set.size
+        start, links = self._alignment.support(first_span), line.link_set.size
         moved = along(wire.displacement[lane] - 0.5 * wire.increment[lane])[:, PAD:-PAD]
         x = start + line.spacing * np.arange(moved.shape[1])
         inside = (x >= begin) & (x <= end)
         x, moved = x[inside], moved[:, inside]
-        of_span = np.linspace(0.0, line.span, line.shape.shape[1])
-        contact = np.interp(x % line.span, of_span, line.shape[min(lane, len(line.shape) - 1)])
+        place, span = self._alignment.place(x), self._alignment.mean_length
+        of_span = np.linspace(0.0, span, line.shape.shape[1])
+        contact = np.interp(place, of_span, line.shape[min(lane, len(line.shape) - 1)])
         heights = messenger_heights(self._shapes.get(lane, self._shapes[DESIGNED]))
-        messenger = np.interp(x % line.span, np.linspace(0.0, line.span, VIEW_POINTS), heights)
+        messenger = np.interp(place, np.linspace(0.0, span, VIEW_POINTS), heights)
         supports = self.supports[(self.supports >= begin) & (self.supports <= end)]
         first = first_span * (links // line.window)
         droppers = self.droppers[first : first + links]

@@ -11,6 +11,7 @@ acts on it. So the wire's displacement at the ends of a step is the mean of u be
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
+from ...alignment import span_index, spans_of
 from ...state import own_row
 from ...valid_range import ENDING
 from ..protocol import (
@@ -41,10 +42,16 @@ from .wires import (
 
 
 @inlined
+def window_start(line, wire, lane):
+    """Position (m) at which a lane's window begins."""
+    return line.alignment.supports[wire.first_span[lane] & NOT_NEGATIVE]
+
+
+@inlined
 def follow(line, wire, lane, x):
     """Let the window travel on by a span once the contact point at x (m) is past its middle."""
-    ahead = int(x / line.span) - wire.first_span[lane]
-    if 2 * ahead > line.window - 1 and wire.first_span[lane] + line.window < line.spans:
+    ahead = span_index(line.alignment, x) - wire.first_span[lane]
+    if 2 * ahead > line.window - 1 and wire.first_span[lane] + line.window < spans_of(line.alignment):
         wire.first_span[lane] += 1
         per_span = line.rows * WIDTH // line.window
         for w in range(wire.displacement.shape[1]):
@@ -59,7 +66,7 @@ def follow(line, wire, lane, x):
 @inlined
 def unmoved_height(line, lane, x):
     """Height (m) of the contact wire at rest at x (m)."""
-    height = static_height(line.shape[own_row(line.shape, lane)], line.span, x)
+    height = static_height(line.shape[own_row(line.shape, lane)], line.alignment.mean_length, x)
     if line.rise.shape[1] > 0:
         row = own_row(line.rise, lane)
         height += rise_by_defects(line.rise[row], line.rise_breaks, line.rise_decay[row], x)
@@ -71,7 +78,7 @@ def _place(line, wire, lane, contact, x):
     if contact == 0:
         follow(line, wire, lane, x)
     u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
-    row, segment, weight = locate(x - wire.first_span[lane] * line.span, line.spacing, line.rows)
+    row, segment, weight = locate(x - window_start(line, wire, lane), line.spacing, line.rows)
     wire.contact_row[lane, contact], wire.contact_segment[lane, contact] = row, segment
     for k in range(4):
         wire.contact_weight[lane, contact, k] = weight[k]
@@ -97,7 +104,7 @@ def _advance(line, wire, lane):
 @implements(rise_at_contact, FlexibleLine)
 def _rise(line, wire, lane, contact, x0, x1):
     u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
-    start, rows = wire.first_span[lane] * line.span, line.rows
+    start, rows = window_start(line, wire, lane), line.rows
     row_0, segment_0, weight_0 = locate(x0 - start, line.spacing, rows)
     row_1, segment_1, weight_1 = locate(x1 - start, line.spacing, rows)
     before = deflection(u, d, row_0, segment_0, weight_0, 1.0)
@@ -126,7 +133,7 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, FlexibleLine)
 def _end(line, wire, lane):
     first_span = wire.first_span[lane]
-    at_start, at_end = first_span == 0, first_span + line.window >= line.spans
+    at_start, at_end = first_span == 0, first_span + line.window >= spans_of(line.alignment)
     absorbing = line.absorbing[own_row(line.absorbing, lane)]
     for w in range(wire.displacement.shape[1]):
         u, d = wire.displacement[lane, w], wire.increment[lane, w]

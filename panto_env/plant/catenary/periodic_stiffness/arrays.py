@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ....base.arrays import Array
+from ...alignment import AlignmentArrays
 
 
 class PeriodicLine(NamedTuple):
@@ -12,7 +13,7 @@ class PeriodicLine(NamedTuple):
 
     mean: float  # k_m (N/m)
     variation: float  # epsilon (-)
-    spans_per_metre: float  # 1 / L (1/m)
+    alignment: AlignmentArrays
 
 
 class PeriodicWire(NamedTuple):

@@ -44,9 +44,7 @@ class PeriodicStiffness:
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
         alignment = data.alignment(spans)
-        self.line: Any = PeriodicLine(
-            data.mean_stiffness, data.stiffness_variation, alignment.arrays.per_metre
-        )
+        self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, alignment.arrays)
         self.wire: Any = PeriodicWire(np.zeros(lanes))
         self.usual_end = alignment.length
         self.supports: Array = np.zeros(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ....backend import implements, inlined
+from ...alignment import in_spans
 from ...trigonometry import cosine_of_turns
 from ..protocol import (
     look_at_contact,
@@ -14,7 +15,7 @@ from .arrays import PeriodicLine
 @inlined
 def stiffness(line, x):
     """Stiffness k (N/m) at x (m), Eq. 5 of paper 3."""
-    return line.mean * (1.0 + line.variation * cosine_of_turns(line.spans_per_metre * x))
+    return line.mean * (1.0 + line.variation * cosine_of_turns(in_spans(line.alignment, x)))
 
 
 @implements(place_contact, PeriodicLine)
