@@ -110,7 +110,7 @@ def test_more_tension_raises_the_wire_in_the_middle_of_a_span():
         plant.model.settle(lane, DrawnLine(condition, tensions=(1.0, messenger)), 0.0)
         line, at = plant.model.line, 2.5 * data.span_length
         rise = rise_of(line.rise[lane], line.rise_breaks, line.rise_decay[lane], at)
-        heights.append(height_of(line.shape[lane], line.span, at) + rise)
+        heights.append(height_of(line.shape[lane], data.span_length, at) + rise)
     contact, messenger = data.contact_wire, data.messenger_wire
     sag = 9.81 * (contact.mass + messenger.mass) * data.span_length**2 / 8 / messenger.tension
     tensions = (contact.tension + (1 + more) * messenger.tension, (1 + more) * messenger.tension)
