@@ -7,17 +7,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..backend import cache_folder
+from ..backend import cache_folder, source_hash
 from ..base.errors import InputError
 from ..base.files import write_whole
 
 
 def kept_file(folder: str, inputs: Any) -> Path | None:
-    """Where the result of these inputs, plain data, is kept: in a folder of the sources' own cache.
+    """Where the result of these inputs, plain data, under these sources is kept.
 
     None where nothing can be kept.
     """
-    cache, text = cache_folder(), json.dumps(inputs, sort_keys=True)
+    cache, text = cache_folder(), json.dumps([source_hash(), inputs], sort_keys=True)
     return cache and cache / folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
 
 
