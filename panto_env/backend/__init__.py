@@ -8,7 +8,7 @@ function differ by the type of what it works on; ``constants`` gives kernels the
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
-from .cache import cache_folder
+from .cache import cache_folder, source_hash
 from .compile import JIT, constants, inlined, kernel, python_function
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, any_of, choose, larger, root, smaller
@@ -43,5 +43,6 @@ __all__ = [
     "shift_down",
     "shift_up",
     "smaller",
+    "source_hash",
     "store_row",
 ]

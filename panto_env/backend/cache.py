@@ -1,7 +1,7 @@
 """Where compiled kernels are kept.
 
 Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the cache folder is named by a hash of all of the package's sources: any edit opens a new one.
+So the cache folder is named by a hash of all sources that kernels call: an edit of any opens a new one.
 What lies there is run: so a folder is used only if it is this user's own and no other can write to it.
 """
 
@@ -13,6 +13,7 @@ import os
 import shutil
 import stat
 import tempfile
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -20,15 +21,27 @@ import llvmlite
 import numba
 
 PACKAGE = Path(__file__).resolve().parents[1]
+KERNEL_ROOMS = ("backend", "plant", "control", "estimation")
+"""Rooms that kernels are made of. A kernel elsewhere calls nothing but these and its own file."""
 
 
 @cache
 def source_hash() -> str:
     """Hash of every source file of the package, and of what compiles them."""
+    return _hash(PACKAGE.rglob("*.py"))
+
+
+@cache
+def kernel_hash() -> str:
+    """Hash of the source files that kernels are made of, and of what compiles them."""
+    return _hash(path for room in KERNEL_ROOMS for path in (PACKAGE / room).rglob("*.py"))
+
+
+def _hash(files: Iterable[Path]) -> str:
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
     if numba.config.BOUNDSCHECK:
         digest.update(b" with bounds checked")
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sorted(files):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -64,7 +77,7 @@ def _remove(folder: Path, process: int) -> None:
 
 def _own_folder(parent: Path) -> Path | None:
     """The folder of these sources in another one; None where it cannot be made, or is not ours alone."""
-    folder = parent / source_hash()
+    folder = parent / kernel_hash()
     try:
         parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)

@@ -11,9 +11,7 @@ import numba
 from numba.core.extending import intrinsic
 
 from .cache import cache_folder
-from .kernel_files import check_files
-from .once import compile_once
-from .parts import KERNEL_OPTIONS, PART_OPTIONS, refuse_calls
+from .kept_kernels import KeptKernels
 
 F = TypeVar("F", bound=Callable[..., Any])
 E = TypeVar("E", bound=IntEnum)
@@ -25,33 +23,29 @@ hundred times slower: for debuggers and for coverage."""
 # "contract" lets multiply and add fuse; it leaves the order of operations alone. Kernels allocate
 # nothing, so without Numba's run-time they need not count references to the arrays they are given.
 OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
+INLINED = OPTIONS | {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of what kernels call: a call would cost as much as what most of these functions do."""
 
 
 def kernel(function: F) -> F:
     """Compile ``function`` with Numba on its first call; keep the result on disk.
 
-    Of several processes that call it at the same time one compiles it. A kernel runs without Python's lock,
-    so that threads can share the lanes of a batch.
+    A kernel runs without Python's lock, so that threads can share the lanes of a batch.
     """
     previous, folder = numba.config.CACHE_DIR, cache_folder()
-    numba.config.CACHE_DIR = str(folder or "")  # read by Numba when it decorates
+    numba.config.CACHE_DIR = str(folder or "")  # read by Numba's cache when it is made
     try:
-        compiled: Any = numba.njit(cache=folder is not None, nogil=True, **KERNEL_OPTIONS, **OPTIONS)(
-            function
-        )
+        compiled: Any = numba.njit(nogil=True, no_cfunc_wrapper=True, **OPTIONS)(function)
+        if JIT and folder is not None:
+            compiled._cache = KeptKernels(function)
     finally:
         numba.config.CACHE_DIR = previous
-    if JIT and folder is not None:
-        check_files(compiled._cache)
-        compile_once(compiled, folder)
     return compiled  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
     """A function that kernels call, compiled by itself and then put in the place of the call."""
-    compiled: Any = numba.njit(**PART_OPTIONS, **OPTIONS)(function)
-    if JIT:
-        refuse_calls(compiled)
+    compiled: Any = numba.njit(**INLINED)(function)
     return compiled  # type: ignore[no-any-return]
 
 

@@ -14,13 +14,9 @@ from typing import Any, TypeVar
 
 from numba.extending import overload
 
-from .compile import JIT, OPTIONS
-from .parts import PART_OPTIONS
+from .compile import INLINED, JIT
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-INLINED: dict[str, Any] = OPTIONS | PART_OPTIONS
-"""Compiler options of an implementation: a call would cost as much as what most of them do."""
 
 
 def operation(declaration: F) -> F:

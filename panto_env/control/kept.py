@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from ..backend import cache_folder
+from ..backend import cache_folder, source_hash
 from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
 
@@ -19,7 +19,7 @@ def kept(folder: str, inputs: Any, compute: Callable[[], Any]) -> Any:
     cache = cache_folder()
     if cache is None:
         return compute()
-    made_of = checksum(inputs)
+    made_of = checksum([source_hash(), inputs])
     file = cache / folder / f"{made_of}.json"
     with suppress(InputError):  # nothing is there, or it is damaged
         found = read_checked(file)

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: what is damaged is compiled anew, what is another user's is not looked at."""
+"""Compiled kernels on disk: damaged ones are compiled anew, another user's are not looked at."""
 
 import os
 import resource
@@ -29,10 +29,10 @@ def call(tmp_path):
     (tmp_path / "module.py").write_text(MODULE)
     (tmp_path / "tmp").mkdir()
 
-    def call(cache="cache", **options):
+    def call(cache="cache", code=CALL, **options):
         environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / cache), "TMPDIR": str(tmp_path / "tmp")}
         told = subprocess.run(
-            [sys.executable, "-c", CALL],
+            [sys.executable, "-c", code],
             cwd=tmp_path,
             env=environment,
             capture_output=True,
@@ -44,6 +44,52 @@ def call(tmp_path):
         return told.stdout.split(), told.stderr
 
     return call
+
+
+START = "from pathlib import Path; import time\nwhile not Path('go').exists(): time.sleep(0.01)\n"
+
+
+def test_processes_that_compile_at_once_never_run_one_another_s_kernel(tmp_path):
+    """Each for other types first: Numba may keep one form under both names."""
+    (tmp_path / "module.py").write_text(MODULE)
+    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
+    code = START + "from module import thrice; print(thrice(%s), thrice(%s))"
+
+    def start(first, second):
+        command = [sys.executable, "-c", code % (first, second)]
+        return subprocess.Popen(
+            command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    started = [start(*order) for order in (("1.5", "2"), ("2", "1.5"))]
+    (tmp_path / "go").touch()
+    told = [process.communicate(timeout=120) for process in started]
+    assert told == [("4.5 6.0\n", ""), ("6.0 4.5\n", "")]
+    assert start("1.5", "2").communicate(timeout=120) == ("4.5 6.0\n", "")
+
+
+def test_a_form_under_a_wrong_name_is_compiled_anew(call, tmp_path):
+    call()
+    assert call(code=CALL.replace("1.5", "2")) == (["6.0", "0"], "")
+    first, second = sorted(files(tmp_path / "cache", ".nbc"))
+    shutil.copy(second, first)
+    assert call() == (["4.5", "0"], "")
+
+
+def test_a_process_that_dies_while_it_compiles_blocks_nobody(call, tmp_path):
+    slow = "import module, os; module.thrice._compiler.compile = lambda *_: os._exit(3); module.thrice(1.5)"
+    with pytest.raises(AssertionError):
+        call(code=slow)
+    assert call() == (["4.5", "0"], "")
+
+
+def test_a_compilation_is_announced_where_somebody_sees_it(call):
+    shown = "import sys; sys.stderr.isatty = lambda: True\n" + CALL
+    told, said = call(code=shown)
+    assert told == ["4.5", "0"]
+    assert said.startswith("Compiling kernels, about ")
+    assert said.count("\n") == 1
+    assert call(code=shown) == (["4.5", "1"], "")
 
 
 def files(folder, suffix):
@@ -97,7 +143,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_it_is_the_user_s_alone(folder, tmp_path):
     found = folder()
-    assert found == tmp_path / "cache" / cache.source_hash()
+    assert found == tmp_path / "cache" / cache.kernel_hash()
     assert stat.S_IMODE(found.stat().st_mode) == 0o700
     assert folder() == found
 
@@ -116,11 +162,11 @@ def plant(place, how, tmp_path):
 @pytest.mark.parametrize("how", ["link", "open"])
 def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how):
     """The wanted one first, then the one in the temporary folder, whose name is known, and its parent."""
-    wanted = tmp_path / "cache" / cache.source_hash()
+    wanted = tmp_path / "cache" / cache.kernel_hash()
     common = tmp_path / "tmp" / f"panto_env-{cache._user()}"
     plant(wanted, how, tmp_path)
-    assert folder() == common / cache.source_hash()
-    (common / cache.source_hash()).rmdir()
+    assert folder() == common / cache.kernel_hash()
+    (common / cache.kernel_hash()).rmdir()
     common.rmdir()
     plant(common, how, tmp_path)
     alone = folder()

@@ -1,0 +1,80 @@
+"""Compiled kernels on disk: Numba's cache, where damaged files are compiled anew a full disk ends nothing.
+
+Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself; where
+one overwrites the other's file with the kernel for other types, that is noticed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import sys
+import time
+import warnings
+from typing import Any
+
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+
+PAUSE = 60.0
+"""Seconds within which kernels that are compiled are announced only once."""
+
+_announced = -PAUSE
+
+
+class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
+    """Compiled kernels in their form on disk."""
+
+    def reduce(self, result: Any) -> tuple[bytes, bytes]:
+        """A checksum, and what it is of."""
+        data = pickle.dumps(super().reduce(result))
+        return hashlib.sha256(data).digest(), data
+
+    def rebuild(self, target_context: Any, payload: tuple[bytes, bytes]) -> Any:
+        """The kernel. Raises ValueError where it is damaged."""
+        digest, data = payload
+        if hashlib.sha256(data).digest() != digest:
+            raise ValueError("damaged")
+        return super().rebuild(target_context, pickle.loads(data))
+
+
+class KeptKernels(FunctionCache):  # type: ignore[misc]
+    """What is kept of one kernel: a form for each combination of types that it was called with."""
+
+    _impl_class = _CheckedResults
+
+    def load_overload(self, types: Any, target_context: Any) -> Any:
+        """The form for these types; None where there is none, or it is damaged."""
+        try:
+            kernel = super().load_overload(types, target_context)
+        except Exception:  # whatever damaged files lead to
+            kernel = None
+        if kernel is None or tuple(kernel.signature.args) != tuple(types):
+            _announce()
+            return None
+        return kernel
+
+    def save_overload(self, types: Any, kernel: Any) -> None:
+        """Keep a form, with a warning where that is not possible."""
+        try:
+            try:
+                super().save_overload(types, kernel)
+            except (pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError):  # a damaged index
+                self.flush()
+                super().save_overload(types, kernel)
+        except OSError as error:
+            warnings.warn(
+                f"Compiled kernels cannot be kept in {self.cache_path} ({error.strerror or error}), so the "
+                "next process compiles them again; make room there, or set PANTO_CACHE_DIR.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+
+
+def _announce() -> None:
+    """Say on standard error, where somebody sees it, what takes so long."""
+    global _announced
+    seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+    if seen and time.monotonic() - _announced > PAUSE:
+        text = "Compiling kernels, about 15 s, once per version and kind of line ..."
+        print(text, file=sys.stderr, flush=True)
+        _announced = time.monotonic()
