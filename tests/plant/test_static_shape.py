@@ -3,7 +3,6 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies
 from pydantic import ValidationError
 
 from panto_env import InputError, simulate
@@ -39,21 +38,20 @@ def test_agrees_with_finite_elements(name):
     np.testing.assert_allclose(shape.dropper_tension, other.dropper_tension, rtol=1e-3, atol=0.2)
 
 
-def check_against_the_closed_form(line, shape):
-    """Within a nanometre and a micronewton, but for the size of the wire's own forces."""
+def check_against_the_closed_form(line, shape, tolerance):
+    """tolerance: of heights (m), and a thousandth of that of forces (N)."""
     x = np.linspace(0, line.span_length, 1001)
     contact, messenger, tension, arm_force = periodic_span.shape(line, shape.dropper_mass, x)
-    scale = line.contact_wire.tension / 1e4
-    np.testing.assert_allclose(shape.contact.height(x), contact, atol=1e-9)
-    np.testing.assert_allclose(shape.messenger.height(x), messenger, atol=1e-9)
-    np.testing.assert_allclose(shape.dropper_tension, tension, atol=1e-6 * scale)
-    assert shape.arm_force == pytest.approx(arm_force, abs=1e-6 * scale)
+    np.testing.assert_allclose(shape.contact.height(x), contact, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(shape.messenger.height(x), messenger, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(shape.dropper_tension, tension, rtol=0, atol=1e3 * tolerance)
+    assert shape.arm_force == pytest.approx(arm_force, abs=1e3 * tolerance)
 
 
 @pytest.mark.parametrize("name", FLEXIBLE)
 def test_agrees_with_the_closed_form(name):
     line = load_catenary(name)
-    check_against_the_closed_form(line, static_shape.solve(line))
+    check_against_the_closed_form(line, static_shape.solve(line), 1e-12)
 
 
 @pytest.mark.parametrize("name", FLEXIBLE)
@@ -174,76 +172,73 @@ def test_droppers_keep_apart_from_one_another_and_from_the_support():
 # --- any line -------------------------------------------------------------------------------------
 
 
-def about(value, low, high):
-    """Mostly near a usual value, else anywhere in the range of the schema."""
-    near = strategies.floats(max(low, value / 4), min(high, value * 4))
-    return near if low == high else strategies.one_of(near, near, near, strategies.floats(low, high))
-
-
-def number(schema, key, usual):
+def number(random, schema, key, usual):
+    """Mostly near a usual value, at times anywhere in the range of the schema, or at one of its ends."""
     (between,) = ranges_of(schema.model_fields[key].rebuild_annotation())
-    return about(usual, between.low, between.high)
+    low, high = between.low, between.high
+    match random.choice(["near"] * 5 + ["anywhere", "end"]):
+        case "near":
+            return float(random.uniform(max(low, usual / 4), min(high, usual * 4)))
+        case "anywhere":
+            return float(random.uniform(low, high))
+        case _:
+            return float(random.choice([low, high]))
 
 
-@strategies.composite
-def lines(draw):
-    """Tables of lines, all numbers within the schema's ranges."""
-    span = draw(number(FlexibleCatenaryData, "span_length", 60.0))
-    count = draw(strategies.integers(1, 12))
+def random_line(random):
+    """Table of a line, all numbers within the schema's ranges."""
+    span = number(random, FlexibleCatenaryData, "span_length", 60.0)
+    count = int(random.integers(1, 13))
     gap = span / count
-    shift = draw(strategies.floats(0.1, 0.9))
-    depth = draw(number(Droppers, "sag", 0.03))
+    shift = float(random.uniform(0.1, 0.9))
+    depth = number(random, Droppers, "sag", 0.03)
     level = [depth * (1 - ((2 * k + 1) / count - 1) ** 2) for k in range(count)]  # a parabola
-    errors = strategies.one_of(strategies.just(0.0), strategies.floats(-0.02, 0.02))
+    errors = random.uniform(-0.02, 0.02, count) * (random.random() < 0.3)
     wires = [
         {
-            "mass": draw(number(Wire, "mass", 1.2)),
-            "tension": draw(number(Wire, "tension", 20e3)),
-            "bending_stiffness": draw(number(Wire, "bending_stiffness", 150.0)),
+            "mass": number(random, Wire, "mass", 1.2),
+            "tension": number(random, Wire, "tension", 20e3),
+            "bending_stiffness": number(random, Wire, "bending_stiffness", 150.0),
         }
         for _ in range(2)
     ]
-    kind = draw(strategies.sampled_from(["stiffness", "axial_stiffness"]))
+    kind = str(random.choice(["stiffness", "axial_stiffness"]))
     return LINE.model_dump() | {
         "span_length": span,
-        "encumbrance": draw(number(FlexibleCatenaryData, "encumbrance", 1.4)),
+        "encumbrance": number(random, FlexibleCatenaryData, "encumbrance", 1.4),
         "contact_wire": wires[0],
         "messenger_wire": wires[1],
         "droppers": {
             "positions": [gap * (k + shift) for k in range(count)],
-            "sag": [min(max(sag + draw(errors), -0.2), 0.5) for sag in level],
-            kind: draw(number(Droppers, kind, 1e5)),
-            "mass": draw(number(Droppers, "mass", 0.1)),
-            "contact_clamp_mass": draw(number(Droppers, "contact_clamp_mass", 0.2)),
-            "messenger_clamp_mass": draw(number(Droppers, "messenger_clamp_mass", 0.2)),
+            "sag": np.clip(level + errors, -0.2, 0.5).tolist(),
+            kind: number(random, Droppers, kind, 1e5),
+            "mass": number(random, Droppers, "mass", 0.1),
+            "contact_clamp_mass": number(random, Droppers, "contact_clamp_mass", 0.2),
+            "messenger_clamp_mass": number(random, Droppers, "messenger_clamp_mass", 0.2),
         },
-        "support": {"stiffness": draw(number(Support, "stiffness", 5e5)), "damping": 1000.0},
-        "steady_arm": {"mass": 0.0, "stiffness": 0.0, "holds_wire": draw(strategies.booleans())},
+        "support": {"stiffness": number(random, Support, "stiffness", 5e5), "damping": 1000.0},
+        "steady_arm": {"mass": 0.0, "stiffness": 0.0, "holds_wire": bool(random.integers(2))},
     }
 
 
 def test_any_line_is_refused_in_one_sentence_or_hangs_in_equilibrium():
     """Random numbers within the ranges; what hangs is judged by finite elements."""
     hung, messages = 0, []
-
-    @settings(max_examples=80, derandomize=True, deadline=None, database=None)
-    @given(lines())
-    def check(table):
-        nonlocal hung
+    for seed in range(120):
         try:
-            line = FlexibleCatenaryData.model_validate(table)
+            line = FlexibleCatenaryData.model_validate(random_line(np.random.default_rng(seed)))
             shape = static_shape.hang(line)
         except ValidationError as error:
             messages.append(explain(error, FlexibleCatenaryData))
-            return
+            continue
         except InputError as error:
             messages.append(str(error))
-            return
+            continue
         hung += 1
         assert shape.dropper_tension.min() > 0
         assert shape.dropper_length.min() > 0
         assert np.isfinite(shape.dropper_length).all()
-        check_against_the_closed_form(line, shape)
+        check_against_the_closed_form(line, shape, 1e-8)
         assert shape.contact.height(np.array(line.droppers.positions)) == pytest.approx(
             -np.array(line.droppers.sag), abs=1e-9
         )
@@ -259,8 +254,6 @@ def test_any_line_is_refused_in_one_sentence_or_hangs_in_equilibrium():
         np.testing.assert_allclose(
             shape.dropper_tension, other.dropper_tension, rtol=1e-2, atol=extra + 2e-3 * weight
         )
-
-    check()
     assert hung >= 10
     assert len(messages) >= 10
     assert not [each for each in messages if re.search(r"[.?!]\s|\n", each)]

@@ -16,7 +16,7 @@ from ....base.arrays import Array, Index
 from ..schema import Wire
 
 GRAVITY = 9.81  # m/s^2
-SHARPEST = 1e-7  # m over which a wire without bending stiffness rounds a kink, as elements need one
+SHARPEST = 1e-12  # m over which a wire without bending stiffness rounds a kink, as elements need one
 
 
 class Profile(NamedTuple):
