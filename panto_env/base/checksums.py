@@ -43,7 +43,7 @@ def without_checksum(table: Any, arrays: Mapping[str, NDArray[Any]] = NO_ARRAYS)
         rest = {key: value for key, value in table.items() if key != CHECKSUM}
         if table.get(CHECKSUM) == checksum(rest, arrays):
             return rest
-    raise ValueError("it is damaged or was changed, as its checksum does not fit what it says")
+    raise ValueError("it is damaged or was changed, or is of something else: no checksum fits what it says")
 
 
 def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:

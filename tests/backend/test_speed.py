@@ -137,12 +137,13 @@ def test_results_of_several_machines_stand_side_by_side(result, tmp_path, capsys
     assert "Another One" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"machine": 1}', "\xff"])
+@pytest.mark.parametrize("text", ["", "[]", json.dumps(with_checksum({"machine": 1})), "\xff"])
 def test_what_is_no_result_is_refused(tmp_path, text):
     path = tmp_path / "bad.json"
     path.write_text(text, encoding="latin-1")
     with pytest.raises(
-        InputError, match=r"bad\.json is (no result of 'panto speed --json'|not JSON, or is damaged)"
+        InputError,
+        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|.* no checksum fits)",
     ):
         speed.speed([path])
 

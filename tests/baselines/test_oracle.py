@@ -29,6 +29,7 @@ from panto_baselines.oracle.settings import oracle_settings
 from panto_baselines.oracle.solver import descend
 from panto_configs import find as find_config
 from panto_env import InputError, simulate
+from panto_env.base.checksums import with_checksum
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import actuator_settings
 
@@ -411,11 +412,11 @@ def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.Monkey
     assert stored.asked(settings) != [before]
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"cells": [{"fingerprint": "0"}]}'])
+@pytest.mark.parametrize("text", ["", "[]", json.dumps(with_checksum({"cells": [{"fingerprint": "0"}]}))])
 def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
     file = tmp_path / "o.json"
     file.write_text(text)
-    with pytest.raises(InputError, match=r"holds no oracles of this version; remove it|is not JSON"):
+    with pytest.raises(InputError, match=r"holds no oracles of this version|is not JSON|no checksum fits"):
         stored.read(file)
     assert isinstance(called("--output", str(file)).exception, InputError)
     assert file.read_text() == text

@@ -23,6 +23,7 @@ from panto_baselines.report.tables import signed
 from panto_baselines.report.toml import as_toml
 from panto_configs import names
 from panto_env import InputError
+from panto_env.base.checksums import with_checksum, write_checked
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
 VOID = {"meta", "input"}
@@ -143,8 +144,8 @@ def test_charts_draw_every_policy_in_its_place():
 
 def test_a_result_without_traces_says_so():
     table = result()
-    del table["traces"]
-    assert "run the benchmark anew to have them here" in html(table)
+    table["traces"] = []
+    assert "every pass of the first seed ended early" in html(table)
     assert "polyline class" not in html(table)
 
 
@@ -222,7 +223,7 @@ def called(*arguments):
 def test_command_writes_the_page_beside_the_first_file(tmp_path):
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     for path in (first, second):
-        path.write_text(json.dumps(result()))
+        write_checked(path, result())
     done = called(first, second)
     assert done.exit_code == 0, done.output
     assert done.stdout == f"The page is {tmp_path / 'a.html'}.\n"
@@ -235,11 +236,17 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
         ("run.parquet", "", "run.parquet is not a whole trajectory file"),
         ("out.json", None, "there is no such file"),
         ("out.json", "{", "is not JSON"),
-        ("out.json", "[1]", "is no result of `panto benchmark --output RESULT.json`"),
-        ("out.json", '{"rows": []}', "'version' is missing or wrong"),
-        ("out.json", json.dumps(result(cells=[])), "do not fit together"),
-        ("out.json", json.dumps(result(traces=[{"policy": 1}])), "'traces.0.policy' is missing or wrong"),
-        ("out.json", json.dumps(result(spans=[])), "do not fit together"),
+        ("out.json", "[1]", "no checksum fits what it says"),
+        ("out.json", '{"rows": []}', "no checksum fits what it says"),
+        ("out.json", json.dumps(with_checksum({})), "is no result of `panto benchmark --output RESULT.json`"),
+        ("out.json", json.dumps(with_checksum({"rows": []})), "'version' is missing or wrong"),
+        ("out.json", json.dumps(with_checksum(result(cells=[]))), "do not fit together"),
+        (
+            "out.json",
+            json.dumps(with_checksum(result(traces=[{"policy": 1}]))),
+            "'traces.0.policy' is missing or wrong",
+        ),
+        ("out.json", json.dumps(with_checksum(result(spans=[]))), "do not fit together"),
     ],
 )
 def test_what_is_no_result_is_refused_in_one_sentence(tmp_path, name, text, words):
@@ -314,7 +321,7 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
 
 def test_panto_report_prints_it_and_writes_no_page(tmp_path):
     file = tmp_path / "result.json"
-    file.write_text(json.dumps(result()))
+    write_checked(file, result())
     app = typer.Typer()
     app.command()(report)
     told = CliRunner().invoke(app, [str(file), "--markdown"])

@@ -106,7 +106,7 @@ def _train(algorithm: str, tape: Tape) -> None:
         (Path(folder) / "training.toml").write_text(text, encoding="utf-8")
         _panto(("train", "training.toml", "--output", "run"), folder)
         (model,) = Path(folder).glob("run/model.*")  # earlier versions had zips
-        _json(("evaluate", str(model), "--seeds", "2"), tape, folder)
+        _json(("evaluate", f"run/{model.name}", "--seeds", "2"), tape, folder)
 
 
 def _reproduce(study: str, tape: Tape) -> None:
