@@ -2,9 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +13,8 @@ from panto_env.metrics import en50367
 from panto_env.metrics.criterion import Criterion, criteria_table, remarks, worst
 from panto_env.metrics.figures import Figures, arcing, contact_loss
 
+from ..command import panto
 from .test_summary import RUN, SPAN, replace
-
-PANTO = Path(sys.executable).with_name("panto")
 
 
 def by_key(criteria):
@@ -219,8 +215,8 @@ def test_a_saved_run_knows_its_line(tmp_path, reference_run):
 # --- commands ------------------------------------------------------------------------------------
 
 
-def panto(*arguments):
-    result = subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True)
+def printed(*arguments):
+    result = panto(*arguments)
     assert result.returncode == 0, result.stderr
     return result.stdout
 
@@ -230,7 +226,7 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
     mine = tmp_path / "dc.toml"
     room = 'free_uplift = { value = 0.2, source = "seen: my drawing" }\n'
     mine.write_text(text.replace("[contact_wire]", f'system = "DC 3 kV"\n{room}[contact_wire]', 1))
-    told = json.loads(panto("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
+    told = json.loads(printed("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
     found = {criterion["key"]: criterion for criterion in told}
     assert found["mean"]["highest"] == pytest.approx(0.00097 * 160**2 + 110)
     assert found["mean"]["lowest"] is None
@@ -242,15 +238,17 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
 def test_simulate_validate_and_evaluate_print_the_same_table():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
     for output in (
-        panto("simulate", *light),
-        panto("evaluate", "passive", *light, "--line-condition", "new"),
-        panto("validate"),
+        printed("simulate", *light),
+        printed("evaluate", "passive", *light, "--line-condition", "new"),
+        printed("validate"),
     ):
         for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
             assert words in output
-    validation = json.loads(panto("validate", "--json"))["compliance"]
+    validation = json.loads(printed("validate", "--json"))["compliance"]
     assert [entry["speed_kmh"] for entry in validation] == [250.0, 300.0]
     assert {criterion["key"] for criterion in validation[0]["criteria"]} > {"mean", "std", "doppler", "slack"}
-    (entry,) = json.loads(panto("evaluate", "passive", *light, "--line-condition", "new", "--json"))["passes"]
+    (entry,) = json.loads(printed("evaluate", "passive", *light, "--line-condition", "new", "--json"))[
+        "passes"
+    ]
     assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
