@@ -42,7 +42,7 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 test: $(READY) lint
-	$(BIN)/pytest -n auto -m 'not slow'
+	$(BIN)/pytest -n auto --dist worksteal -m 'not slow'
 
 # The documentation as a site, warnings as errors. `make proofs` builds it too, and follows every link within it.
 SITE := docs/_build/html
@@ -72,7 +72,7 @@ films: $(READY)
 # Slow proofs: more lines against finite elements, longer trainings, random environments.
 CASES := 2000
 proofs: $(READY)
-	CASES=$(CASES) $(BIN)/pytest -n auto -m slow
+	CASES=$(CASES) $(BIN)/pytest -n auto --dist worksteal -m slow
 
 # Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
 coverage: $(READY)
@@ -122,7 +122,7 @@ floors:
 	$(FLOORS)/bin/pip install -qq --upgrade pip packaging
 	$(FLOORS)/bin/python -m tests.floors $(FLOOR_EXTRAS) > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/pip install -q --constraint $(FLOORS)/floors.txt pytest pytest-xdist --editable ".[$(FLOOR_EXTRAS)]"
-	$(FLOORS)/bin/pytest -n auto tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
+	$(FLOORS)/bin/pytest -n auto --dist worksteal tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
 	  tests/envs/test_vector_rules.py tests/analysis/test_sweep.py tests/analysis/test_plots.py tests/metrics/test_trajectory.py tests/render/test_render.py
 
 # Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.
@@ -135,7 +135,7 @@ pythons:
 	  venv=.venv-$$(basename $$python); \
 	  $$python -m venv $$venv && \
 	  $$venv/bin/pip install -qq --constraint constraints.txt pytest pytest-xdist --editable '.[control,render]' && \
-	  $$venv/bin/pytest -n auto tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py tests/baselines/test_baselines.py \
+	  $$venv/bin/pytest -n auto --dist worksteal tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py tests/baselines/test_baselines.py \
 	    || exit 1; done
 
 # The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.

@@ -10,7 +10,7 @@ from panto_env import Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics import en50367
-from panto_env.metrics.criterion import Criterion, criteria_table, remarks, worst
+from panto_env.metrics.criterion import Criterion, criteria_table, limits_in_words, remarks, worst
 from panto_env.metrics.figures import Figures, arcing, contact_loss
 
 from ..command import panto
@@ -150,6 +150,20 @@ def test_every_criterion_of_a_run(reference_run):
     ]
     assert found["slack"].value == pytest.approx(100 * np.mean(slack), rel=0.01)
     assert 0 < found["slack"].value < 20
+
+
+def test_what_waves_meet_is_told_of_lines_that_have_it(reference_run):
+    found = by_key(reference_run.compliance())
+    expected = load_catenary("en50318-2002").reflections(300 / 3.6 / 60.0)
+    assert (found["dropper reflection"].value, found["support reflection"].value) == expected
+    assert "at 1.4 Hz (one per span)" in found["support reflection"].name
+    bare = replace(reference_run, line=replace(reference_run.line, dropper_reflection=math.nan))
+    assert set(found) - set(by_key(bare.compliance())) == {"dropper reflection", "support reflection"}
+
+
+@pytest.mark.parametrize(("value", "shown"), [(9.9996, "10.000"), (10.0, "10.0"), (-10.4, "-10.4")])
+def test_large_numbers_have_one_figure_after_the_comma_and_small_ones_three(value, shown):
+    assert limits_in_words(Criterion("a", "a", "N", 0.0, value)) == f"at least {shown}"
 
 
 def test_spans_are_those_asked_for(reference_run):

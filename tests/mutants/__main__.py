@@ -98,8 +98,7 @@ def judge(name: str, room: dict[str, Any], count: int, seed: int, python: str) -
         bench.cover()
         for mutant in mutants:
             killed += (dead := bench.kills(mutant))
-            if not dead:
-                print(f"survives: {mutant.diff(bench.root)}", flush=True)
+            print("killed" if dead else f"survives: {mutant.diff(bench.root)}", flush=True)
     print(f"{name}: {killed} of {len(mutants)} killed, {killed / max(1, len(mutants)):.0%}", flush=True)
     return killed, len(mutants)
 
