@@ -1,7 +1,4 @@
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pyarrow.csv
 import pyarrow.parquet
@@ -14,12 +11,9 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.cli.sweep import parse_values
 from panto_env.plant.actuators.lagged import LaggedActuator
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
+
 PAPER_3 = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
-
-
-def panto(*arguments, cwd=None):
-    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
 
 
 def figures(row):

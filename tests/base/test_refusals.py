@@ -1,8 +1,6 @@
 """What can't be computed or understood is refused in one sentence, before time is lost."""
 
 import os
-import subprocess
-import sys
 
 import gymnasium
 import numpy as np
@@ -25,6 +23,8 @@ from panto_env.plant.pantograph import build
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome
 from panto_env.studies import write as write_study
+
+from ..command import panto
 
 OWN = """
 class Own:
@@ -57,13 +57,8 @@ evaluation = { interval_steps = 100 }
 """
 
 
-def panto(*arguments, folder):
-    command = [sys.executable, "-c", "from panto_env.cli import main; main()", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
-
-
 def command(*arguments):
-    """The same here, without a process of its own; InputErrors are raised."""
+    """The command `panto`; InputErrors are raised."""
     make_app()(args=list(arguments), standalone_mode=False)
 
 
@@ -187,13 +182,13 @@ def test_a_sweep_of_millions_is_refused_before_it_begins(tmp_path):
     values = list(np.linspace(200.0, 300.0, 400))
     with pytest.raises(InputError, match="This sweep has 160,000 passes; 100,000 at most"):
         sweep({"speed_kmh": values, "pantograph.masses.0": values})
-    done = panto("sweep", "speed_kmh=100:300:10000000", folder=tmp_path)
+    done = panto("sweep", "speed_kmh=100:300:10000000", cwd=tmp_path)
     assert done.returncode == 2
     assert "10,000,000 values" in done.stderr
 
 
 def test_a_run_is_saved_as_parquet_or_not_computed_at_all(tmp_path):
-    done = panto("simulate", "--output", "run.csv", folder=tmp_path)
+    done = panto("simulate", "--output", "run.csv", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert "run.csv must end in .parquet" in done.stderr
     assert not list(tmp_path.iterdir())
@@ -269,7 +264,7 @@ def test_a_folder_that_is_asked_for_is_made(tmp_path):
 
 
 def test_the_command_says_its_version(tmp_path):
-    done = panto("--version", folder=tmp_path)
+    done = panto("--version", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"panto-env {panto_env.__version__}\n")
 
 

@@ -50,6 +50,7 @@ def test_so_it_is_without_a_buffer(tmp_path):
     assert done.returncode == 2
 
 
+@pytest.mark.slow
 def test_a_file_is_written_though_nothing_can_be_printed(tmp_path):
     for end in (f"> {FULL}", ">&-", "| true"):
         shell(f"{RUN} --output run.parquet {end}", tmp_path)

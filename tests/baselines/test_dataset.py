@@ -224,6 +224,7 @@ class TestEpisodes:
 
 
 class TestParts:
+    @pytest.mark.slow
     def test_killed_in_the_middle_it_goes_on_and_ends_the_same(self, minari, tmp_path, monkeypatch):
         monkeypatch.setattr(make_episodes, "PER_PART", 1)
         mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.safetensors")
@@ -258,6 +259,7 @@ class TestParts:
         assert (tmp_path / "out" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
         assert panto("dataset", "verify", "out", cwd=tmp_path).returncode == 0
 
+    @pytest.mark.slow
     def test_the_whole_command_may_be_killed(self, tmp_path):
         """SIGKILL of the command itself while a table is made: what is whole stays, and is not made again."""
         (tmp_path / "few.toml").write_text(

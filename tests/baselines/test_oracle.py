@@ -371,6 +371,7 @@ app()
 """
 
 
+@pytest.mark.slow
 def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
     file = tmp_path / "list.json"
     order = [sys.executable, "-c", LIST, str(file)]

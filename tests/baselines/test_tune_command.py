@@ -99,6 +99,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_a_tuning_that_is_killed_loses_no_finished_speed(tmp_path: Path) -> None:
     line = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--actuator", "ideal")
     small = ("tune", "skyhook", *line, "--line-condition", "new", "--speed", "250", "--speed", "300")

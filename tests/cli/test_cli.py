@@ -1,8 +1,5 @@
 import json
-import subprocess
-import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
@@ -10,12 +7,9 @@ from panto_env import Trajectory
 from panto_env.base.checksums import read_checked
 from panto_env.studies.en50318 import reference
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
+
 WITH_AGENTS = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra 'agents'")
-
-
-def panto(*arguments, cwd=None):
-    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
 
 
 def test_validate_prints_the_table_and_passes():

@@ -1,8 +1,6 @@
 """A mean force that is asked for is met by trimming the static force, once, and kept."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium
@@ -18,7 +16,8 @@ from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.en50367 import largest_mean
 from panto_env.plant.state import Row
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
+
 LIGHT = {"catenary": "periodic-stiffness", "pantograph": "identified-2dof"}
 """A line that costs little, and a pantograph whose spring pulls back by a fifth."""
 
@@ -223,15 +222,15 @@ def test_a_sweep_meets_it_at_every_value():
 
 def test_the_command_takes_it_and_says_what_it_applied():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "identified-2dof")
-    command = [PANTO, "simulate", *light, "--spans", "5-8", "--mean-force"]
-    text = subprocess.run([*command, "60"], capture_output=True, text=True)
+    command = ["simulate", *light, "--spans", "5-8", "--mean-force"]
+    text = panto(*command, "60")
     assert text.returncode == 0, text.stderr
     assert "trimmed for a passive mean of 60.0 N" in text.stdout
-    told = json.loads(subprocess.run([*command, "en50367", "--json"], capture_output=True, text=True).stdout)
+    told = json.loads(panto(*command, "en50367", "--json").stdout)
     assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6))
     assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=0.1)
     assert told["nominal_force"] > told["target_mean"]
-    bad = subprocess.run([*command, "much"], capture_output=True, text=True)
+    bad = panto(*command, "much")
     assert bad.returncode == 2
     assert len(bad.stderr.splitlines()) == 1
 

@@ -3,9 +3,6 @@
 import dataclasses
 import json
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -16,7 +13,7 @@ from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +31,6 @@ def record(motion, tmp_path_factory):
     path = tmp_path_factory.mktemp("train") / "record.csv"
     write_motion(motion, path)
     return path
-
-
-def panto(*arguments, cwd=None):
-    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
 
 
 def test_a_measurement_is_the_run_with_noise(run):

@@ -23,8 +23,8 @@ from pathlib import Path
 from panto_env import simulate
 from panto_env.cli import main as panto
 
-from .files import write_files
-from .lines import BY_HAND, command_lines
+from .files import write_files, write_made_files
+from .lines import BY_HAND, USUAL, command_lines
 from .processes import End, run_all
 
 LIMIT = 60.0
@@ -81,6 +81,7 @@ def run_line(line: tuple[str, ...], files: Path, folder: Path) -> None:
 def prepare(files: Path) -> None:
     """Write the files, load kernels and libraries, so that no case has to: it has them from this process."""
     write_files(files)
+    write_made_files(files)
     simulate("periodic-stiffness", "three-mass", policy="p", distance=100.0)
     simulate(distance=60.0)
     for module in ("matplotlib.pyplot", "torch", "stable_baselines3"):
@@ -93,11 +94,13 @@ def main() -> None:
     """Try them, tell each end that is bad, then how many there were of each kind."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, help="how many; all by default")
+    parser.add_argument("--usual", action="store_true", help="those without a bad option, which must succeed")
     parser.add_argument("--folder", type=Path, help="where to work, instead of the temporary folder")
     parser.add_argument("--only", default="", help="those alone that have this text")
     parser.add_argument("--all", action="store_true", help="tell every end")
     given = parser.parse_args()
-    lines = [line for line in chosen(given.count) if given.only in " ".join(line)]
+    usual = [(*command, *words) for command, words in USUAL.items()]
+    lines = [line for line in (usual if given.usual else chosen(given.count)) if given.only in " ".join(line)]
     ends: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(dir=given.folder) as name:
         folder = Path(name)
@@ -106,6 +109,8 @@ def main() -> None:
         prepare(files)
         for number, end in run_all([partial(run_line, line, files, folder) for line in lines], folder, LIMIT):
             kind = judged(end)
+            if given.usual and kind != "done":
+                kind = f"{BAD}{kind}"
             ends[kind] += 1
             if given.all or kind.startswith(BAD):
                 words = [word if len(word) < 100 else f"{word[:100]}..." for word in lines[number]]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import warnings
 from pathlib import Path
 
+from panto_agents.stored import FOLDER as MODELS
+from panto_baselines.dataset.checksums import write_checksums
 from panto_env import simulate
 from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of
@@ -12,6 +15,7 @@ from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import write_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
 
+DOCS = Path(__file__).parents[2] / "docs"
 TRAINING = """
 algorithm = "ppo"
 total_steps = {steps}
@@ -23,8 +27,10 @@ hyperparameters = {{ n_steps = 64, batch_size = 64, n_epochs = 1, net_arch = [{w
 """
 ABLATION = """
 training = "training.toml"
-seeds = [2000]
+seeds = [2000, 2001]
 total_steps = 128
+judged_by = "track.toml"
+judged_on = 1
 [variants."no history".environment]
 history = 0
 """
@@ -34,10 +40,19 @@ title = "some"
 catenary = "periodic-stiffness"
 pantograph = "three-mass"
 speed_kmh = [250, 300]
+[environment]
+line_condition = "fair"
 [[sets]]
 name = "own"
 policies = ["passive"]
 episodes = 1
+"""
+TRACK = """
+line_condition = "fair"
+[[lines]]
+catenary = "periodic-stiffness"
+pantograph = "three-mass"
+speeds_kmh = [300]
 """
 DESIGNS = """
 title = "some"
@@ -100,6 +115,7 @@ def write_files(folder: Path) -> None:
         "training.toml": TRAINING.format(steps=128, widths=8),
         "million.toml": TRAINING.format(steps=128, widths=1_000_000),
         "ablation.toml": ABLATION,
+        "track.toml": TRACK,
         "episodes.toml": EPISODES,
         "designs.toml": DESIGNS,
         "policies.py": POLICIES,
@@ -128,6 +144,21 @@ def write_files(folder: Path) -> None:
         run.save(folder / "run.parquet")
         moved = simulate("periodic-stiffness", "dsa350", distance=300.0)
     write_motion(measure(moved), folder / "motion.csv")
+
+
+def write_made_files(folder: Path) -> None:
+    """Write files that commands have made, which take some seconds: passes, a model, results, a data set."""
+    (folder / "passes").mkdir()
+    for k in range(1, 5):
+        speed = 220.0 + 0.2 * k
+        run = simulate("en50318-2002", "dsa250", speed, accuracy="fast", distance=1200.0)
+        run.save(folder / "passes" / f"{k}.parquet")
+    shutil.copy(next(MODELS.glob("*.safetensors")), folder / "agent.safetensors")
+    shutil.copy(DOCS / "benchmark" / "head.json", folder / "benchmark.json")
+    shutil.copy(next((DOCS / "speed").glob("*.json")), folder / "speed.json")
+    (folder / "set").mkdir()
+    shutil.copy(folder / "rig.csv", folder / "set" / "rig.csv")
+    write_checksums(folder / "set")
 
 
 def marked(text: str, description: str, name: str) -> str:

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from .lines import BY_HAND, command_lines
+from .lines import BY_HAND, USUAL, command_lines
 from .processes import run_all
 
 ROOT = Path(__file__).parents[2]
 
 
-def tried(count, folder):
-    """Try so many command lines in a fresh process, which has no threads: how many ends of each kind."""
-    command = [sys.executable, "-m", "tests.fuzz.command_lines", "--count", str(count), "--folder", folder]
+def tried(folder, *options):
+    """Try command lines in a fresh process, which has no threads: how many ends of each kind."""
+    command = [sys.executable, "-m", "tests.fuzz.command_lines", *options, "--folder", folder]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     *told, counts = done.stdout.splitlines() or [done.stderr]
     print(counts)
@@ -31,16 +31,17 @@ def test_the_table_is_long_and_has_every_command():
     assert {line[0] for line in BY_HAND} > {"simulate", "sweep", "benchmark", "train", "dataset", "report"}
 
 
-def test_some_command_lines_end_well(tmp_path):
-    ends = tried(50, tmp_path)
-    assert sum(ends.values()) == 50
-    assert ends["refused in one sentence"] > 25
+@pytest.mark.slow
+def test_what_a_bad_option_is_put_into_succeeds_without_it(tmp_path):
+    """So that it is the bad option that a command line of the table is refused for."""
+    assert tried(tmp_path, "--usual") == {"done": len(USUAL)}
 
 
 @pytest.mark.slow
 def test_hundreds_of_command_lines_end_well(tmp_path):
-    ends = tried(400, tmp_path)
+    ends = tried(tmp_path, "--count", "400")
     assert sum(ends.values()) == 400
+    assert ends["refused in one sentence"] > 250
 
 
 def exit_with_5():

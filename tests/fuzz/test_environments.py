@@ -28,10 +28,6 @@ def check(count, folder):
     assert ends["finite"] > 0.3 * count  # else it is the generator that is refused
 
 
-def test_a_few(tmp_path):
-    check(12, tmp_path)
-
-
 @pytest.mark.slow
 def test_many(tmp_path):
     check(int(os.environ.get("CASES", "2000")), tmp_path)

@@ -1,4 +1,4 @@
-"""Damaged files end well: some of each kind here, thousands in the proofs, more in `make fuzz`."""
+"""Damaged files end well: thousands in the proofs, more in `make fuzz`."""
 
 import sys
 
@@ -24,10 +24,6 @@ def check(count, folder):
     for kind, counts in ends.items():
         assert BAD not in counts
         assert counts["refused"] > 0.3 * counts.total(), kind  # else it is the damage that is none
-
-
-def test_some_of_each_kind(tmp_path):
-    check(150, tmp_path)
 
 
 @pytest.mark.slow

@@ -1,7 +1,4 @@
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,14 +16,11 @@ from panto_env.identification import (
     write_record,
 )
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
+
 TRUTH = parameters_of(load_pantograph("identified-2dof"))
 MEASURED = ("--measured", "k1T=32992", "m2=5", "k2=14544")
 HEADER = "time (s),force (N),y_p1 (mm),y_p2 (mm),y_p3 (mm)"
-
-
-def panto(*arguments, cwd=None):
-    return subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,12 +10,11 @@ from panto_env import Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics import en50367
-from panto_env.metrics.criterion import Criterion, criteria_table, remarks, worst
+from panto_env.metrics.criterion import Criterion, criteria_table, limits_in_words, remarks, worst
 from panto_env.metrics.figures import Figures, arcing, contact_loss
 
+from ..command import panto
 from .test_summary import RUN, SPAN, replace
-
-PANTO = Path(sys.executable).with_name("panto")
 
 
 def by_key(criteria):
@@ -156,6 +152,20 @@ def test_every_criterion_of_a_run(reference_run):
     assert 0 < found["slack"].value < 20
 
 
+def test_what_waves_meet_is_told_of_lines_that_have_it(reference_run):
+    found = by_key(reference_run.compliance())
+    expected = load_catenary("en50318-2002").reflections(300 / 3.6 / 60.0)
+    assert (found["dropper reflection"].value, found["support reflection"].value) == expected
+    assert "at 1.4 Hz (one per span)" in found["support reflection"].name
+    bare = replace(reference_run, line=replace(reference_run.line, dropper_reflection=math.nan))
+    assert set(found) - set(by_key(bare.compliance())) == {"dropper reflection", "support reflection"}
+
+
+@pytest.mark.parametrize(("value", "shown"), [(9.9996, "10.000"), (10.0, "10.0"), (-10.4, "-10.4")])
+def test_large_numbers_have_one_figure_after_the_comma_and_small_ones_three(value, shown):
+    assert limits_in_words(Criterion("a", "a", "N", 0.0, value)) == f"at least {shown}"
+
+
 def test_spans_are_those_asked_for(reference_run):
     assert by_key(reference_run.compliance((5, 6)))["std"].value == reference_run.summary((5, 6)).std
 
@@ -219,8 +229,8 @@ def test_a_saved_run_knows_its_line(tmp_path, reference_run):
 # --- commands ------------------------------------------------------------------------------------
 
 
-def panto(*arguments):
-    result = subprocess.run([PANTO, *map(str, arguments)], capture_output=True, text=True)
+def printed(*arguments):
+    result = panto(*arguments)
     assert result.returncode == 0, result.stderr
     return result.stdout
 
@@ -230,7 +240,7 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
     mine = tmp_path / "dc.toml"
     room = 'free_uplift = { value = 0.2, source = "seen: my drawing" }\n'
     mine.write_text(text.replace("[contact_wire]", f'system = "DC 3 kV"\n{room}[contact_wire]', 1))
-    told = json.loads(panto("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
+    told = json.loads(printed("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
     found = {criterion["key"]: criterion for criterion in told}
     assert found["mean"]["highest"] == pytest.approx(0.00097 * 160**2 + 110)
     assert found["mean"]["lowest"] is None
@@ -242,15 +252,17 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
 def test_simulate_validate_and_evaluate_print_the_same_table():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
     for output in (
-        panto("simulate", *light),
-        panto("evaluate", "passive", *light, "--line-condition", "new"),
-        panto("validate"),
+        printed("simulate", *light),
+        printed("evaluate", "passive", *light, "--line-condition", "new"),
+        printed("validate"),
     ):
         for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
             assert words in output
-    validation = json.loads(panto("validate", "--json"))["compliance"]
+    validation = json.loads(printed("validate", "--json"))["compliance"]
     assert [entry["speed_kmh"] for entry in validation] == [250.0, 300.0]
     assert {criterion["key"] for criterion in validation[0]["criteria"]} > {"mean", "std", "doppler", "slack"}
-    (entry,) = json.loads(panto("evaluate", "passive", *light, "--line-condition", "new", "--json"))["passes"]
+    (entry,) = json.loads(printed("evaluate", "passive", *light, "--line-condition", "new", "--json"))[
+        "passes"
+    ]
     assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]

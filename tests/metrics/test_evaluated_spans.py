@@ -1,9 +1,6 @@
 """Figures leave out the start of a run by default, and say which spans they cover."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,8 @@ from panto_env.metrics.spans import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_
 from panto_env.plant.alignment import Alignment
 from panto_env.studies.en50318 import start
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
+
 USUAL = (FIRST_SETTLED, LAST_USUAL)
 LINE = Alignment.equal(60.0, 20)
 
@@ -77,7 +75,7 @@ def test_choices():
 
 def test_tables_say_which_spans_are_evaluated():
     def shown(*arguments):
-        result = subprocess.run([PANTO, *arguments], capture_output=True, text=True)
+        result = panto(*arguments)
         assert result.returncode == 0, result.stderr
         return result.stdout
 

@@ -7,6 +7,8 @@ from panto_env.backend import kernel
 from panto_env.plant.interpolation import stencil
 from panto_env.plant.trigonometry import cosine_of_turns, sine_of_turns
 
+pytestmark = pytest.mark.plain
+
 
 @kernel
 def sine_and_cosine(turns):

@@ -52,6 +52,18 @@ def test_a_wrong_wheel_makes_a_saw_tooth_and_a_wrong_speed():
     assert abs(np.mean(scales)) < 4 * 0.02 / 60**0.5
 
 
+@pytest.mark.plain
+@pytest.mark.parametrize(("sensors", "told"), [("blind", 0.0), ("realistic", 1.0)])
+def test_blind_sensors_do_not_tell_the_place(sensors, told):
+    """Sine and cosine of the place are zero, and else of a point on the unit circle."""
+    env = gymnasium.make(NAME, sensors=sensors, distance=60.0).unwrapped
+    layout, (seen, _) = env.context.layout, env.reset(seed=0)
+    for _ in range(20):
+        sine, cosine = (layout.read(seen, f"{name} of span position") for name in ("sine", "cosine"))
+        assert sine**2 + cosine**2 == pytest.approx(told, abs=1e-6)
+        seen = env.step(np.zeros(1))[0]
+
+
 def test_a_mast_is_detected_with_an_error_that_lasts_until_the_next():
     span, jitter = span_length(), []
     for position, error, speed in runs("ideal:mast_jitter=0.3", seeds=20, distance=1000.0):

@@ -1,7 +1,5 @@
 """Grid and time step: fine enough by default, and said where they are not."""
 
-import subprocess
-import sys
 import warnings
 
 import pytest
@@ -13,6 +11,8 @@ from panto_env.plant.catenary.flexible.resolution import GRIDS, Resolution, fine
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.numerics import WINDOW, Numerics, Runs
 from panto_env.studies.en50318 import lines
+
+from ..command import panto
 
 LINE = load_catenary("en50318-2002")
 
@@ -86,8 +86,7 @@ def test_a_train_so_slow_that_it_feels_the_nodes_is_told_so():
 
 
 def test_the_command_line_says_it_in_one_line():
-    command = [sys.executable, "-c", "from panto_env.cli import main; main()", "simulate", "--spacing", "0.5"]
-    told = subprocess.run(command, capture_output=True, text=True)
+    told = panto("simulate", "--spacing", "0.5")
     assert told.returncode == 0
     (line,) = (each for each in told.stderr.splitlines() if each.startswith("panto: warning"))
     assert "may be wrong by up to about 5 %" in line

@@ -1,9 +1,6 @@
 """A run that leaves the plant's valid range ends there, under a policy or none, and says so."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +19,7 @@ from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.valid_range import FREE_UPLIFT, Ending
 
-PANTO = Path(sys.executable).with_name("panto")
+from ..command import panto
 
 
 def pressed(force):
@@ -135,10 +132,7 @@ def test_the_command_prints_one_sentence_and_no_figures(tmp_path):
     text = (FOLDERS["pantograph"] / "en50318-2002.toml").read_text().replace("value = 120.0", "value = 700.0")
     mine = tmp_path / "heavy.toml"
     mine.write_text(text)
-    command = [PANTO, "simulate", "--pantograph", mine]
-    table, machine = (
-        subprocess.run([*command, *more], capture_output=True, text=True) for more in ([], ["--json"])
-    )
+    table, machine = (panto("simulate", "--pantograph", mine, *more) for more in ([], ["--json"]))
     assert (table.returncode, machine.returncode) == (1, 1)
     assert table.stdout.startswith("The run ended early at ")
     assert len(table.stdout.splitlines()) == 1

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,9 +15,12 @@ import pytest
 from panto_env.catalog import load_pantograph
 from panto_env.identification import FREQUENCY_SWEEP, add_noise, clean_record, parameters_of, write_record
 
+from ..command import panto as run_panto
 from ..documents import ROOT, check, commands, pages, panto, python, targets
 
 MINUTES = "takes minutes"
+SHELL = "<>|&;$*?`"
+"""What makes a command line one for a shell."""
 
 
 class Rule(NamedTuple):
@@ -25,25 +29,24 @@ class Rule(NamedTuple):
     begins: str  # what the command begins with; of several rules the longest one counts
     why: str
     with_options: str | None = None  # run with these, too; None: parsed, and not run
-    slow: bool = False  # run by `make proofs` alone
 
 
 RULES = (
     Rule("panto benchmark", "all speeds and seeds", "--speed 300 --seeds 1 --workers 1"),
     Rule("panto benchmark passive pd runs", "all seeds", "--seeds 1 --workers 1"),
-    Rule("panto dataset episodes dataset-known-line", "a thousand", "--episodes 1 --workers 1", slow=True),
-    Rule("panto dataset episodes dataset-unknown-lines", "600", "--episodes 1 --workers 1", slow=True),
-    Rule("panto dataset designs", MINUTES, "--count 8 --workers 1", slow=True),
-    Rule("panto dataset verify data", "of what the three before made", "", slow=True),
+    Rule("panto dataset episodes dataset-known-line", "a thousand", "--episodes 1 --workers 1"),
+    Rule("panto dataset episodes dataset-unknown-lines", "600", "--episodes 1 --workers 1"),
+    Rule("panto dataset designs", MINUTES, "--count 8 --workers 1"),
+    Rule("panto dataset verify data", "of what the three before made", ""),
     Rule("panto evaluate", "all speeds", "--speed 300"),
     Rule("panto film", "hundreds of frames", "--seconds 0.1 --size 320 240"),
     Rule("panto film passive runs/demo", "wants an agent of `make demo`, which is run by hand"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
     Rule("panto oracle --stored", "as it stands", ""),
     Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
-    Rule("panto reproduce paper3-parameters", "ten seconds", "", slow=True),
+    Rule("panto reproduce paper3-parameters", "ten seconds", ""),
     Rule("panto speed --json", f"{MINUTES}, and means nothing on a busy machine"),
-    Rule("panto train agent-ppo", MINUTES, "--steps 1000", slow=True),
+    Rule("panto train agent-ppo", MINUTES, "--steps 1000"),
     Rule("panto train agent-clone", "clones a million steps first; tests/agents/test_agents.py clones fewer"),
     Rule("panto train agent-residual", f"{MINUTES}; tests/agents/test_agents.py has a short one"),
     Rule("panto train ppo --output runs/ppo", "what follows needs its model", "--steps 1000"),
@@ -51,12 +54,11 @@ RULES = (
         "panto trainings",
         "six trainings of minutes, or a cluster; tests/cluster/ has short ones",
     ),
-    Rule("panto sweep catenary.mean_stiffness=2000:6000:17", "527 passes", "", slow=True),
+    Rule("panto sweep catenary.mean_stiffness=2000:6000:17", "527 passes", ""),
     Rule(
         "panto tune",
         MINUTES,
         "--speed 300 --seeds 1 --passes 2 --workers 1 --output gains-$$.toml",
-        slow=True,
     ),
 )
 """The only exceptions; whatever has none is run as it stands."""
@@ -72,11 +74,11 @@ BY_HAND = {
     "lint": "part of test",
     "notebook": "two minutes; a slow test runs it, too",
     "nonsense": "any number of lines; proofs run some",
-    "pythons": "wants other versions of Python",
     "ptx": "wants an environment of its own",
     "ray": "wants an environment of its own",
     "rllib": "wants an environment of its own",
     "same": "wants an earlier commit",
+    "mutants": "wants an environment of its own, and some hours",
 }
 """Targets of the Makefile that CI does not run, and why."""
 SHORTENED = {
@@ -119,20 +121,18 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(page, folder, slow):
+def run(page, folder):
     """Run the commands of a page in order."""
-    ran = 0
     for command in commands(page):
         rule = rule_of(command)
         if not (command.whole and command.words[0] == "panto") or (rule and rule.with_options is None):
             continue
-        if rule and rule.slow and not slow:
-            continue
         line = f"{command.text} {rule.with_options}" if rule else command.text
-        done = subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True, check=False)
+        if set(line) & set(SHELL):
+            done = subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True)
+        else:
+            done = run_panto(*shlex.split(line)[1:], cwd=folder)
         assert done.returncode == 0, f"{command.place}\nwas run as {line}\n{done.stdout}{done.stderr}"
-        ran += 1
-    return ran
 
 
 @pytest.mark.parametrize("command", shown(), ids=lambda command: command.place)
@@ -140,17 +140,10 @@ def test_a_command_can_be_given(command):
     check(command)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in pages() if commands(page)])
 def test_commands_of_a_page_run(page, folder):
-    run(page, folder, slow=False)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "page", sorted({each.page for each in shown() if each.whole and (rule := rule_of(each)) and rule.slow})
-)
-def test_long_commands_of_a_page_run_shortened(page, folder):
-    assert run(page, folder, slow=True)
+    run(page, folder)
 
 
 @pytest.mark.parametrize("page", [page for page in pages() if python(page)])

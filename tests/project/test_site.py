@@ -22,6 +22,7 @@ from panto_env.envs import IDS
 from panto_env.envs.settings import EnvironmentSettings
 
 pytest.importorskip("furo", reason="the extra 'docs' is not installed")
+pytestmark = pytest.mark.slow
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {

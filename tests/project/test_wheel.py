@@ -58,6 +58,7 @@ def run(command, **options):
     return subprocess.run(command, capture_output=True, text=True, check=False, **options)
 
 
+@pytest.mark.slow
 def test_every_file_of_the_packages_is_in_it(wheel):
     listed = run(["git", "ls-files", "panto_env", *FOLDERS], cwd=ROOT)
     if listed.returncode != 0:
@@ -70,6 +71,7 @@ def test_every_file_of_the_packages_is_in_it(wheel):
     assert inside == wanted
 
 
+@pytest.mark.slow
 def test_it_works_without_the_checkout(python, tmp_path):
     code = USER.replace("wrong: int", "wrong")
     ran = run([python, "-c", code], cwd=tmp_path)
@@ -79,6 +81,7 @@ def test_it_works_without_the_checkout(python, tmp_path):
     assert str(python.parents[1]) in place
 
 
+@pytest.mark.slow
 def test_its_commands_find_what_they_come_with(python, tmp_path):
     panto = python.parent / "panto"
     wanted = {

@@ -154,7 +154,7 @@ def test_an_uncompensated_mass_is_in_the_loop():
     assert change[0] == pytest.approx(1 + 1.5 * (2j * np.pi * 30) ** 2 / force[0])
 
 
-@pytest.mark.parametrize("name", ["rig", "rig-flexible"])
+@pytest.mark.parametrize("name", ["rig", pytest.param("rig-flexible", marks=pytest.mark.slow)])
 def test_frequency_response_and_simulation_agree_on_the_delay_that_is_borne(name):
     rig = load_catenary(name)
     delay = Loop(rig, PANTOGRAPH, SPEED).margins().delay

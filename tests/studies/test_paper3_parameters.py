@@ -9,6 +9,7 @@ from panto_env.studies import find_study, write
 from panto_env.studies.paper3_parameters.equations import Equations
 from panto_env.studies.paper3_parameters.passes import influences, run_pass
 
+pytestmark = pytest.mark.slow
 PLANT = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
 
 OURS = {

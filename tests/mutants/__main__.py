@@ -1,0 +1,124 @@
+"""Share of generated mutants that the tests notice, room by room: `make mutants SAMPLE=200 SEED=1`.
+
+In a copy of the checkout the tests of a room run once under coverage, which tells the tests that reach a
+statement. A mutant of it is killed if one of these fails or hangs. One that no test reaches survives.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from coverage import CoverageData
+
+from .draw import Mutant, draw
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = {
+    "panto_env": "panto_env",
+    **{f"panto_{name}": name for name in ("agents", "baselines", "configs")},
+}
+LEFT_OUT = shutil.ignore_patterns(".git", ".venv*", "__pycache__", "runs", "build", "_build", ".*_cache")
+
+
+class Workbench:
+    """A copy of the checkout, and how tests run in it."""
+
+    def __init__(self, folder: Path, python: str, room: dict[str, Any]) -> None:
+        self.root, self.python, self.room = folder / "checkout", python, room
+        shutil.copytree(ROOT, self.root, ignore=LEFT_OUT)
+        (folder / "names").mkdir()
+        for name, source in PACKAGES.items():
+            (folder / "names" / name).symlink_to(self.root / source)
+        self.environment = os.environ | {"PYTHONPATH": str(folder / "names"), "PYTHONDONTWRITEBYTECODE": "1"}
+        if room.get("plain"):
+            self.environment["NUMBA_DISABLE_JIT"] = "1"
+        self.marks = "plain and not slow" if room.get("plain") else "not slow"
+        self.data = CoverageData(str(folder / "coverage"))
+
+    def _python(self, *words: str, seconds: float | None = None) -> subprocess.CompletedProcess[str]:
+        call, pipe = [self.python, *words], subprocess.PIPE
+        return subprocess.run(
+            call, cwd=self.root, env=self.environment, stdout=pipe, text=True, timeout=seconds
+        )
+
+    def cover(self) -> None:
+        """Run the room's tests once, and keep which of them reaches which line."""
+        options = self.root.parent / "coveragerc"
+        options.write_text(
+            f"[run]\ndynamic_context = test_function\ndata_file = {self.data.data_filename()}\n"
+        )
+        measured = [
+            "-m",
+            "coverage",
+            "run",
+            f"--rcfile={options}",
+            f"--source={','.join(self.room['sources'])}",
+        ]
+        done = self._python(*measured, "-m", "pytest", "-q", "-m", self.marks, *self.room["tests"])
+        if done.returncode:
+            raise SystemExit(f"The tests fail without any mutant:\n{done.stdout[-2000:]}")
+        self.data.read()
+
+    def tests_of(self, mutant: Mutant) -> list[str]:
+        """The tests that reach a mutant: all of the room where it is reached before any begins."""
+        by_line = self.data.contexts_by_lineno(str(mutant.path))
+        found = {context for line in mutant.lines for context in by_line.get(line, ())}
+        if "" in found:
+            return list(self.room["tests"])
+        parts = [context.split(".") for context in sorted(found)]
+        return [f"{'/'.join(names[:-1])}.py::{names[-1]}" for names in parts]
+
+    def kills(self, mutant: Mutant) -> bool:
+        """Whether one of the tests that reach a mutant fails, or hangs."""
+        if not (tests := self.tests_of(mutant)):
+            return False
+        mutant.path.write_text(mutant.after, encoding="utf-8")
+        try:
+            done = self._python("-m", "pytest", "-q", "-x", "-m", self.marks, *tests, seconds=600)
+            return done.returncode != 0
+        except subprocess.TimeoutExpired:
+            return True
+        finally:
+            mutant.path.write_text(mutant.before, encoding="utf-8")
+
+
+def judge(name: str, room: dict[str, Any], count: int, seed: int, python: str) -> tuple[int, int]:
+    """Print the survivors of a room's mutants; how many were killed, and how many there were."""
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        bench, killed = Workbench(Path(folder), python, room), 0
+        paths = sorted(path for source in room["sources"] for path in (bench.root / source).rglob("*.py"))
+        mutants = draw(paths, count, seed)
+        bench.cover()
+        for mutant in mutants:
+            killed += (dead := bench.kills(mutant))
+            print("killed" if dead else f"survives: {mutant.diff(bench.root)}", flush=True)
+    print(f"{name}: {killed} of {len(mutants)} killed, {killed / max(1, len(mutants)):.0%}", flush=True)
+    return killed, len(mutants)
+
+
+def main() -> None:
+    """Judge all rooms, or those that are named."""
+    rooms = tomllib.loads((Path(__file__).parent / "rooms.toml").read_text())
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rooms", nargs="*", choices=[[], *rooms], metavar="ROOM", help=", ".join(rooms))
+    parser.add_argument("--sample", type=int, default=200, help="mutants in all rooms together")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--python", required=True, help="Python of the environment that the tests run in")
+    given = parser.parse_args()
+    names = given.rooms or list(rooms)
+    counts = [
+        judge(name, rooms[name], given.sample // len(names), given.seed, given.python) for name in names
+    ]
+    killed, drawn = (sum(column) for column in zip(*counts, strict=True))
+    print(f"all: {killed} of {drawn} killed, {killed / drawn:.0%}")
+
+
+if __name__ == "__main__":
+    main()
