@@ -14,6 +14,7 @@ from ..base.arrays import Array
 from ..plant.pantograph.schema import PantographData
 from .estimate import model_of
 from .force import RandomWalk
+from .kalman import corrected, correction
 from .low_pass import CUTOFF, low_pass
 from .model import Model
 from .motion import Motion
@@ -50,8 +51,8 @@ def unknown_input(
     raw = np.empty(len(measured))
     for k, sample in enumerate(measured):
         if gain is None or not settled:
-            gain, corrected = _gain(system, covariance)
-            following = system.transition @ corrected @ system.transition.T + system.process_noise
+            gain, after = _gain(system, covariance)
+            following = system.transition @ after @ system.transition.T + system.process_noise
             settled = bool(np.abs(following - covariance).max() <= SETTLED * np.abs(covariance).max())
             covariance = following
         innovation = sample - system.observed @ state
@@ -90,13 +91,9 @@ def _system(model: Model) -> _System:
 def _gain(system: _System, covariance: Array) -> tuple[_Gain, Array]:
     """Gains for a sample, and covariance of the corrected state, for that of the predicted one, (N, N)."""
     observed, contact = system.observed, system.contact
-    seen = observed @ covariance
-    innovation = seen @ observed.T + system.measurement_noise
-    known = np.linalg.solve(innovation, seen).T
+    known, innovation = correction(covariance, observed, system.measurement_noise)
     through = observed @ contact
     weight = np.linalg.solve(innovation, through)
     force = weight / (through @ weight)
     gain = known + np.outer(contact - known @ through, force)
-    after = np.eye(len(covariance)) - gain @ observed
-    corrected = after @ covariance @ after.T + gain @ system.measurement_noise @ gain.T
-    return _Gain(gain, force), corrected
+    return _Gain(gain, force), corrected(covariance, gain, observed, system.measurement_noise)
