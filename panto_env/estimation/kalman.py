@@ -59,12 +59,18 @@ def steady_covariance(
     try:
         with one_thread():
             found = solve_discrete_are(transition.T, observed.T, process_noise, measurement_noise)
+            covariance = np.asarray((found + found.T) / 2)
+            gain, _ = correction(covariance, observed, measurement_noise)
+            kept = transition @ (np.eye(len(transition)) - gain @ observed)
+            # SciPy may find a solution that rounding alone has made: of a part that nothing shows.
+            if not np.abs(np.linalg.eigvals(kept)).max() < 1 - SETTLED:
+                raise np.linalg.LinAlgError("a part of the state is never forgotten")
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
             "The Kalman filter has no steady gain for these intensities of noise, or they are too far apart "
             f"to be computed with ({error}); take others, or an estimator's time-varying gain."
         ) from error
-    return np.asarray((found + found.T) / 2)
+    return covariance
 
 
 def steady_gain(transition: Array, observed: Array, process_noise: Array, measurement_noise: Array) -> Array:
