@@ -12,7 +12,7 @@ from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import RunSettings, far_enough
-from panto_env.metrics.low_pass import low_pass_sections
+from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.spans import chosen_spans
 from panto_env.plant.state import Row
 
@@ -71,7 +71,7 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
         task.step(np.nan_to_num(np.clip(actions, -1, 1)), ended if ended.any() else None)
         early |= results.terminated
         ended |= results.terminated | results.truncated
-    values = _low_passed(task, settings)
+    values = _low_passed(task)
     values[early] = np.nan
     values = values.reshape(len(laws), len(seeds), -1)
     values[list(unable)] = np.nan
@@ -91,17 +91,12 @@ def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
     return set(unable)
 
 
-def _low_passed(task: Task, settings: RunSettings) -> Array:
+def _low_passed(task: Task) -> Array:
     """Low-passed contact force over the evaluated spans, (lanes, samples), (N)."""
-    from scipy.signal import sosfilt
-
     time_step, alignment = task.plant.time_step, task.plant.alignment
     force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
-    sections, settled = low_pass_sections(time_step)
-    start = settled[:, None, :] * force[None, :, :1]
-    filtered, _ = sosfilt(sections, force, axis=1, zi=start)
     position = (np.arange(force.shape[1]) + 0.5) * time_step * float(task.speed[0])
     spans = chosen_spans(None, task.length.distance, alignment)
     assert spans is not None  # of a choice that is not "all"
-    inside = filtered[:, alignment.within(position, spans)]
+    inside = low_pass(force, time_step)[:, alignment.within(position, spans)]
     return np.asarray(inside[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

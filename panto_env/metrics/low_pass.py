@@ -15,7 +15,7 @@ from ..base.errors import InputError
 CUTOFF, ORDER = 20.0, 6
 """Hz, and the filter's order."""
 MIRRORED = 1.0
-"""Time (s) of the record that is mirrored about each end, where ``low_pass_in_place`` looks beyond it."""
+"""Time (s) of the record that is mirrored about each end, where ``zero_phase_low_pass`` looks beyond it."""
 
 
 @cache
@@ -44,18 +44,33 @@ def low_pass_sections(time_step: float) -> tuple[Array, Array]:
 
 
 def low_pass(force: Array, time_step: float) -> Array:
-    """Contact force (N) as EN 50317 looks at it: low-passed causally, settled at its first value.
+    """Contact force (N), (..., n), as EN 50317 looks at it: low-passed causally, settled at its first value.
 
     Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
     """
+    return low_pass_from(settled_at(force[..., 0], time_step), force, time_step)[0]
+
+
+def settled_at(force: Array, time_step: float) -> Array:
+    """State, (3, ..., 2), of the causal filter after a force (N), (...), that has always been the same."""
+    _, settled = low_pass_sections(time_step)
+    return np.moveaxis(np.multiply.outer(settled, force), 1, -1)
+
+
+def low_pass_from(state: Array, force: Array, time_step: float) -> tuple[Array, Array]:
+    """Force (N), (..., n), low-passed causally from a state of the filter, and the state after it.
+
+    Both states are (3, ..., 2). Raises InputError where the samples, ``time_step`` (s) apart, are too far
+    apart.
+    """
     from scipy.signal import sosfilt  # slow to import
 
-    sections, settled = low_pass_sections(time_step)
-    filtered, _ = sosfilt(sections, force, zi=settled * force[0])
-    return np.asarray(filtered)
+    sections, _ = low_pass_sections(time_step)
+    filtered, after = sosfilt(sections, force, zi=state)
+    return np.asarray(filtered), np.asarray(after)
 
 
-def low_pass_in_place(force: Array, time_step: float) -> Array:
+def zero_phase_low_pass(force: Array, time_step: float) -> Array:
     """Contact force (N) with the same attenuation, but not delayed: for pictures along a line.
 
     Its σ is that of ``low_pass``; single peaks differ, because a filter that delays also shifts phases.
