@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData
 from .estimate import model_of
 from .force import RandomWalk
+from .inertia import CUTOFF, ORDER
 from .kalman import corrected, correction
-from .low_pass import CUTOFF, low_pass
 from .model import Model
 from .motion import Motion
 from .plausibility import check_motion
@@ -59,7 +60,7 @@ def unknown_input(
         raw[k] = gain.force @ innovation
         state = system.transition @ (state + gain.state @ innovation) + known[k]
     raw[0] = motion.lift  # of the step before the first sample nothing is known
-    return raw if cutoff is None else low_pass(raw, cutoff, motion.time_step)
+    return raw if cutoff is None else low_pass(raw, motion.time_step, cutoff, ORDER)
 
 
 class _System(NamedTuple):
