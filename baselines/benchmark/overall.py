@@ -12,7 +12,7 @@ from .single_pass import Row
 from .statistics import (
     Array,
     Cell,
-    Place,
+    LineAtSpeed,
     bootstrap_interval,
     interquartile_mean,
     relative_changes,
@@ -40,7 +40,7 @@ class Standing:
 
 def standings(rows: Sequence[Row], cells: Sequence[Cell]) -> tuple[Standing, ...]:
     """Policies that run in every cell, in the order of the rows; ranked where they qualify in every cell."""
-    changes: dict[str, dict[Place, Array]] = {}
+    changes: dict[str, dict[LineAtSpeed, Array]] = {}
     for cell in cells:
         own = [row for row in rows if _place(row) == _place(cell) and row.policy == cell.policy]
         changes.setdefault(cell.policy, {})[_place(cell)] = relative_changes(own)
@@ -53,11 +53,13 @@ def standings(rows: Sequence[Row], cells: Sequence[Cell]) -> tuple[Standing, ...
     )
 
 
-def _place(one: Row | Cell) -> Place:
-    return one.catenary, one.pantograph, one.speed_kmh
+def _place(one: Row | Cell) -> LineAtSpeed:
+    return LineAtSpeed(one.catenary, one.pantograph, one.speed_kmh)
 
 
-def _standing(policy: str, changes: Mapping[str, Mapping[Place, Array]], cells: Sequence[Cell]) -> Standing:
+def _standing(
+    policy: str, changes: Mapping[str, Mapping[LineAtSpeed, Array]], cells: Sequence[Cell]
+) -> Standing:
     own = [cell for cell in cells if cell.policy == policy]
     by_place = changes[policy]
     every = np.concatenate(list(by_place.values()))

@@ -11,7 +11,7 @@ from panto_env.base.colours import LIMIT, series_colour
 from panto_env.base.units import from_kmh
 from panto_env.metrics import en50367
 from panto_env.metrics.labels import LABELS
-from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.metrics.spans import in_words
 
 from .run import Benchmark
@@ -65,7 +65,7 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
     for policy, colour in colours.items():
         run, _ = drive(settings, line, policy, speed, seed)
         inside = run.alignment.within(run.position, shown)
-        force = low_pass_in_place(run.contact_force, run.time_step)[inside]
+        force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
     limit = en50367.maximum_limit(from_kmh(speed))

@@ -25,7 +25,7 @@ from .controls import policy_of
 from .overall import Standing, standings
 from .settings import BenchmarkSettings, Line
 from .single_pass import Row, along, run_pass
-from .statistics import Cell, Place, compare
+from .statistics import Cell, LineAtSpeed, compare
 from .trace import Trace
 
 SUFFIXES = (".json", *TABLES)
@@ -106,14 +106,14 @@ def run(
     return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
 
 
-def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[Place, float]:
+def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:
     """Change of sigma (%) of the stored oracles of exactly these cells, as far as there are any."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
             ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, covered)
             if ratio is not None:
-                found[line.catenary, line.pantograph, speed] = 100 * (ratio - 1)
+                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = 100 * (ratio - 1)
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,12 @@ MOVED = 0.015
 """Share by which a policy may move the mean force from that of its own passive run."""
 
 
-Place = tuple[str, str, float]
-"""Line, pantograph and speed (km/h) of a cell."""
+class LineAtSpeed(NamedTuple):
+    """A line, the pantograph on it, and its speed (km/h)."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
 
 
 @dataclass(frozen=True)
@@ -93,14 +98,16 @@ def mean_range(passive: float) -> tuple[float, float]:
     return passive * (1 - MOVED), passive * (1 + MOVED)
 
 
-def compare(rows: Sequence[Row], oracles: Mapping[Place, float] = MappingProxyType({})) -> tuple[Cell, ...]:
+def compare(
+    rows: Sequence[Row], oracles: Mapping[LineAtSpeed, float] = MappingProxyType({})
+) -> tuple[Cell, ...]:
     """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference.
 
     oracles: change of sigma (%) of stored oracles, where there are any.
     """
-    groups: dict[Place, dict[str, list[Row]]] = {}
+    groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
-        group = groups.setdefault((row.catenary, row.pantograph, row.speed_kmh), {})
+        group = groups.setdefault(LineAtSpeed(row.catenary, row.pantograph, row.speed_kmh), {})
         group.setdefault(row.policy, []).append(row)
     return tuple(
         cell

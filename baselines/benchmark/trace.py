@@ -8,7 +8,7 @@ import numpy as np
 
 from panto_env import Trajectory
 from panto_env.base.arrays import Array
-from panto_env.metrics.low_pass import CUTOFF, low_pass_in_place
+from panto_env.metrics.low_pass import CUTOFF, zero_phase_low_pass
 from panto_env.metrics.spectrum import amplitudes
 from panto_env.plant.alignment import Spans
 
@@ -44,7 +44,7 @@ def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
     begin, end = run.alignment.limits((max(first, last - 1), last))
     stride = min(STRIDE, run.speed / (PER_PERIOD * CUTOFF))
     position = np.linspace(begin, end, round((end - begin) / stride) + 1)
-    force = low_pass_in_place(run.contact_force, run.time_step)
+    force = zero_phase_low_pass(run.contact_force, run.time_step)
     frequency, amplitude = amplitudes(run.contact_force[run.inside(spans)], run.time_step)
     shown = frequency <= CUTOFF
     return Trace(

@@ -28,7 +28,7 @@ _Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*[a-z0-9]$")]
 _Speed = Annotated[float, Between(1, 600, "km/h")]
 
 
-class Place(Settings):
+class EpisodePlace(Settings):
     """A pantograph on a line, and the speeds that episodes draw from."""
 
     catenary: str = Field(description=description("catenary"))
@@ -85,14 +85,14 @@ class EpisodesSettings(Settings):
     environment: dict[str, Any] = Field(
         default_factory=dict, description=f"arguments of {ENVIRONMENT} that differ from its own"
     )
-    places: tuple[Place, ...] = Field(min_length=1, description="lines, with pantograph and speeds")
+    places: tuple[EpisodePlace, ...] = Field(min_length=1, description="lines, with pantograph and speeds")
     sets: tuple[PolicySet, ...] = Field(min_length=1, description="data sets")
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
         _checked_distinct(tuple(each.name for each in self.sets))
         _checked_distinct(tuple((each.catenary, each.pantograph) for each in self.places))
-        of_a_place = next((key for key in Place.model_fields if key in self.environment), None)
+        of_a_place = next((key for key in EpisodePlace.model_fields if key in self.environment), None)
         if of_a_place is not None:
             raise ValueError(f"{of_a_place} belongs into places, not into environment")
         most = max(self.count(each) for each in self.sets)

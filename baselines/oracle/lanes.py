@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from panto_env.analysis.pool import in_threads, workers_for
 from panto_env.base.arrays import Array
 from panto_env.control import Task
-from panto_env.control.cost import check_record
+from panto_env.control.cost import arrays_of, check_record
 from panto_env.control.mean_force import Trim
 from panto_env.control.settings import RunSettings
 from panto_env.plant.state import SAMPLE_ROWS, Place, Row, Samples
@@ -93,7 +92,7 @@ class _Group:
             self._first, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0)))
         )
         moving = self._plant.model.wire, self._plant.actuators, self._plant.run
-        self._moving = list(_arrays(moving))
+        self._moving = list(arrays_of(moving))
         self._start = [(array, array.copy()) for array in self._moving]
 
     def run(self, commands: Array) -> Array:
@@ -154,12 +153,3 @@ Saved = list[tuple[Any, Any]]
 def _restore(saved: Saved) -> None:
     for array, content in saved:
         np.copyto(array, content)
-
-
-def _arrays(value: Any) -> Iterator[Any]:
-    """All arrays of named tuples, at any depth."""
-    if isinstance(value, np.ndarray):
-        yield value
-    elif isinstance(value, tuple):
-        for each in value:
-            yield from _arrays(each)

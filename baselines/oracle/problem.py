@@ -13,7 +13,7 @@ from panto_env.base.errors import InputError
 from panto_env.control import passive_mean, trim_of_pass
 from panto_env.control.extent import whole_steps
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.low_pass import low_pass_sections
+from panto_env.metrics.low_pass import low_pass_from, settled_at
 from panto_env.metrics.spans import SpanChoice
 
 from ..benchmark.controls import Tape
@@ -61,7 +61,9 @@ class Problem:
         before = passive.contact_force[: self.begin * self.steps]
         self.every = max(1, round(RESOLUTION / passive.time_step))
         """Evaluated samples from one row of the least squares to the next."""
-        self._filter_state = _state_after(before, passive.contact_force[0], passive.time_step)
+        settled = settled_at(passive.contact_force[0], passive.time_step)
+        self._filter_state = low_pass_from(settled, before, passive.time_step)[1] if len(before) else settled
+        """Of EN 50317's filter, (sections, 2), where the first knot begins."""
         trim = trim_of_pass(settings, seed, spans, passive_mean)
         self.knots = Knots(settings.actuator, passive.time_step, self.steps)
         self._true = Stretch(settings, trim, seed, self.begin, self.count)
@@ -79,14 +81,12 @@ class Problem:
         Rows are evaluated samples ``RESOLUTION`` apart. By a push of ``PUSH`` on each knot of (count, places)
         in the true plant, followed for ``MEMORY``, of an actuator without limits of force and rate.
         """
-        from scipy.signal import sosfilt  # slow to import
-
         push = self.knots.free_commands(np.array([[PUSH], [0.0]]))[:, 0]
         followed = max(1, round(MEMORY / self.interval))
         changes = self._free.changes(self.knots.free_commands(knots), push, followed)
-        sections, _ = low_pass_sections(self.passive.time_step)
-        filtered = sosfilt(sections, changes, axis=2)[:, :, self.rows] / PUSH
-        return np.asarray(filtered.reshape(-1, len(self.rows)).T)
+        state = settled_at(np.zeros(changes.shape[:2]), self.passive.time_step)
+        filtered = low_pass_from(state, changes, self.passive.time_step)[0][:, :, self.rows] / PUSH
+        return filtered.reshape(-1, len(self.rows)).T
 
     def response_along(self, knots: Array, basis: Array) -> Array:
         """The same for combinations of knots, (rows, directions).
@@ -118,17 +118,6 @@ class Problem:
         )
 
     def _filtered(self, force: Array) -> Array:
-        from scipy.signal import sosfilt  # slow to import
-
-        sections, _ = low_pass_sections(self.passive.time_step)
+        """Force (N), (runs, samples), from the first knot on, low-passed as EN 50317 says."""
         state = np.repeat(self._filter_state[:, None], len(force), axis=1)
-        return np.asarray(sosfilt(sections, force, axis=1, zi=state)[0])
-
-
-def _state_after(force: Array, first: float, time_step: float) -> Array:
-    """State of EN 50317's filter, (sections, 2), after a force (N), settled at its first value."""
-    from scipy.signal import sosfilt  # slow to import
-
-    sections, settled = low_pass_sections(time_step)
-    state = settled * first
-    return np.asarray(sosfilt(sections, force, zi=state)[1]) if len(force) else state
+        return low_pass_from(state, force, self.passive.time_step)[0]

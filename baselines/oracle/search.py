@@ -12,7 +12,7 @@ from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.base.shown import shown
 from panto_env.metrics.figures import Figures
-from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.metrics.low_pass import zero_phase_low_pass
 
 from .problem import Problem
 from .solver import Descent, Progress, descend
@@ -92,8 +92,8 @@ def find(
         )
     passive = problem.passive
     forces = (
-        low_pass_in_place(passive.contact_force, passive.time_step),
-        low_pass_in_place(run.contact_force, run.time_step),
+        zero_phase_low_pass(passive.contact_force, passive.time_step),
+        zero_phase_low_pass(run.contact_force, run.time_step),
     )
     return Oracle(problem, tuple(searches), commands, run, figures, forces)
 

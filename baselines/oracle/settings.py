@@ -30,7 +30,7 @@ def _condition(value: Any) -> LineCondition:
     return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
 
 
-class Cell(Settings):
+class OracleCell(Settings):
     """A pantograph with an actuator on a line, and the speeds to run at."""
 
     catenary: str = Field(default("catenary"), description=description("catenary"))
@@ -44,7 +44,9 @@ class Cell(Settings):
 class OracleSettings(Settings):
     """Cells, and what is the same in all of them."""
 
-    cells: tuple[Cell, ...] = Field((Cell(),), min_length=1, description="lines, actuators and speeds")
+    cells: tuple[OracleCell, ...] = Field(
+        (OracleCell(),), min_length=1, description="lines, actuators and speeds"
+    )
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
     spans: tuple[_Span, _Span] | None = Field(
         None, description="first and last span over which σ is least; by default those after the start"
@@ -69,7 +71,7 @@ class OracleSettings(Settings):
             for speed in cell.speeds_kmh:
                 yield self.given(cell, speed)
 
-    def given(self, cell: Cell, speed_kmh: float) -> dict[str, Any]:
+    def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
         """Settings of the run of a cell at a speed (km/h), by name."""
         return {
             "catenary": cell.catenary,

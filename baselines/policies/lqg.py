@@ -6,6 +6,7 @@ import numpy as np
 
 from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
+from panto_env.estimation.kalman import steady_gain
 
 from .gains import Source
 from .lanes_law import Array, FromAverage, Observations, TunableLaw
@@ -19,6 +20,8 @@ HEIGHT = 1e-3
 """m: unit of the noise that drives heights."""
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
 """Of ``OUTPUTS``, rms: the model's own error is most of it, so that force is trusted first (N, m, m/s)."""
+ROUNDING = 1e-14
+"""Variance added to each state's noise, without which the Riccati equation is too badly conditioned."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
 HELD = 0.7
@@ -60,11 +63,11 @@ class LinearQuadraticGaussian(TunableLaw):
         self.feedback = regulator(self.model.a, self.model.b, self.model.c[0], effort, HELD)
         known = len(self.model.a) - 1  # all states but the command's integral
         self.filter = np.zeros((known + 1, len(OUTPUTS)))
-        self.filter[:known] = kalman(
+        self.filter[:known] = steady_gain(
             self.model.a[:known, :known],
             self.model.c[:, :known],
-            self.model.noise[:known],
-            np.square(READING_NOISE) * [1.0, *[motion**2] * 4],
+            np.diag(self.model.noise[:known] + ROUNDING),
+            np.diag(np.square(READING_NOISE) * [1.0, *[motion**2] * 4]),
         )
         self._state = np.zeros((len(self.model.a), lanes))
         self._from_average = FromAverage(context.control_interval, AVERAGED)
@@ -155,13 +158,3 @@ def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> A
         p = solve_discrete_are(a, b[:, None], cost, np.array([[effort]]))
         gains: Array = (b @ p @ a) / (effort + b @ p @ b)
     return gains
-
-
-def kalman(a: Array, c: Array, noise: Array, readings: Array) -> Array:
-    """Gain, (states, readings), that corrects a prediction; variances of the states' noise and readings'."""
-    from scipy.linalg import solve_discrete_are
-
-    with one_thread():
-        p = solve_discrete_are(a.T, c.T, np.diag(noise) + 1e-14 * np.eye(len(a)), np.diag(readings))
-        gain: Array = np.linalg.solve(c @ p @ c.T + np.diag(readings), c @ p).T
-    return gain

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
@@ -20,6 +20,8 @@ from pydantic import (
 from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 
+from ..benchmark.statistics import LineAtSpeed
+
 Number = Annotated[
     float,
     BeforeValidator(lambda value: nan if value is None else value),
@@ -30,21 +32,13 @@ Series = Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
 Interval = tuple[FiniteFloat, FiniteFloat] | None
 
 
-class Place(NamedTuple):
-    """A line, the pantograph on it, and its speed (km/h)."""
-
-    catenary: str
-    pantograph: str
-    speed_kmh: float
-
-
-class Part(BaseModel):
+class ResultTable(BaseModel):
     """A table of the file, whose other keys a page has no use for."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-class AtPlace(Part):
+class AtPlace(ResultTable):
     """What belongs to one policy on one line at one speed."""
 
     policy: str
@@ -53,12 +47,12 @@ class AtPlace(Part):
     speed_kmh: FiniteFloat
 
     @property
-    def place(self) -> Place:
+    def place(self) -> LineAtSpeed:
         """Where it belongs."""
-        return Place(self.catenary, self.pantograph, self.speed_kmh)
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
 
 
-class Cell(AtPlace):
+class StoredCell(AtPlace):
     """As ``benchmark.statistics.Cell``."""
 
     seeds: int
@@ -91,7 +85,7 @@ class Trace(AtPlace):
         return self
 
 
-class Standing(Part):
+class StoredStanding(ResultTable):
     """As ``benchmark.overall.Standing``."""
 
     policy: str
@@ -109,14 +103,14 @@ class Standing(Part):
     oracle_share: float | None = None
 
 
-class Result(Part):
+class Result(ResultTable):
     """One track: everything that a page shows of it."""
 
     version: str
     settings: dict[str, Any]
     spans: tuple[tuple[int, int], ...]
-    standings: tuple[Standing, ...]
-    cells: tuple[Cell, ...]
+    standings: tuple[StoredStanding, ...]
+    cells: tuple[StoredCell, ...]
     traces: tuple[Trace, ...]
 
     @property
@@ -130,7 +124,7 @@ class Result(Part):
         return list(dict.fromkeys(cell.policy for cell in self.cells))
 
     @property
-    def places(self) -> list[Place]:
+    def places(self) -> list[LineAtSpeed]:
         """Lines and speeds, in the order of the settings."""
         return list(dict.fromkeys(cell.place for cell in self.cells))
 

@@ -6,7 +6,8 @@ from math import isnan
 
 from panto_env.base.table import Table
 
-from .result import Cell, Place, Result
+from ..benchmark.statistics import LineAtSpeed
+from .result import Result, StoredCell
 
 
 def summary(result: Result) -> Table:
@@ -38,11 +39,11 @@ def summary(result: Result) -> Table:
     return Table(f"{result.title}: Δσ (%), {seeds} seeds", headings, tuple(rows))
 
 
-def _heading(place: Place, several_lines: bool) -> str:
+def _heading(place: LineAtSpeed, several_lines: bool) -> str:
     return f"{place.catenary}, {place.speed_kmh:g}" if several_lines else f"{place.speed_kmh:g} km/h"
 
 
-def _text(cell: Cell) -> str:
+def _text(cell: StoredCell) -> str:
     if isnan(cell.change):
         return "ended early"
     if cell.disqualified:
@@ -50,7 +51,7 @@ def _text(cell: Cell) -> str:
     return f"{cell.change:.1f}{' *' if cell.rank == 1 else ''}"
 
 
-def _oracle(result: Result, place: Place) -> str:
+def _oracle(result: Result, place: LineAtSpeed) -> str:
     """Change of sigma (%) of the oracle that is stored for a place, or ""."""
     for cell in result.cells:
         if cell.place == place and cell.oracle_share:

@@ -12,13 +12,13 @@ from panto_env.terminal import number
 
 from ..benchmark.report import FIGURES, OWN_LABELS
 from .charts import Scale
-from .result import Cell, Result, Standing
+from .result import Result, StoredCell, StoredStanding
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
 FAR_OFF = 25.0
 """Change of σ (%) from which on a disqualified policy is left out of pictures' and colours' scales."""
-R = TypeVar("R", Standing, Cell)
+R = TypeVar("R", StoredStanding, StoredCell)
 
 
 class Bar(NamedTuple):
@@ -70,7 +70,7 @@ def leaderboard(result: Result) -> Table:
         policy: max(_of(result, policy), key=lambda cell: _size(cell.mean_change))
         for policy in result.policies
     }
-    columns: list[Column[Standing]] = [
+    columns: list[Column[StoredStanding]] = [
         *_first_columns(result.standings),
         Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
@@ -82,9 +82,9 @@ def leaderboard(result: Result) -> Table:
     return _table("All lines, speeds and seeds", columns, result.standings)
 
 
-def table_of_cells(cells: Sequence[Cell], caption: str) -> Table:
+def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
     """All policies on one line at one speed."""
-    columns: list[Column[Cell]] = [
+    columns: list[Column[StoredCell]] = [
         *_first_columns(cells),
         Column("passes improved", lambda one: _share(one.improved)),
         Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
@@ -120,7 +120,7 @@ def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Tab
     )
 
 
-def _of(result: Result, policy: str) -> list[Cell]:
+def _of(result: Result, policy: str) -> list[StoredCell]:
     return [cell for cell in result.cells if cell.policy == policy]
 
 
@@ -128,7 +128,7 @@ def _size(value: float) -> float:
     return abs(value) if isfinite(value) else 0.0
 
 
-def _of_figure(name: str, decimals: int) -> Column[Cell]:
+def _of_figure(name: str, decimals: int) -> Column[StoredCell]:
     label = (LABELS | OWN_LABELS)[name]
     return Column(
         label.short_heading.removesuffix(" (-)"),
@@ -162,7 +162,7 @@ def _key(value: float) -> str:
     return f"{value:.9g}" if isfinite(value) else ""
 
 
-def _change(one: Standing | Cell, scale: Scale) -> Entry:
+def _change(one: StoredStanding | StoredCell, scale: Scale) -> Entry:
     if not isfinite(one.change):
         return Entry("–")
     low, high = one.interval or (one.change, one.change)
@@ -172,7 +172,7 @@ def _change(one: Standing | Cell, scale: Scale) -> Entry:
     return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
-def _scale(rows: Sequence[Standing | Cell]) -> Scale:
+def _scale(rows: Sequence[StoredStanding | StoredCell]) -> Scale:
     """Of the pictures of intervals: no policy that is far off flattens those that qualify."""
     ends = [
         end

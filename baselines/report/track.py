@@ -8,9 +8,10 @@ from itertools import groupby
 from math import isfinite, nan
 
 from ..benchmark.settings import REFERENCE
+from ..benchmark.statistics import LineAtSpeed
 from .charts import Chart, Line, Point, curves, dots
 from .descriptions import what_is
-from .result import Cell, Place, Result, Trace
+from .result import Result, StoredCell, Trace
 from .tables import FAR_OFF, Table, leaderboard, signed, table_of_cells
 from .toml import as_toml
 
@@ -41,7 +42,7 @@ class Shade:
 class Section:
     """One line at one speed."""
 
-    place: Place
+    place: LineAtSpeed
     title: str
     table: Table
     charts: list[Chart]
@@ -54,8 +55,8 @@ class About:
     name: str
     text: str
     rank: int | None
-    worst: Cell
-    disqualified: list[Cell]
+    worst: StoredCell
+    disqualified: list[StoredCell]
     everywhere: bool
 
 
@@ -68,7 +69,7 @@ class Track:
     numbers: dict[str, int]  # of policies, for their colours
     shown_first: set[str]  # policies whose traces are shown to begin with
     leaderboard: Table
-    lines: list[tuple[Place, int]]  # the first place of each line, and at how many speeds it is run
+    lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
     heat: dict[str, list[Shade | None]]  # by policy, over all places
     pairs: dict[str, list[Shade | None]]  # by policy, over all others
     overview: Chart | None
@@ -113,7 +114,7 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     }
 
 
-def _shade(cell: Cell | None, largest: float) -> Shade | None:
+def _shade(cell: StoredCell | None, largest: float) -> Shade | None:
     if cell is None:
         return None
     strength = cell.change / largest if isfinite(cell.change) else 0.0
@@ -131,7 +132,7 @@ def _pairs(result: Result) -> dict[str, list[Shade | None]]:
     return table
 
 
-def _section(result: Result, place: Place) -> Section:
+def _section(result: Result, place: LineAtSpeed) -> Section:
     cells = [cell for cell in result.cells if cell.place == place]
     title = f"{place.pantograph} on {place.catenary} at {place.speed_kmh:g} km/h"
     first, last = result.spans[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]

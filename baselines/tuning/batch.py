@@ -12,7 +12,7 @@ from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import RunSettings, far_enough
-from panto_env.metrics.low_pass import low_pass_sections
+from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.spans import chosen_spans
 from panto_env.plant.state import Row
 
@@ -71,7 +71,7 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
         task.step(np.nan_to_num(np.clip(actions, -1, 1)), ended if ended.any() else None)
         early |= results.terminated
         ended |= results.terminated | results.truncated
-    values = _low_passed(task, settings)
+    values = _low_passed(task)
     values[early] = np.nan
     values = values.reshape(len(laws), len(seeds), -1)
     values[list(unable)] = np.nan
@@ -91,24 +91,19 @@ def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
     return set(unable)
 
 
-def _low_passed(task: Task, settings: RunSettings) -> Array:
+def _low_passed(task: Task) -> Array:
     """Low-passed contact force over the evaluated spans, (lanes, samples), (N).
 
     Each lane's samples are those in which its own train is inside. Where speeds drift, trains stay there
     for different times: of each as many samples are taken as the fastest has, evenly in time.
     """
-    from scipy.signal import sosfilt
-
     time_step, alignment = task.plant.time_step, task.plant.alignment
     force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
-    sections, settled = low_pass_sections(time_step)
-    start = settled[:, None, :] * force[None, :, :1]
-    filtered, _ = sosfilt(sections, force, axis=1, zi=start)
     middle = np.arange(force.shape[1]) + 0.5
     spans = chosen_spans(None, task.length.distance, alignment)
     assert spans is not None  # of a choice that is not "all"
     inside = [alignment.within(task.plant.position(lane, middle), spans) for lane in range(task.lanes)]
     count = min(int(own.sum()) for own in inside)
-    chosen = [own[where] for own, where in zip(filtered, inside, strict=True)]
+    chosen = [own[where] for own, where in zip(low_pass(force, time_step), inside, strict=True)]
     kept = np.array([own[np.rint(np.linspace(0, len(own) - 1, count)).astype(int)] for own in chosen])
     return np.asarray(kept[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])

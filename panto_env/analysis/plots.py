@@ -14,7 +14,7 @@ from ..base.colours import BLUE, GREEN, LIMIT, PURPLE, VERMILION
 from ..base.files import PICTURES, check_output, write_whole
 from ..base.legend import legend_above
 from ..metrics import en50367
-from ..metrics.low_pass import low_pass_in_place
+from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
@@ -122,7 +122,7 @@ def say_what_is_hidden(axis: Axes) -> None:
 def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str) -> None:
     """The contact force and its limits, where shown, (n,); raw: the colour of what is not filtered."""
     position = run.position[shown]
-    filtered = low_pass_in_place(run.contact_force, run.time_step)[shown]
+    filtered = zero_phase_low_pass(run.contact_force, run.time_step)[shown]
     limit = en50367.maximum_limit(run.speed)
     words = f"EN 50367: at most {limit:g} N"
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")

@@ -16,7 +16,7 @@ from ..estimation.motion import Motion, measure
 from ..estimation.plausibility import check_motion
 from ..estimation.settings import EstimatorSettings
 from ..estimation.smoother import smooth_force
-from ..metrics.low_pass import low_pass_in_place
+from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 
@@ -78,7 +78,7 @@ def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | Non
     model = model_of(motion, known, ESTIMATOR)
     filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
     force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
-    return low_pass_in_place(np.interp(run.time, motion.time, force), run.time_step)
+    return zero_phase_low_pass(np.interp(run.time, motion.time, force), run.time_step)
 
 
 def _as_recorded(run: Trajectory) -> Motion:

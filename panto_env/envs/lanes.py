@@ -31,7 +31,7 @@ class Answer(NamedTuple):
         return Answer(self.results._replace(values=values), speed_kmh, lanes.copy())
 
 
-class Lanes:
+class VectorLanes:
     """All lanes, and the tasks that they run: most often the same one."""
 
     def __init__(self, usual: Task) -> None:

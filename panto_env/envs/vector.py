@@ -23,7 +23,7 @@ from ..control.observation import BOUND
 from ..control.settings import read_settings
 from .episodes import task_with_options, with_longest_episode
 from .infos import REWARD, lane_figures, lane_infos
-from .lanes import Answer, Lanes
+from .lanes import Answer, VectorLanes
 from .one_thread import InUse, one_at_a_time
 from .settings import VectorSettings, render_metadata
 from .stable_baselines import NamedToStableBaselines
@@ -79,7 +79,7 @@ class PantographVectorEnv(
         self._shape = (self.num_envs, *self.single_action_space.shape)
         self._spec: EnvSpec | None = None
         self._limit = settings.max_episode_steps
-        self._lanes = Lanes(self.task)
+        self._lanes = VectorLanes(self.task)
         self._random: dict[int, np.random.Generator] = {}  # by lane, made when first asked for
         self._seeds: dict[int, int | None] = {}  # what each is, or will be, seeded with; None: anything
         self._running = False

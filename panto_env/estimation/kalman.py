@@ -47,8 +47,10 @@ class Filtered:
     gains: Gains
 
 
-def steady_covariance(model: Model) -> Array:
-    """Covariance of the predicted state, (N, N), that a filter of endless records settles at.
+def steady_covariance(
+    transition: Array, observed: Array, process_noise: Array, measurement_noise: Array
+) -> Array:
+    """Covariance of the predicted state, (N, N), that a Kalman filter settles at; arguments as in ``Model``.
 
     Raises InputError where there is none, as when a part of the state can neither be seen nor fades away.
     """
@@ -56,25 +58,33 @@ def steady_covariance(model: Model) -> Array:
 
     try:
         with one_thread():
-            found = solve_discrete_are(
-                model.transition.T, model.observed.T, model.process_noise, model.measurement_noise
-            )
+            found = solve_discrete_are(transition.T, observed.T, process_noise, measurement_noise)
+            covariance = np.asarray((found + found.T) / 2)
+            gain, _ = correction(covariance, observed, measurement_noise)
+            kept = transition @ (np.eye(len(transition)) - gain @ observed)
+            # SciPy may find a solution that rounding alone has made: of a part that nothing shows.
+            if not np.abs(np.linalg.eigvals(kept)).max() < 1 - SETTLED:
+                raise np.linalg.LinAlgError("a part of the state is never forgotten")
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
-            "The filter has no steady gain for these intensities of noise, or they are too far apart to be "
-            f"computed with ({error}); take others, or the time-varying gain."
+            "The Kalman filter has no steady gain for these intensities of noise, or they are too far apart "
+            f"to be computed with ({error}); take others, or an estimator's time-varying gain."
         ) from error
-    return np.asarray((found + found.T) / 2)
+    return covariance
 
 
-def steady_gain(model: Model) -> Array:
-    """Gain (N, m) of the steady filter: z <- z + gain (y - observed z). InputError where there is none."""
-    return _correction(model, steady_covariance(model))[0]
+def steady_gain(transition: Array, observed: Array, process_noise: Array, measurement_noise: Array) -> Array:
+    """Gain, (N, m), that a Kalman filter settles at: z <- z + gain (y - observed z).
+
+    Arguments are as in ``Model``. Raises InputError where there is none.
+    """
+    covariance = steady_covariance(transition, observed, process_noise, measurement_noise)
+    return correction(covariance, observed, measurement_noise)[0]
 
 
 def steady_gains(model: Model) -> Gains:
     """The steady filter's gain for every sample. Raises InputError where there is none."""
-    covariance = steady_covariance(model)
+    covariance = steady_covariance(*model.linear)
     return Gains(*(each[None] for each in _gains(model, covariance)))
 
 
@@ -84,10 +94,8 @@ def time_varying_gains(model: Model, samples: int) -> Gains:
     for _ in range(samples):
         kept.append(_gains(model, covariance))
         gain = kept[-1].gain
-        after = np.eye(len(covariance)) - gain @ model.observed
-        # Joseph's form: it stays symmetric and positive whatever is rounded.
-        corrected = after @ covariance @ after.T + gain @ model.measurement_noise @ gain.T
-        following = model.transition @ corrected @ model.transition.T + model.process_noise
+        after = corrected(covariance, gain, model.observed, model.measurement_noise)
+        following = model.transition @ after @ model.transition.T + model.process_noise
         deviation = np.sqrt(np.diag(following))
         settled = (np.abs(following - covariance) <= SETTLED * np.outer(deviation, deviation)).all()
         covariance = following
@@ -120,27 +128,41 @@ def run_filter(model: Model, gains: Gains, measured: Array, inputs: Array, start
     return Filtered(predicted, state, innovations, gains)
 
 
-def force_variance(model: Model, gains: Gains, sample: int = -1) -> float:
-    """Variance (N^2) of the filtered contact force at a sample, the last unless told otherwise, by the model.
+def force_variance(model: Model, gains: Gains) -> float:
+    """Variance (N^2) of the filtered contact force by the model, after the last of the gains.
 
     It knows of noise, not of wrong parameters.
     """
-    seen = model.observed @ gains.force[sample]
-    known = seen @ np.linalg.solve(gains.innovation[sample], seen)
-    return float(model.force @ gains.force[sample] - known)
+    ahead = gains.force[-1]
+    seen = model.observed @ ahead
+    known = seen @ np.linalg.solve(gains.innovation[-1], seen)
+    return float(model.force @ ahead - known)
 
 
 def _gains(model: Model, covariance: Array) -> Gains:
-    """Of one sample, whose predicted state has this covariance, (N, N)."""
-    return Gains(*_correction(model, covariance), covariance @ model.force)
+    """Gains of one sample whose predicted state has this covariance, (N, N)."""
+    return Gains(*correction(covariance, model.observed, model.measurement_noise), covariance @ model.force)
 
 
-def _correction(model: Model, covariance: Array) -> tuple[Array, Array]:
-    """Gain, (N, m), and covariance of the innovation, (m, m), for that of the predicted state, (N, N)."""
-    seen = model.observed @ covariance
-    innovation = seen @ model.observed.T + model.measurement_noise
+def correction(covariance: Array, observed: Array, measurement_noise: Array) -> tuple[Array, Array]:
+    """Kalman gain, (N, m), and covariance of the innovation, (m, m), of one sample.
+
+    covariance: of the predicted state, (N, N); observed, (m, N), and measurement_noise, (m, m), as in
+    ``Model``.
+    """
+    seen = observed @ covariance
+    innovation = seen @ observed.T + measurement_noise
     # Solved in units of the noise: those of displacements and velocities are far apart.
     unit = np.sqrt(np.diag(innovation))
     scaled = innovation / np.outer(unit, unit)
     gain = (np.linalg.solve(scaled, seen / unit[:, None]) / unit[:, None]).T
     return gain, innovation
+
+
+def corrected(covariance: Array, gain: Array, observed: Array, measurement_noise: Array) -> Array:
+    """Covariance of the corrected state, (N, N), after any gain, (N, m); arguments as for ``correction``.
+
+    Joseph's form: it stays symmetric and positive whatever is rounded.
+    """
+    kept = np.eye(len(covariance)) - gain @ observed
+    return np.asarray(kept @ covariance @ kept.T + gain @ measurement_noise @ gain.T)

@@ -34,6 +34,11 @@ class Model(NamedTuple):
     force: Array  # (N,): the contact force is force @ z (N)
     start_covariance: Array  # (N, N): of the state when a record begins
 
+    @property
+    def linear(self) -> tuple[Array, Array, Array, Array]:
+        """Transition, observed, process noise and measurement noise: all that a steady gain depends on."""
+        return self.transition, self.observed, self.process_noise, self.measurement_noise
+
     def start(self, first: Array, lift: float) -> Array:
         """Mean of the state when a record begins, (N,): where its first sample, (m,), shows it, not moving.
 

@@ -19,7 +19,7 @@ from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.pantograph.schema import PantographData
 from .estimate import SETTLING, filter_motion, model_of
-from .kalman import steady_gains
+from .kalman import corrected, correction, steady_gains
 from .model import Model
 from .motion import Motion
 from .plausibility import check_motion
@@ -93,12 +93,9 @@ def estimate_parameters(
     noise = block_diag(model.process_noise, np.zeros((p, p)))
     history, force = np.empty((len(measured), p)), np.empty(len(measured))
     for k, sample in enumerate(measured):
-        seen = observed @ covariance
-        innovation = seen @ observed.T + model.measurement_noise
-        gain = np.linalg.solve(innovation, seen).T
+        gain, _ = correction(covariance, observed, model.measurement_noise)
         state = state + gain @ (sample - observed @ state)
-        after = np.eye(size + p) - gain @ observed
-        covariance = after @ covariance @ after.T + gain @ model.measurement_noise @ gain.T
+        covariance = corrected(covariance, gain, observed, model.measurement_noise)
         history[k], force[k] = state[size:], model.force @ state[:size]
         moved, slope = linear.move(state[:size], state[size:], inputs[k])
         jacobian = np.eye(size + p)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..base.arrays import Array
 from ..base.colours import BLUE, LIMIT, ORANGE
 from ..base.legend import legend_above
-from ..metrics.low_pass import low_pass_in_place
+from ..metrics.low_pass import zero_phase_low_pass
 from .estimate import Estimate
 from .verdict import WINDOW_NIS
 
@@ -33,9 +33,9 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     step = float(estimate.time[1] - estimate.time[0])
     time = estimate.time[shown]
     if measured is not None:
-        drawn = low_pass_in_place(measured, step)[shown]
+        drawn = zero_phase_low_pass(measured, step)[shown]
         force.plot(time, drawn, color=ORANGE, linewidth=3, label="recorded")
-    drawn = low_pass_in_place(estimate.force, step)[shown]
+    drawn = zero_phase_low_pass(estimate.force, step)[shown]
     force.plot(time, drawn, color="black", linewidth=1, label="estimated")
     force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
     legend_above(force, 2)

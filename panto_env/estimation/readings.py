@@ -77,7 +77,7 @@ def estimating(
     every = max(n for n in range(1, control_steps + 1) if _fits(n, control_steps, time_step))
     process = estimator.force_model.process(speed, span)
     model = build_model(pantograph, process, estimator, every * time_step)
-    gain = steady_gain(model)
+    gain = steady_gain(*model.linear)
     size, measured = len(model.transition), len(model.observed)
     corrected = np.eye(size) - gain @ model.observed
     rms = sensors.noise_rms

@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData
 from .estimate import model_of
 from .force import RandomWalk
-from .low_pass import CUTOFF, low_pass
+from .inertia import CUTOFF, ORDER
+from .kalman import corrected, correction
 from .model import Model
 from .motion import Motion
 from .plausibility import check_motion
@@ -50,15 +52,15 @@ def unknown_input(
     raw = np.empty(len(measured))
     for k, sample in enumerate(measured):
         if gain is None or not settled:
-            gain, corrected = _gain(system, covariance)
-            following = system.transition @ corrected @ system.transition.T + system.process_noise
+            gain, after = _gain(system, covariance)
+            following = system.transition @ after @ system.transition.T + system.process_noise
             settled = bool(np.abs(following - covariance).max() <= SETTLED * np.abs(covariance).max())
             covariance = following
         innovation = sample - system.observed @ state
         raw[k] = gain.force @ innovation
         state = system.transition @ (state + gain.state @ innovation) + known[k]
     raw[0] = motion.lift  # of the step before the first sample nothing is known
-    return raw if cutoff is None else low_pass(raw, cutoff, motion.time_step)
+    return raw if cutoff is None else low_pass(raw, motion.time_step, cutoff, ORDER)
 
 
 class _System(NamedTuple):
@@ -90,13 +92,9 @@ def _system(model: Model) -> _System:
 def _gain(system: _System, covariance: Array) -> tuple[_Gain, Array]:
     """Gains for a sample, and covariance of the corrected state, for that of the predicted one, (N, N)."""
     observed, contact = system.observed, system.contact
-    seen = observed @ covariance
-    innovation = seen @ observed.T + system.measurement_noise
-    known = np.linalg.solve(innovation, seen).T
+    known, innovation = correction(covariance, observed, system.measurement_noise)
     through = observed @ contact
     weight = np.linalg.solve(innovation, through)
     force = weight / (through @ weight)
     gain = known + np.outer(contact - known @ through, force)
-    after = np.eye(len(covariance)) - gain @ observed
-    corrected = after @ covariance @ after.T + gain @ system.measurement_noise @ gain.T
-    return _Gain(gain, force), corrected
+    return _Gain(gain, force), corrected(covariance, gain, observed, system.measurement_noise)

@@ -1,10 +1,10 @@
 """Identification of a pantograph from records of a rig (paper 1, sections 2 to 4), and beyond."""
 
+from .band import band_limited, excited_band
 from .coverage import Trials, run_trials
 from .equation_error import FILTERED, PRINTED, equations, fit_equation_error, three_points
 from .experiments import EXPERIMENTS, FREQUENCY_SWEEP, Excitation, add_noise, clean_record
 from .fit import Fit
-from .low_pass import excited_band, low_pass
 from .methods import METHODS, Identification, identify
 from .model import IDENTIFIED, MEASURED, UNITS, parameters_of
 from .output_error import OUTPUT_ERROR, fit_output_error
@@ -30,6 +30,7 @@ __all__ = [
     "Record",
     "Trials",
     "add_noise",
+    "band_limited",
     "clean_record",
     "equations",
     "excited_band",
@@ -37,7 +38,6 @@ __all__ = [
     "fit_output_error",
     "force_matches",
     "identify",
-    "low_pass",
     "matches",
     "parameters_of",
     "read_record",

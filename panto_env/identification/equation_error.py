@@ -6,8 +6,8 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from .band import band_limited
 from .fit import Fit, free_names
-from .low_pass import low_pass
 from .model import IDENTIFIED, Parameters, check_known
 from .record import Record
 
@@ -61,7 +61,7 @@ def fit_equation_error(
     known = check_known(known)
     if band is None:
         return solve(record, known, 1, free_offset, PRINTED)
-    kept, stride = low_pass(record, band)
+    kept, stride = band_limited(record, band)
     return solve(kept, known, stride, free_offset, FILTERED)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..base.errors import InputError
+from .band import excited_band
 from .equation_error import FILTERED, PRINTED, fit_equation_error
 from .fit import Fit
-from .low_pass import excited_band
 from .model import Parameters, check_known
 from .output_error import OUTPUT_ERROR, fit_output_error
 from .plausibility import check_record

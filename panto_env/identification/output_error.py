@@ -12,9 +12,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from .band import band_limited
 from .equation_error import FILTERED, solve
 from .fit import Fit, free_names
-from .low_pass import low_pass
 from .model import Parameters, check_known, matrices
 from .record import Record
 from .response import polynomials, respond
@@ -47,7 +47,7 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     from scipy.optimize import least_squares  # slow to import
 
     known = check_known(known)
-    kept, stride = low_pass(record, band)
+    kept, stride = band_limited(record, band)
     start = solve(kept, known, stride, free_offset, FILTERED)
     if start.dependence > IDENTIFIABLE:
         raise InputError(

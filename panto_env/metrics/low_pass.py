@@ -1,6 +1,6 @@
-"""EN 50317's low-pass of the contact force: a Butterworth filter of sixth order at 20 Hz.
+"""Butterworth low-passes of a force; by default EN 50317's of the contact force, of sixth order at 20 Hz.
 
-It lets the force through 31 ms late, 2.6 m at 300 km/h: right for figures, but not for pictures along a line.
+EN 50317's delays the force by 31 ms, 2.6 m at 300 km/h: right for figures, not for pictures along a line.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from ..base.errors import InputError
 CUTOFF, ORDER = 20.0, 6
 """Hz, and the filter's order."""
 MIRRORED = 1.0
-"""Time (s) of the record that is mirrored about each end, where ``low_pass_in_place`` looks beyond it."""
+"""Time (s) of the record that is mirrored about each end, where ``zero_phase_low_pass`` looks beyond it."""
 
 
 @cache
-def low_pass_sections(time_step: float) -> tuple[Array, Array]:
-    """The filter as second-order sections, (3, 6), and its state settled at 1, (3, 2).
+def low_pass_sections(time_step: float, cutoff: float = CUTOFF, order: int = ORDER) -> tuple[Array, Array]:
+    """A filter as second-order sections, (order / 2, 6), and its state settled at 1, (order / 2, 2).
 
     Every caller gets the same two arrays. Raises InputError where samples, ``time_step`` (s) apart, are
-    too far apart to carry 20 Hz.
+    too far apart to carry the cut-off frequency (Hz).
     """
-    if not time_step < 0.5 / CUTOFF:
+    if not time_step < 0.5 / cutoff:
         raise InputError(
-            f"Samples {1e3 * time_step:g} ms apart cannot be low-passed at {CUTOFF:g} Hz; "
-            f"take a time step below {0.5e3 / CUTOFF:g} ms."
+            f"Samples {1e3 * time_step:g} ms apart cannot be low-passed at {cutoff:g} Hz; "
+            f"take a time step below {0.5e3 / cutoff:g} ms."
         )
     # Pairs of poles on a circle, by the bilinear transform that keeps the cut-off frequency. SciPy's own
     # design is the same but for the order of factors; its import takes longer than all else at the start.
-    angle = np.pi * (2 * np.arange(ORDER // 2) + 1) / (2 * ORDER)
-    width, pole = np.tan(np.pi * CUTOFF * time_step), 2 * np.sin(angle)
+    angle = np.pi * (2 * np.arange(order // 2) + 1) / (2 * order)
+    width, pole = np.tan(np.pi * cutoff * time_step), 2 * np.sin(angle)
     whole = 1 + pole * width + width**2
     b, one = width**2 / whole, np.ones(len(angle))
     a1, a2 = 2 * (width**2 - 1) / whole, (1 - pole * width + width**2) / whole
@@ -43,19 +43,36 @@ def low_pass_sections(time_step: float) -> tuple[Array, Array]:
     return sections, settled
 
 
-def low_pass(force: Array, time_step: float) -> Array:
-    """Contact force (N) as EN 50317 looks at it: low-passed causally, settled at its first value.
+def low_pass(force: Array, time_step: float, cutoff: float = CUTOFF, order: int = ORDER) -> Array:
+    """Force (N), (..., n), low-passed causally, settled at its first value; by default as EN 50317 says.
 
-    Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
+    Raises InputError where the samples, ``time_step`` (s) apart, are too far apart for the cut-off (Hz).
+    """
+    start = settled_at(force[..., 0], time_step, cutoff, order)
+    return low_pass_from(start, force, time_step, cutoff, order)[0]
+
+
+def settled_at(force: Array, time_step: float, cutoff: float = CUTOFF, order: int = ORDER) -> Array:
+    """State, (order / 2, ..., 2), of a causal filter whose input (N), (...), has always been the same."""
+    _, settled = low_pass_sections(time_step, cutoff, order)
+    return np.moveaxis(np.multiply.outer(settled, force), 1, -1)
+
+
+def low_pass_from(
+    state: Array, force: Array, time_step: float, cutoff: float = CUTOFF, order: int = ORDER
+) -> tuple[Array, Array]:
+    """Force (N), (..., n), low-passed causally from a state of the filter, and the state after it.
+
+    Both states are (order / 2, ..., 2). Raises InputError as ``low_pass`` does.
     """
     from scipy.signal import sosfilt  # slow to import
 
-    sections, settled = low_pass_sections(time_step)
-    filtered, _ = sosfilt(sections, force, zi=settled * force[0])
-    return np.asarray(filtered)
+    sections, _ = low_pass_sections(time_step, cutoff, order)
+    filtered, after = sosfilt(sections, force, zi=state)
+    return np.asarray(filtered), np.asarray(after)
 
 
-def low_pass_in_place(force: Array, time_step: float) -> Array:
+def zero_phase_low_pass(force: Array, time_step: float) -> Array:
     """Contact force (N) with the same attenuation, but not delayed: for pictures along a line.
 
     Its σ is that of ``low_pass``; single peaks differ, because a filter that delays also shifts phases.

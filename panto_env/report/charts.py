@@ -11,7 +11,7 @@ import numpy as np
 from ..base.colours import BLUE, LIMIT, series_colour
 from ..base.legend import legend_above
 from ..metrics import en50367
-from ..metrics.low_pass import low_pass_in_place
+from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spectrum import amplitudes
 from .findings import Findings
 
@@ -44,7 +44,7 @@ def force_along(one: Findings) -> str:
 
     def draw(axes: Axes) -> None:
         run, inside = one.run, one.inside
-        position, smooth = run.position[inside], low_pass_in_place(run.contact_force, run.time_step)[inside]
+        position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
         axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
         limit = en50367.maximum_limit(run.speed)

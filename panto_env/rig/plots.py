@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..analysis.plots import mark_supports
 from ..base.colours import series_colour
 from ..base.legend import legend_above
-from ..metrics.low_pass import low_pass_in_place
+from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spectrum import amplitudes
 from .comparison import Pair
 
@@ -41,7 +41,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         for k, (who, run) in enumerate(drawn.items()):
             values = getattr(run, name)
             if name == "contact_force":
-                values = low_pass_in_place(values, run.time_step)
+                values = zero_phase_low_pass(values, run.time_step)
             values = scale * (values - values[run.inside(pairs[0].spans)].mean())
             shown = (run.position >= begin) & (run.position <= end)
             style = LINE_STYLE if who.startswith("under") else _rig_style(k)

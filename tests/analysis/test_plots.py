@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from panto_env import simulate
 from panto_env.analysis.plots import plot_forces, plot_run, say_what_is_hidden
 from panto_env.catalog import load_pantograph
-from panto_env.metrics.low_pass import low_pass, low_pass_in_place
+from panto_env.metrics.low_pass import low_pass, zero_phase_low_pass
 
 
 def lag(first, second):
@@ -29,7 +29,7 @@ def curve(axis, label):
 
 def test_the_filter_of_pictures_attenuates_as_much_and_does_not_delay(reference_run):
     force, step = reference_run.contact_force, reference_run.time_step
-    late, in_place = low_pass(force, step), low_pass_in_place(force, step)
+    late, in_place = low_pass(force, step), zero_phase_low_pass(force, step)
     inside = reference_run.inside()
     assert in_place[inside].std() == pytest.approx(late[inside].std(), rel=0.01)
     assert in_place[inside].mean() == pytest.approx(late[inside].mean(), rel=0.001)
@@ -42,13 +42,13 @@ def test_at_20_hz_and_beyond_it_attenuates_as_the_figures_filter():
     for frequency in (2.0, 20.0, 30.0):
         wave = np.sin(2 * np.pi * frequency * time)
         middle = slice(5000, 15000)
-        late, in_place = (f(wave, 1e-3)[middle].std() for f in (low_pass, low_pass_in_place))
+        late, in_place = (f(wave, 1e-3)[middle].std() for f in (low_pass, zero_phase_low_pass))
         assert in_place == pytest.approx(late, rel=1e-3)
 
 
 def test_it_takes_any_length_and_keeps_what_is_constant():
     for count in (1, 2, 50, 1000):
-        assert low_pass_in_place(np.full(count, 120.0), 2e-3) == pytest.approx(120.0)
+        assert zero_phase_low_pass(np.full(count, 120.0), 2e-3) == pytest.approx(120.0)
 
 
 def test_a_run_s_plot_shows_the_evaluated_spans_their_supports_and_limits(run):
@@ -59,7 +59,7 @@ def test_a_run_s_plot_shows_the_evaluated_spans_their_supports_and_limits(run):
     inside = run.inside()
     np.testing.assert_array_equal(drawn.get_xdata(), run.position[inside])
     np.testing.assert_array_equal(
-        drawn.get_ydata(), low_pass_in_place(run.contact_force, run.time_step)[inside]
+        drawn.get_ydata(), zero_phase_low_pass(run.contact_force, run.time_step)[inside]
     )
     assert curve(contact, "EN 50367: at most 350 N").get_ydata()[0] == 350
     assert curve(contact, "nominal").get_ydata()[0] == run.nominal_force

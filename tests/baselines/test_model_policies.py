@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from panto_baselines.policies.h_infinity import central, least_bound, weighted
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
-from panto_baselines.policies.lqg import Disturbed, kalman, regulator
+from panto_baselines.policies.lqg import ROUNDING, Disturbed, regulator
 from panto_baselines.policies.mpc import HORIZON, Programs
 from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.preview import Preview, preview
@@ -25,6 +25,7 @@ from panto_env import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
+from panto_env.estimation.kalman import steady_gain
 from panto_env.policies import find_policy
 
 Array = NDArray[np.float64]
@@ -222,7 +223,8 @@ def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
     for _ in range(6000):
         correction = p @ c.T @ np.linalg.inv(c @ p @ c.T + np.diag(readings))
         p = a @ (p - correction @ c @ p) @ a.T + np.diag(noise)
-    assert kalman(a, c, noise, readings) == pytest.approx(correction, rel=1e-3, abs=1e-6)
+    gain = steady_gain(a, c, np.diag(noise + ROUNDING), np.diag(readings))
+    assert gain == pytest.approx(correction, rel=1e-3, abs=1e-6)
 
 
 # --- H-infinity ------------------------------------------------------------------------------------

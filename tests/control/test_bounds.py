@@ -18,7 +18,7 @@ from panto_env.control.cost import LONGEST, Cost, in_words
 from panto_env.control.settings import run_settings
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of
-from panto_env.identification.low_pass import low_pass
+from panto_env.identification.band import band_limited
 from panto_env.plant.catenary.flexible import static as static_shape
 
 
@@ -124,7 +124,7 @@ def test_a_band_below_what_a_record_holds_is_refused():
     record = clean_record(FREQUENCY_SWEEP, parameters_of(load_pantograph("identified-2dof")))
     for band in (1e-308, 1e-6):
         with pytest.raises(InputError, match="is too short for motion up to"):
-            low_pass(record, band)
+            band_limited(record, band)
 
 
 def test_a_header_of_spaces_is_read_in_no_time(tmp_path):

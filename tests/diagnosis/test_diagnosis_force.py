@@ -14,7 +14,7 @@ from panto_env.diagnosis.cases import Track, drive
 from panto_env.diagnosis.force import ESTIMATOR, RATE
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
-from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.metrics.low_pass import zero_phase_low_pass
 
 TRACK = Track("en50318-2002", "dsa250", 220.0, seed=32)
 
@@ -26,7 +26,7 @@ def runs():
 
 def error_of(run, seed=0, pantograph=None):
     """Of the estimate, within 0 to 20 Hz and once its start is forgotten."""
-    error = estimated_force(run, seed, pantograph) - low_pass_in_place(run.contact_force, run.time_step)
+    error = estimated_force(run, seed, pantograph) - zero_phase_low_pass(run.contact_force, run.time_step)
     return error[run.inside()]
 
 
@@ -62,7 +62,7 @@ def test_it_is_the_estimator_s_own(runs):
     blind = replace(runs[0], head_velocity=none, frame_velocity=none)
     motion = replace(measure(blind, rate=RATE, seed=5), head_velocity=None, frame_velocity=None)
     force = estimate(motion, load_pantograph("dsa250"), ESTIMATOR).force
-    expected = low_pass_in_place(np.interp(runs[0].time, motion.time, force), runs[0].time_step)
+    expected = zero_phase_low_pass(np.interp(runs[0].time, motion.time, force), runs[0].time_step)
     assert np.array_equal(estimated_force(runs[0], 5), expected)
 
 

@@ -134,10 +134,10 @@ def test_the_steady_gain_is_the_limit_of_the_time_varying_one(force, observation
     model = built(force_model=force, observation=observation, suspension_drift=5.0)
     gains = time_varying_gains(model, 20_000)
     assert len(gains.gain) < 20_000  # settled
-    unit = np.sqrt(np.diag(steady_covariance(model)))
+    unit = np.sqrt(np.diag(steady_covariance(*model.linear)))
     measured = np.sqrt(np.diag(gains.innovation[-1]))
     scale = measured / unit[:, None]
-    np.testing.assert_allclose(gains.gain[-1] * scale, steady_gain(model) * scale, atol=1e-5)
+    np.testing.assert_allclose(gains.gain[-1] * scale, steady_gain(*model.linear) * scale, atol=1e-5)
     steady = steady_gains(model)
     np.testing.assert_allclose(steady.innovation[0], gains.innovation[-1], rtol=1e-5, atol=1e-12)
     assert force_variance(model, steady) == pytest.approx(force_variance(model, gains), rel=1e-5)
@@ -146,7 +146,7 @@ def test_the_steady_gain_is_the_limit_of_the_time_varying_one(force, observation
 def test_steady_filter_and_smoother_are_those_of_a_record_that_begins_as_it_stays():
     """From the steady covariance on the time-varying filter's gains never change."""
     model = built()
-    model = model._replace(start_covariance=steady_covariance(model))
+    model = model._replace(start_covariance=steady_covariance(*model.linear))
     measured, states = simulated(model, 3000, 5)
     inputs = np.zeros((3000, 2))
     steady = run_filter(model, steady_gains(model), measured, inputs, np.zeros(6))
@@ -244,7 +244,7 @@ def test_what_has_no_steady_gain_is_told():
     model = built()
     blind = model._replace(observed=0 * model.observed)
     with pytest.raises(InputError, match="no steady gain"):
-        steady_gain(blind)
+        steady_gain(*blind.linear)
 
 
 def test_gains_of_samples_beyond_the_last_are_the_last():

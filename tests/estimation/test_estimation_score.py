@@ -11,12 +11,12 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
 from panto_env.estimation.estimate import estimate, model_of
 from panto_env.estimation.force import RandomWalk
-from panto_env.estimation.inertia import inertia_corrected
-from panto_env.estimation.low_pass import CUTOFF, low_pass
+from panto_env.estimation.inertia import CUTOFF, ORDER, inertia_corrected
 from panto_env.estimation.motion import Motion
 from panto_env.estimation.score import phases, score
 from panto_env.estimation.settings import EstimatorSettings
 from panto_env.estimation.unknown_input import _gain, _system, unknown_input
+from panto_env.metrics.low_pass import low_pass
 
 from ..pantograph_alone import equations
 
@@ -100,7 +100,7 @@ def test_inertia_corrected_is_the_force_low_passed(driven):
         with pytest.raises(InputError, match=r"'dsa380' has 3 masses; .* needs two"):
             inertia_corrected(motion, pantograph)
         return
-    wanted = low_pass(motion.contact_force, CUTOFF, STEP)
+    wanted = low_pass(motion.contact_force, STEP, CUTOFF, ORDER)
     # A difference looks half a step back. Inertia may be larger than the force, and so may its delay.
     for velocities, late in ((True, 1.0), (False, 2.0)):
         found = inertia_corrected(motion, pantograph, velocities=velocities)
@@ -170,12 +170,12 @@ def test_an_unknown_input_is_that_of_least_squares_over_the_whole_record(driven)
 def test_low_pass_is_butterworths_and_starts_settled():
     sections = butter(2, 40.0, fs=1 / STEP, output="sos")
     for frequency in (5.0, 40.0, 100.0):
-        filtered = low_pass(np.sin(2 * np.pi * frequency * TIME), 40.0, STEP)[2000:]
+        filtered = low_pass(np.sin(2 * np.pi * frequency * TIME), STEP, 40.0, 2)[2000:]
         _, response = freqz_sos(sections, worN=[frequency], fs=1 / STEP)
         assert np.sqrt(2) * filtered.std() == pytest.approx(abs(response[0]), rel=2e-3)
-    np.testing.assert_allclose(low_pass(np.full(50, 120.0), 40.0, STEP), 120.0)
+    np.testing.assert_allclose(low_pass(np.full(50, 120.0), STEP, 40.0, 2), 120.0)
     with pytest.raises(InputError, match="20 ms apart cannot be low-passed at 40 Hz"):
-        low_pass(np.zeros(50), 40.0, 0.02)
+        low_pass(np.zeros(50), 0.02, 40.0, 2)
 
 
 @pytest.mark.parametrize("late", [-4.25, 0.0, 0.4, 3.0, 7.3])  # ms

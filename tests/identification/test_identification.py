@@ -14,6 +14,7 @@ from panto_env.identification import (
     PRINTED,
     Record,
     add_noise,
+    band_limited,
     clean_record,
     equations,
     excited_band,
@@ -21,7 +22,6 @@ from panto_env.identification import (
     fit_output_error,
     force_matches,
     identify,
-    low_pass,
     matches,
     parameters_of,
     run_trials,
@@ -157,8 +157,8 @@ def test_low_pass_keeps_the_excitation_and_drops_noise():
     noisy = add_noise(clean, np.random.default_rng(0))
     band = excited_band(noisy)
     assert 1.4219 < band < 1.6
-    kept, stride = low_pass(noisy, band)
-    same, _ = low_pass(clean, band)
+    kept, stride = band_limited(noisy, band)
+    same, _ = band_limited(clean, band)
     inside = slice(round(same.start / same.time_step), None)
     original = clean.head[inside][: len(same.head)]
     np.testing.assert_allclose(same.head, original, atol=2e-3 * np.ptp(original))
@@ -169,7 +169,7 @@ def test_low_pass_keeps_the_excitation_and_drops_noise():
 @pytest.mark.parametrize(("band", "message"), [(400.0, "quarter of the sampling rate"), (0.1, "too short")])
 def test_band_that_does_not_fit_is_refused(band, message):
     with pytest.raises(InputError, match=message):
-        low_pass(clean_record(EXPERIMENTS[0], TRUTH, duration=5.0), band)
+        band_limited(clean_record(EXPERIMENTS[0], TRUTH, duration=5.0), band)
 
 
 def test_fitting_performance_is_100_for_the_truth_and_less_for_others():

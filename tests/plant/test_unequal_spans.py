@@ -1,7 +1,8 @@
 """A line of nine span lengths, through everything that asks where something is.
 
-Today's lines have spans of one length each. The line of periodic stiffness computes with any alignment that it
-is given, so that here it has many lengths; what is expected follows from the supports' positions alone.
+Today's lines have spans of one length each. The line of periodic stiffness computes with any alignment
+that it is given, so that here it has many lengths; what is expected follows from the supports'
+positions alone.
 """
 
 import numpy as np

@@ -12,7 +12,7 @@ from panto_env.backend import python_function
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.metrics.low_pass import low_pass_in_place
+from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wire_defects import RAMP, worn_depth
@@ -168,7 +168,7 @@ def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
     ]
     at = np.linspace(200, 280, 1000)
     ours, fine, intact = (
-        np.interp(at, run.position, low_pass_in_place(run.contact_force, run.time_step)) for run in runs
+        np.interp(at, run.position, zero_phase_low_pass(run.contact_force, run.time_step)) for run in runs
     )
     assert (ours - fine).std() < 0.08 * (intact - fine).std()
 

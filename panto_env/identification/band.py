@@ -1,4 +1,6 @@
-"""The same linear-phase low-pass for all sensors: the filtered record still obeys the equations of motion.
+"""The band of the excitation, and a record limited to it by a linear-phase low-pass.
+
+The low-pass is the same for all sensors, so that the filtered record still obeys the equations of motion.
 
 Noise outside the band of the excitation carries no information, but ruins derivatives (and excites the
 model's own resonance). A linear filter commutes with a linear model, so the same filter on every channel
@@ -31,7 +33,7 @@ def excited_band(record: Record) -> float:
     return float(np.fft.rfftfreq(len(plate), record.time_step)[max(place, 1)])
 
 
-def low_pass(record: Record, band: float) -> tuple[Record, int]:
+def band_limited(record: Record, band: float) -> tuple[Record, int]:
     """The record below ``band`` (Hz), its ends cut off, and how many samples apart noise is independent.
 
     Passes to ``band``, stops above twice of it. Raises InputError where the record is too short for
