@@ -288,7 +288,7 @@ def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen() -> None:
     assert tuned.history[-1] < 0.8 < tuned.history[0]
     assert tuned.std_change < -0.1
     assert tuned.passes <= 60 + 11
-    with pytest.raises(InputError, match="'pd' has no gains to tune; policies that have are"):
+    with pytest.raises(InputError, match="'pd' has no gains to tune; policies with gains are"):
         tunable("pd")
 
 
