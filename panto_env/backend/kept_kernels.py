@@ -1,7 +1,7 @@
 """Compiled kernels on disk: Numba's cache, where damaged files are compiled anew and no full disk ends a run.
 
-Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself. Where
-one overwrites the other's file with the kernel for other types, that is noticed.
+Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself.
+Where one overwrites the other's file with the kernel for other types, that is noticed.
 """
 
 from __future__ import annotations
