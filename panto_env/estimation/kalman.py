@@ -57,12 +57,17 @@ def steady_covariance(model: Model) -> Array:
         found = solve_discrete_are(
             model.transition.T, model.observed.T, model.process_noise, model.measurement_noise
         )
+        found = np.asarray((found + found.T) / 2)
+        kept = model.transition @ (np.eye(len(found)) - _correction(model, found)[0] @ model.observed)
+        # Some processors' rounding hides from the solver that there is no solution.
+        if not np.abs(np.linalg.eigvals(kept)).max() < 1:
+            raise np.linalg.LinAlgError("what cannot be seen does not fade away")
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
             "The filter has no steady gain for these intensities of noise, or they are too far apart to be "
             f"computed with ({error}); take others, or the time-varying gain."
         ) from error
-    return np.asarray((found + found.T) / 2)
+    return found
 
 
 def steady_gain(model: Model) -> Array:
