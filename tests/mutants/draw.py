@@ -78,7 +78,7 @@ def _places(source: str, tree: ast.Module) -> dict[tuple[int, int], list[tuple[s
         positions = (pair for node in nodes for pair in operator.mutation_positions(node))
         for occurrence, (start, _) in enumerate(positions):
             line = source.splitlines()[start[0] - 1]
-            if not any(first <= start < last for first, last in words) and not ONLY_SPEED.search(line):
+            if not any(first <= start < last for first, last in words) and not SPARED.search(line):
                 found.setdefault(start, []).append((name, occurrence))
     return found
 
