@@ -16,8 +16,10 @@ from cosmic_ray.plugins import get_operator, operator_names
 ARITHMETIC, BITS = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"BitOr", "BitAnd"}
 SAME = ({"Is", "Eq"}, {"IsNot", "NotEq"}, {"Is", "NotEq"}, {"IsNot", "Eq"})
 """Comparisons that mean the same of None and of an enumeration's members."""
-ONLY_SPEED = re.compile(r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b")
-"""Decorators whose lines change nothing that is computed, where kernels are plain Python."""
+ONLY_SPEED = re.compile(
+    r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b|strict=True"
+)
+"""Lines with decorators that change nothing that is computed, or with what only a bug would break."""
 
 
 class Mutant(NamedTuple):
@@ -76,7 +78,7 @@ def _places(source: str, tree: ast.Module) -> dict[tuple[int, int], list[tuple[s
         positions = (pair for node in nodes for pair in operator.mutation_positions(node))
         for occurrence, (start, _) in enumerate(positions):
             line = source.splitlines()[start[0] - 1]
-            if not any(first <= start < last for first, last in words) and not ONLY_SPEED.search(line):
+            if not any(first <= start < last for first, last in words) and not SPARED.search(line):
                 found.setdefault(start, []).append((name, occurrence))
     return found
 
