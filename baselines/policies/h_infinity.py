@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
 
 CORNER = 30.0
@@ -43,6 +44,12 @@ class HInfinity(TunableLaw):
     It needs to know the pantograph, tension and mass of the wires, and the delays; not the place within the
     span.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "log performance": Gain(0.1, 0.0),
+        "log frequency": Gain(0.05, 0.3),
+        "log height": Gain(0.1, 1.0),
+    }
 
     def __init__(self, gains: Source = "h-infinity", delay: float = DELAY, lag: float = LAG) -> None:
         """gains: (3,): log10 of the weight's performance (N/N), of its frequency (Hz), of the wire's height
@@ -76,21 +83,6 @@ class HInfinity(TunableLaw):
         force: Array = (self._c @ self._state + self._d @ seen)[0]
         self._state = self._a @ self._state + self._b @ seen
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["log performance", "log frequency", "log height"]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts."""
-        return np.array([0.0, 0.3, 1.0])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.1, 0.05, 0.1])
 
 
 class Weighted(NamedTuple):
