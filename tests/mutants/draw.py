@@ -16,7 +16,7 @@ from cosmic_ray.plugins import get_operator, operator_names
 ARITHMETIC, BITS = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"BitOr", "BitAnd"}
 SAME = ({"Is", "Eq"}, {"IsNot", "NotEq"}, {"Is", "NotEq"}, {"IsNot", "Eq"})
 """Comparisons that mean the same of None and of an enumeration's members."""
-ONLY_SPEED = re.compile(
+SPARED = re.compile(
     r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b|strict=True"
 )
 """Lines with decorators that change nothing that is computed, or with what only a bug would break."""
