@@ -11,7 +11,7 @@ from ..base.arrays import Array
 
 ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
 """Distance (spans) from a defect up to which less than such a share of its score counts as its own waves, as
-simulated ones make them at 160 to 280 km/h. Nearer than the first none is told apart."""
+simulated ones make them at 160 to 280 km/h. Nearer than the first none is distinguished."""
 
 
 @dataclass(frozen=True)

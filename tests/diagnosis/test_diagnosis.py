@@ -261,7 +261,7 @@ def test_runs_that_cannot_be_compared_are_refused(healthy_runs, change, message)
 
 
 def test_runs_that_say_too_little_are_refused(healthy_runs):
-    with pytest.raises(InputError, match="takes 3 of them at least, not 2; give more with --healthy"):
+    with pytest.raises(InputError, match="takes at least 3 of them, not 2; give more with --healthy"):
         diagnose(healthy_runs[:1], healthy_runs[1:3])
     with pytest.raises(InputError, match="One run stands there twice"):
         diagnose(healthy_runs[:1], healthy_runs[:4])
