@@ -29,7 +29,7 @@ class Adaptive(Repetitive):
     the model. Feedback is against what differs from span to span, learning against what does not.
 
     It needs to know what ``Repetitive`` needs, and gains for line, pantograph and speed; not the line's
-    stiffness along the span. ``place="counted"`` goes without a sensor that tells the place, as there, with
+    stiffness along the span. ``place="counted"`` goes without a sensor of the place, as there, with
     the same gains.
     """
 

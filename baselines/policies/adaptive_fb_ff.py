@@ -19,7 +19,7 @@ class AdaptiveFeedforward(Adaptive):
     worn or ridden otherwise. Gains are to be fitted on such lines; on lines that are as designed there is
     nothing to learn, and learning costs.
 
-    It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must tell the place.
+    It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must measure the place.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {**SERIES_GAINS, **Adaptive.TUNED}

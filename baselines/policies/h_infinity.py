@@ -1,4 +1,4 @@
-"""Mixed-sensitivity H-infinity control: two Riccati equations and a search for the least bound."""
+"""Mixed-sensitivity H-infinity control: two Riccati equations and a search for the minimum bound."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ HEIGHT = 1e-3
 WIDTH = 0.7
 """Damping of the weight on the contact force: a band of about its frequency to either side."""
 NEAR = 1.1
-"""The bound used, over the least one: a controller at the least bound is badly conditioned."""
+"""The bound used, over the minimum one: a controller at the minimum bound is badly conditioned."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
-"""Bounds (-) between which the least one is sought, by what factor first, how often that is then halved."""
+"""Bounds (-) between which the minimum is searched for, the factor from one to the next, and how often that
+factor is then halved."""
 
 
 class HInfinity(TunableLaw):
@@ -36,9 +37,9 @@ class HInfinity(TunableLaw):
 
     What comes in is the height of the wire, low-passed, and noise on each reading; what is to be small is the
     contact force through a band-pass weight, W_S = performance 2 zeta w s / (s^2 + 2 zeta w s + w^2), and the
-    command. The controller makes the largest gain between them, over all frequencies, at most 1.1 times the
-    least possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The band
-    leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
+    command. The controller makes the maximum gain between them, over all frequencies, at most 1.1 times the
+    minimum possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The
+    band leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
     included; the controller is sampled by the bilinear rule.
 
     It needs to know the pantograph, tension and mass of the wires, and the delays; not the place within the
@@ -69,7 +70,7 @@ class HInfinity(TunableLaw):
         model = line_model(context, mean_line(context), delay + interval / 2, lag)
         plant = weighted(model, performance, 2 * np.pi * frequency, height * HEIGHT)
         with one_thread():
-            self.bound, controller = least_bound(plant)
+            self.bound, controller = minimum_bound(plant)
         self._a, self._b, self._c, self._d, _ = cont2discrete(
             (*controller, np.zeros((1, len(OUTPUTS)))), interval, "bilinear"
         )
@@ -126,8 +127,8 @@ def weighted(model: LineModel, performance: float, centre: float, height: float)
     return Weighted(a, b1, b2, c1, c2 / np.array(READING_NOISE)[:, None])
 
 
-def least_bound(plant: Weighted) -> tuple[float, Controller]:
-    """A bound (-) a little above the least, and the controller that keeps it; InputError where none does."""
+def minimum_bound(plant: Weighted) -> tuple[float, Controller]:
+    """A bound (-) a little above the minimum, and the controller that keeps it. InputError if none does."""
     bound = SMALLEST
     while central(plant, bound) is None:
         bound *= STRIDE

@@ -58,13 +58,13 @@ class LanesLaw(ABC):
     def span_angle(self, observations: Observations, lead: float = 0.0) -> Array:
         """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on.
 
-        Raises InputError where the observation does not tell it: both sine and cosine are 0.
+        Raises InputError where the observation does not hold it: both sine and cosine are 0.
         """
         sine = self.read(observations, "sine of span position")
         cosine = self.read(observations, "cosine of span position")
         if (sine**2 + cosine**2 < 0.5).any():
             raise InputError(
-                "It needs the place within the span, which these sensors do not tell; take skyhook, "
+                "It needs the place within the span, which these sensors do not measure; take skyhook, "
                 "h-infinity, or repetitive:place='counted'."
             )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.alignment.mean_length
@@ -86,7 +86,7 @@ class TunableLaw(LanesLaw):
     """The gains by name, in order."""
 
     def __init__(self, gains: Source) -> None:
-        """gains: the numbers, or the name or path of a file that `panto tune` wrote, asked at each start."""
+        """gains: the numbers, or the name or path of a file that `panto tune` wrote, read at each start."""
         if not isinstance(gains, str) and not (
             len(gains) and all(isinstance(each, int | float) and np.isfinite(each) for each in gains)
         ):

@@ -29,7 +29,7 @@ AVERAGED = 2.0
 
 
 class PredictiveControl(TunableLaw):
-    """The commands over a horizon that make the predicted force vary least, within limits, anew at each step.
+    """Commands over a horizon that minimise the variation of the predicted force within limits, at each step.
 
     Predicted force = passive force of the line as designed at the places to come + answers to commands given
     and to be given, each with the response of the place where it is given (``preview``: stiffness along the

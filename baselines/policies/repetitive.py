@@ -32,7 +32,7 @@ class Repetitive(TunableLaw):
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
-    learn. Where no sensor tells the place, ``place="counted"`` goes by the speed that is read: what repeats
+    learn. Where no sensor measures the place, ``place="counted"`` goes by the measured speed: what repeats
     is learnt wherever the count begins, and learning follows the drift of a speed that is slightly wrong.
     """
 

@@ -16,7 +16,7 @@ class TunedProportionalDerivative(TunableLaw):
 
     u = gain e + derivative de/dt - damping dz/dt + bias, with e = F_N - F, de/dt its backward difference over
     the control interval (0 at the first step) and dz/dt the frame's velocity, all as measured. Where the mean
-    force is below F_N, feedback alone presses harder; the bias takes that back.
+    force is below F_N, feedback alone raises it; the bias compensates for that.
 
     It needs to know the nominal force, and nothing of the line but its gains.
     """
