@@ -42,7 +42,7 @@ def oracle(
     seed: Annotated[list[int] | None, typer.Option(min=0, help="Seed of the line; repeatable.")] = None,
     spans: Annotated[
         str | None,
-        typer.Option(help="Spans over which σ is to be least, first-last; by default those after the start."),
+        typer.Option(help="Spans over which σ is minimised, first-last; by default those after the start."),
     ] = None,
     start: Annotated[
         list[str] | None, typer.Option(help="Where a search starts: zero, periodic or random; repeatable.")
@@ -65,10 +65,10 @@ def oracle(
 ) -> None:
     """Find the steadiest contact force that an actuator can reach on a line that it knows ahead of time.
 
-    The least σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
-    what control can be asked for. It is a local optimum that is reached, not a proof that nothing is better.
+    The minimum σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
+    what control can reach. It is a local optimum that is reached, not a proof that nothing is better.
     Seeds after the first start where the one before ended. The picture shows the first pass that was searched
-    for. Cells that are in the output already, asked for in the same way, are kept: a list that was broken off
+    for. Cells that are in the output already, with the same settings, are kept: a list that was interrupted
     is gone on with. An output with other cells, which would be lost, is refused without --force.
     """
     from panto_env.analysis.plots import save as save_plot

@@ -47,7 +47,7 @@ class Knots:
         self._rate = math.inf if lagged.rate_limit is None else lagged.rate_limit * time_step
         self.reached = 1.0 - (1.0 - self._share) ** steps
         """Share of the way to its command that the force goes in an interval, where no rate limits it."""
-        self.largest_change = steps * self._rate
+        self.maximum_change = steps * self._rate
         """From one knot to the next (N)."""
         self.late = math.ceil(lagged.delay / time_step - 1e-6)
         """Plant steps from a command to its first effect."""
@@ -56,12 +56,12 @@ class Knots:
         """Limits of ``count`` knots of one place.
 
         A force is within its limit, changes no faster than its limit of rate, and no faster than under the
-        largest command: w[k] - w[k-1] <= reached (limit - w[k-1]), and the same downwards.
+        maximum command: w[k] - w[k-1] <= reached (limit - w[k-1]), and the same downwards.
         """
         one, before = eye_array(count, format="csc"), eye_array(count, k=-1, format="csc")
         parts, bounds = [one], [self.limit]
         if math.isfinite(self._rate):
-            parts, bounds = [*parts, one - before], [*bounds, self.largest_change]
+            parts, bounds = [*parts, one - before], [*bounds, self.maximum_change]
         if self.reached < 1.0:
             parts.append(one - (1.0 - self.reached) * before)
             bounds.append(self.reached * self.limit)
@@ -87,7 +87,7 @@ class Knots:
         return np.clip(before + self._lead(knots - before), -self.limit, self.limit)
 
     def free_commands(self, knots: Array) -> Array:
-        """The same of the actuator without its limits of force and rate (``without_limits``)."""
+        """Commands (N) as of ``commands``, for an actuator without limits (``without_limits``)."""
         before = np.zeros_like(knots)
         before[..., 1:, :] = knots[..., :-1, :]
         return np.asarray(before + (knots - before) / self.reached)
@@ -97,7 +97,7 @@ class Knots:
         if math.isinf(self._rate):
             return np.asarray(change / self.reached)
         size = np.abs(change)
-        low, high = np.zeros_like(size), np.full_like(size, self.largest_change + self._rate / self._share)
+        low, high = np.zeros_like(size), np.full_like(size, self.maximum_change + self._rate / self._share)
         for _ in range(HALVINGS):
             lead = 0.5 * (low + high)
             left = lead.copy()

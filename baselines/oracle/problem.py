@@ -1,4 +1,4 @@
-"""What is asked of the oracle: the least σ over some spans of one pass, at the passive run's mean force."""
+"""The problem of an oracle: the minimum σ over some spans of one pass, at the passive run's mean force."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Problem:
     """One pass along one line, and what the contact force over its evaluated spans does under knots."""
 
     def __init__(self, given: Mapping[str, Any], seed: int = 0, spans: SpanChoice = None) -> None:
-        """given: settings of a run, by name; a line's last spans give the end where none is told.
+        """given: settings of a run, by name; a line's last spans give the end where none is given.
 
         Raises InputError for what is not valid, or where the passive run ends early.
         """
@@ -89,7 +89,7 @@ class Problem:
         return filtered.reshape(-1, len(self.rows)).T
 
     def response_along(self, knots: Array, basis: Array) -> Array:
-        """The same for combinations of knots, (rows, directions).
+        """Change of the filtered force per combination of knots (N/N), (rows, directions).
 
         basis: (knots of all places, directions). By one whole run for each, pushed by ``PUSH`` (rms)
         along it: for a few directions that is far cheaper.

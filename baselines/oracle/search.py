@@ -31,7 +31,7 @@ DECIMALS = 2
 METHOD = 2
 """Version of the search: one more wherever other commands come of it, so that nothing older is kept."""
 MEAN_TOLERANCE = 1e-3
-"""Largest difference of the mean force from the passive run's, as a share of it."""
+"""Maximum difference of the mean force from the passive run's, as a share of it."""
 
 
 @dataclass(frozen=True)

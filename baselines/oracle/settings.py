@@ -1,4 +1,4 @@
-"""What an oracle is asked for: passes as a table of cells, from keywords or a TOML file."""
+"""Settings of a search for oracles: passes as a table of cells, from keywords or a TOML file."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class OracleSettings(Settings):
     )
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
     spans: tuple[_Span, _Span] | None = Field(
-        None, description="first and last span over which σ is least; by default those after the start"
+        None, description="first and last span over which σ is minimised; by default those after the start"
     )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
     hops: int = Field(

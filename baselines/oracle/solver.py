@@ -3,7 +3,7 @@
 Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
 of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
 et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
-is found is a local optimum that is reached: a bound on what control can be asked for, not a proof that
+is found is a local optimum that is reached: a bound on what control can reach, not a proof that
 there is nothing better.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csc_matrix, eye_array, kron
@@ -19,10 +19,8 @@ from scipy.sparse import csc_matrix, eye_array, kron
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 
+from .knots import Limits
 from .problem import Problem
-
-if TYPE_CHECKING:
-    from .knots import Limits
 
 SHARES = (1.0, 0.6, 0.3, 0.1)
 """Of a step that are tried, all at once."""
@@ -31,7 +29,7 @@ DAMPING = 0.1
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Of the last one, that are tried in each iteration: what the model says of large steps is not so."""
 MEAN_TOLERANCE = 5e-4
-"""Largest difference of the mean force from the passive run's at the end of a search, as a share of it."""
+"""Maximum difference of the mean force from the passive run's at the end of a search, as a share of it."""
 MEAN_WEIGHT = 2.0
 """Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
 MEAN_STIFFNESS = 1e3
@@ -133,8 +131,8 @@ def merit(problem: Problem, force: Array) -> float:
 
 def _mean_met(problem: Problem, force: Array) -> bool:
     """Whether the mean of a filtered force, (samples,) (N), is that of the passive run."""
-    wanted = problem.figures.mean
-    return abs(float(force.mean()) - wanted) <= MEAN_TOLERANCE * wanted
+    required = problem.figures.mean
+    return abs(float(force.mean()) - required) <= MEAN_TOLERANCE * required
 
 
 class Model(NamedTuple):
@@ -206,8 +204,6 @@ def of_all_places(limits: Limits, places: int) -> Limits:
     )
 
 
-def _iteration(
-    problem: Problem, number: int, knots: Array, force: Array, share: float, damping: float = 0.0
-) -> Iteration:
+def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:
     at_limits = problem.knots.at_limits(knots)
     return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations
+from .lanes_law import Array, Gain, Observations
 from .line_model import DELAY, LAG, OUTPUTS, LineModel
-from .linear_feedback import COUNT, SIGNALS, LinearFeedback, feedback_names, feedback_steps, loop_gain
+from .linear_feedback import COUNT, FEEDBACK_GAINS, SIGNALS, LinearFeedback, loop_gain
 from .repetitive import Repetitive
-from .span_learner import PACE, Pace
+from .span_learner import Pace
 from .span_place import PLACES
 
 OWN = COUNT + len(Pace._fields)
@@ -26,9 +29,11 @@ class Adaptive(Repetitive):
     the model. Feedback is against what differs from span to span, learning against what does not.
 
     It needs to know what ``Repetitive`` needs, and gains for line, pantograph and speed; not the line's
-    stiffness along the span. ``place="counted"`` goes without a sensor that tells the place, as there, with
+    stiffness along the span. ``place="counted"`` goes without a sensor of the place, as there, with
     the same gains.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {**FEEDBACK_GAINS, **Repetitive.TUNED}
 
     def __init__(
         self, gains: Source = "adaptive", delay: float = DELAY, lag: float = LAG, place: str = PLACES[0]
@@ -65,18 +70,3 @@ class Adaptive(Repetitive):
     @property
     def _of_feedback(self) -> Array:
         return self.gains[-OWN : -OWN + COUNT]
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return [*feedback_names(), *Pace._fields]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts: no feedback."""
-        return np.concatenate([np.zeros(COUNT), PACE])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.concatenate([feedback_steps(), 0.2 * np.array(PACE)])

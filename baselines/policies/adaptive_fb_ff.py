@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from panto_env.control.context import Context
+from collections.abc import Mapping
+from typing import ClassVar
 
 from .adaptive import Adaptive
 from .gains import Source
-from .lanes_law import Array, Observations
+from .lanes_law import Array, Gain, Observations
 from .line_model import DELAY, LAG
-from .periodic import HARMONICS, LEAD, STEP, series, series_names
+from .periodic import HARMONICS, LEAD, SERIES_GAINS, series
 
 
 class AdaptiveFeedforward(Adaptive):
@@ -20,8 +19,10 @@ class AdaptiveFeedforward(Adaptive):
     worn or ridden otherwise. Gains are to be fitted on such lines; on lines that are as designed there is
     nothing to learn, and learning costs.
 
-    It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must tell the place.
+    It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must measure the place.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {**SERIES_GAINS, **Adaptive.TUNED}
 
     def __init__(self, gains: Source = "adaptive-fb+ff", delay: float = DELAY, lag: float = LAG) -> None:
         """gains: (48,): those of ``Periodic``, ``LinearFeedback`` and ``Repetitive``; or a file of gains by
@@ -33,18 +34,3 @@ class AdaptiveFeedforward(Adaptive):
         """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
         feedforward = series(self.span_angle(observations, LEAD)) @ self.gains[: 2 * HARMONICS]
         return super().whole(observations, learnt + feedforward)
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return [*series_names(), *super().gain_names(context)]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts: neither feedback nor feed-forward."""
-        return np.concatenate([np.zeros(2 * HARMONICS), super().first_gains(context)])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.concatenate([np.full(2 * HARMONICS, STEP), super().gain_steps(context)])

@@ -34,7 +34,7 @@ class FeedbackFeedforward(ForceLaw):
 
     The paper calls the control force positive where the contact force is above F_N, and draws no axes.
     We read A sin(...) as a lift; read as a push down it would be the same with theta + pi. With our
-    reading, the least CF lies between theta = -pi/6 and pi/6 under `en50318-2002`, and under
+    reading, the minimum of CF lies between theta = -pi/6 and pi/6 under `en50318-2002`, and under
     `shinkansen-simple` at 350 and 400 km/h; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 makes
     CF worse: `panto benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
 
@@ -112,7 +112,7 @@ class FeedbackFeedforward(ForceLaw):
         cosine = self.read(observation, "cosine of span position")
         if sine**2 + cosine**2 < 0.5:
             raise InputError(
-                "It needs the place within the span, which these sensors do not tell; take p or pd."
+                "It needs the place within the span, which these sensors do not measure; take p or pd."
             )
         share = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
         if self._share is not None:

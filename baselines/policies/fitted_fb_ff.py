@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
-from .linear_feedback import SIGNALS, LinearFeedback, feedback_names, feedback_steps
-from .periodic import HARMONICS, LEAD, STEP, series, series_names
+from .lanes_law import Array, Gain, Observations, TunableLaw
+from .linear_feedback import FEEDBACK_GAINS, SIGNALS, LinearFeedback
+from .periodic import HARMONICS, LEAD, SERIES_GAINS, series
 
 
 class FittedFeedback(TunableLaw):
@@ -22,6 +25,8 @@ class FittedFeedback(TunableLaw):
     It needs to know what ``Periodic`` needs, and reads contact force, displacements and velocities of head
     and frame. Its gains know delays of actuator and sensors that they were fitted with.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {**SERIES_GAINS, **FEEDBACK_GAINS}
 
     def __init__(self, gains: Source = "fitted-fb+ff") -> None:
         """gains: (45,): those of ``Periodic`` (N), then those of ``LinearFeedback``; or the name or path of a
@@ -42,13 +47,3 @@ class FittedFeedback(TunableLaw):
         force: Array = np.clip(self._feedback(readings, feedforward), -limit, limit)
         self._feedback.remember(force)
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return [*series_names(), *feedback_names()]
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.concatenate([np.full(2 * HARMONICS, STEP), feedback_steps()])

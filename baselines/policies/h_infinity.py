@@ -1,8 +1,9 @@
-"""Mixed-sensitivity H-infinity control: two Riccati equations and a search for the least bound."""
+"""Mixed-sensitivity H-infinity control: two Riccati equations and a search for the minimum bound."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
 
 CORNER = 30.0
@@ -23,11 +24,12 @@ HEIGHT = 1e-3
 WIDTH = 0.7
 """Damping of the weight on the contact force: a band of about its frequency to either side."""
 NEAR = 1.1
-"""The bound used, over the least one: a controller at the least bound is badly conditioned."""
+"""The bound used, over the minimum one: a controller at the minimum bound is badly conditioned."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
-"""Bounds (-) between which the least one is sought, by what factor first, how often that is then halved."""
+"""Bounds (-) between which the minimum is searched for, the factor from one to the next, and how often that
+factor is then halved."""
 
 
 class HInfinity(TunableLaw):
@@ -35,14 +37,20 @@ class HInfinity(TunableLaw):
 
     What comes in is the height of the wire, low-passed, and noise on each reading; what is to be small is the
     contact force through a band-pass weight, W_S = performance 2 zeta w s / (s^2 + 2 zeta w s + w^2), and the
-    command. The controller makes the largest gain between them, over all frequencies, at most 1.1 times the
-    least possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The band
-    leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
+    command. The controller makes the maximum gain between them, over all frequencies, at most 1.1 times the
+    minimum possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The
+    band leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
     included; the controller is sampled by the bilinear rule.
 
     It needs to know the pantograph, tension and mass of the wires, and the delays; not the place within the
     span.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "log performance": Gain(0.1, 0.0),
+        "log frequency": Gain(0.05, 0.3),
+        "log height": Gain(0.1, 1.0),
+    }
 
     def __init__(self, gains: Source = "h-infinity", delay: float = DELAY, lag: float = LAG) -> None:
         """gains: (3,): log10 of the weight's performance (N/N), of its frequency (Hz), of the wire's height
@@ -62,7 +70,7 @@ class HInfinity(TunableLaw):
         model = line_model(context, mean_line(context), delay + interval / 2, lag)
         plant = weighted(model, performance, 2 * np.pi * frequency, height * HEIGHT)
         with one_thread():
-            self.bound, controller = least_bound(plant)
+            self.bound, controller = minimum_bound(plant)
         self._a, self._b, self._c, self._d, _ = cont2discrete(
             (*controller, np.zeros((1, len(OUTPUTS)))), interval, "bilinear"
         )
@@ -76,21 +84,6 @@ class HInfinity(TunableLaw):
         force: Array = (self._c @ self._state + self._d @ seen)[0]
         self._state = self._a @ self._state + self._b @ seen
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["log performance", "log frequency", "log height"]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts."""
-        return np.array([0.0, 0.3, 1.0])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.1, 0.05, 0.1])
 
 
 class Weighted(NamedTuple):
@@ -134,8 +127,8 @@ def weighted(model: LineModel, performance: float, centre: float, height: float)
     return Weighted(a, b1, b2, c1, c2 / np.array(READING_NOISE)[:, None])
 
 
-def least_bound(plant: Weighted) -> tuple[float, Controller]:
-    """A bound (-) a little above the least, and the controller that keeps it; InputError where none does."""
+def minimum_bound(plant: Weighted) -> tuple[float, Controller]:
+    """A bound (-) a little above the minimum, and the controller that keeps it. InputError if none does."""
     bound = SMALLEST
     while central(plant, bound) is None:
         bound *= STRIDE

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +58,13 @@ class LanesLaw(ABC):
     def span_angle(self, observations: Observations, lead: float = 0.0) -> Array:
         """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on.
 
-        Raises InputError where the observation does not tell it: both sine and cosine are 0.
+        Raises InputError where the observation does not hold it: both sine and cosine are 0.
         """
         sine = self.read(observations, "sine of span position")
         cosine = self.read(observations, "cosine of span position")
         if (sine**2 + cosine**2 < 0.5).any():
             raise InputError(
-                "It needs the place within the span, which these sensors do not tell; take skyhook, "
+                "It needs the place within the span, which these sensors do not measure; take skyhook, "
                 "h-infinity, or repetitive:place='counted'."
             )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.alignment.mean_length
@@ -70,11 +72,21 @@ class LanesLaw(ABC):
         return angle
 
 
+class Gain(NamedTuple):
+    """A number that `panto tune` fits."""
+
+    step: float  # change by which its effect is measured: small, and about that of other gains' steps
+    first: float = 0.0  # value from which the fit starts
+
+
 class TunableLaw(LanesLaw):
     """A law with a vector of gains, which is given, or found for line, pantograph and speed in a file."""
 
+    TUNED: ClassVar[Mapping[str, Gain]]
+    """The gains by name, in order."""
+
     def __init__(self, gains: Source) -> None:
-        """gains: the numbers, or the name or path of a file that `panto tune` wrote, asked at each start."""
+        """gains: the numbers, or the name or path of a file that `panto tune` wrote, read at each start."""
         if not isinstance(gains, str) and not (
             len(gains) and all(isinstance(each, int | float) and np.isfinite(each) for each in gains)
         ):
@@ -86,22 +98,7 @@ class TunableLaw(LanesLaw):
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in so many lanes. Raises InputError where there are no gains for them."""
         super().begin(context, lanes)
-        self.gains = find_gains(self._source, self.gain_names(context), context)
-
-    @classmethod
-    @abstractmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts: by default all zero, which is no control."""
-        return np.zeros(len(cls.gain_names(context)))
-
-    @classmethod
-    @abstractmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect, by which a tuner tells what they do."""
+        self.gains = find_gains(self._source, list(self.TUNED), context)
 
 
 class FromAverage:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .lanes_law import Array, FromAverage
+from .lanes_law import Array, FromAverage, Gain
 
 SIGNALS = {
     "head displacement": 0.01,
@@ -25,6 +25,11 @@ AVERAGED = 1.0
 """Time constant (s) of the slow average that each signal is counted from, some span's passing."""
 COUNT = HISTORY * len(SIGNALS) + COMMANDS
 """Number of gains."""
+FEEDBACK_GAINS = {
+    **{f"{name}, {step} steps ago": Gain(3.0 * 0.5) for step in range(HISTORY) for name in SIGNALS},
+    **{f"command, {step + 1} steps ago": Gain(3.0 * 0.2) for step in range(COMMANDS)},
+}
+"""Of the signals (N per their unit), newest first, then of the commands."""
 
 
 class LinearFeedback:
@@ -35,7 +40,7 @@ class LinearFeedback:
     """
 
     def __init__(self, gains: Array, interval: float, lanes: int) -> None:
-        """gains: (17,), named as ``feedback_names`` says; interval: of control (s)."""
+        """gains: (17,), in the order of ``FEEDBACK_GAINS``; interval: of control (s)."""
         self._of_signals, self._of_commands = gains[:-COMMANDS], gains[-COMMANDS:]
         self._past = np.zeros((HISTORY, len(SIGNALS), lanes))
         self._commands = np.zeros((COMMANDS, lanes))
@@ -65,14 +70,3 @@ def loop_gain(gains: Array, answers: NDArray[np.complex128], turns: NDArray[np.c
     weights = gains[:-COMMANDS].reshape(HISTORY, len(SIGNALS)) / units
     past = gains[-COMMANDS:] @ turns[None] ** -np.arange(1, COMMANDS + 1)[:, None]
     return np.asarray(np.einsum("hs,hk,sk->k", weights, steps, answers) + past / COMMAND_UNIT)
-
-
-def feedback_names() -> list[str]:
-    """Names of the gains, in order: of the signals (N per their unit), newest first, then of commands."""
-    signals = [f"{name}, {step} steps ago" for step in range(HISTORY) for name in SIGNALS]
-    return [*signals, *(f"command, {step + 1} steps ago" for step in range(COMMANDS))]
-
-
-def feedback_steps() -> Array:
-    """Changes of the gains of like, small effect."""
-    return 3.0 * np.repeat([0.5, 0.2], [HISTORY * len(SIGNALS), COMMANDS])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from panto_env.base.linear_algebra import one_thread
@@ -9,7 +12,7 @@ from panto_env.control.context import Context
 from panto_env.estimation.kalman import steady_gain
 
 from .gains import Source
-from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, MeanLine, Sampled, line_model, mean_line
 
 HIGHEST = 8.0
@@ -41,6 +44,15 @@ class LinearQuadraticGaussian(TunableLaw):
 
     It needs to know the pantograph, tension and mass of the wires, the span, the speed, and the delays.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "log effort": Gain(0.1, -0.3),
+        "log harmonics": Gain(0.2, 0.0),
+        "log wandering": Gain(0.2, 0.5),
+        "log damper factor": Gain(0.05),
+        "log spring factor": Gain(0.1),
+        "log motion noise factor": Gain(0.2),
+    }
 
     def __init__(self, gains: Source = "lqg", delay: float = DELAY, lag: float = LAG) -> None:
         """gains: (6,): log10 of effort (N^2/N^2), of harmonics' and of wandering noise (mm in a root second),
@@ -81,28 +93,6 @@ class LinearQuadraticGaussian(TunableLaw):
         force: Array = np.clip(-self.feedback @ self._state, -limit, limit)
         self._state = self.model.a @ self._state + np.multiply.outer(self.model.b, force)
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return [
-            "log effort",
-            "log harmonics",
-            "log wandering",
-            "log damper factor",
-            "log spring factor",
-            "log motion noise factor",
-        ]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts."""
-        return np.array([-0.3, 0.0, 0.5, 0.0, 0.0, 0.0])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.1, 0.2, 0.2, 0.05, 0.1, 0.2])
 
 
 class Disturbed:

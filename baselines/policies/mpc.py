@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from panto_env.base.shown import shown
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 
@@ -28,7 +29,7 @@ AVERAGED = 2.0
 
 
 class PredictiveControl(TunableLaw):
-    """The commands over a horizon that make the predicted force vary least, within limits, anew at each step.
+    """Commands over a horizon that minimise the variation of the predicted force within limits, at each step.
 
     Predicted force = passive force of the line as designed at the places to come + answers to commands given
     and to be given, each with the response of the place where it is given (``preview``: stiffness along the
@@ -41,6 +42,13 @@ class PredictiveControl(TunableLaw):
     It needs to know the line's and the pantograph's design, the place within the span, the speed, delays and
     limits of the actuator. Computing the preview takes about a second for each speed.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "log effort": Gain(0.2, -1.0),
+        "believed": Gain(0.1, 0.5),
+        "log fading": Gain(0.1, -1.0),
+        "learning": Gain(0.1, 0.3),
+    }
 
     def __init__(
         self, gains: Source = "mpc", delay: float = DELAY, lag: float = LAG, rate: float = RATE
@@ -94,21 +102,6 @@ class PredictiveControl(TunableLaw):
         self._due[:, -1] = 0.0
         self._due += self._last[:, None] * self._preview.response[step]
         return self._last
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["log effort", "believed", "log fading", "learning"]
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts."""
-        return np.array([-1.0, 0.5, -1.0, 0.3])
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.2, 0.1, 0.1, 0.1])
 
 
 class Programs:

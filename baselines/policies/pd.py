@@ -23,7 +23,7 @@ class ProportionalDerivative(ForceLaw):
 
         The defaults were chosen with `panto benchmark pd:gain=...,derivative=...,damping=... --config
         configs/benchmark.toml` among gains of 0.5, 0.75, 1; derivatives of 0, 0.005, 0.01, 0.015; dampings
-        of 100, 150, 200. With the ideal actuator they come within 0.3 % of the least mean sigma; with the
+        of 100, 150, 200. With the ideal actuator they come within 0.3 % of the minimum mean sigma; with the
         realistic one (configs/benchmark-realistic.toml) sigma is below the passive sigma on every line at
         every speed.
         Raises ValueError for a value that is not valid.

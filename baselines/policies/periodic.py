@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
-from panto_env.control.context import Context
-
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, Gain, Observations, TunableLaw
 
 HARMONICS = 14
 """Of the span: the highest passes 60 m at 350 km/h with 23 Hz, about where the figures' filter ends."""
 LEAD = 0.03
 """Time (s) by which the series looks ahead: about what actuator and sensors cost, so that its coefficients
 turn little between two tuned speeds. It is part of the coefficients' meaning, not a gain."""
-STEP = 3.0
-"""Change (N) of a coefficient by which a tuner tells what it does: well below the limits of an actuator."""
+SERIES_GAINS = {f"{kind}{k}": Gain(3.0) for kind in ("cosine", "sine") for k in range(1, HARMONICS + 1)}
+"""Coefficients of a series (N), whose steps are well below the limits of an actuator."""
 
 
 class Periodic(TunableLaw):
@@ -30,6 +31,8 @@ class Periodic(TunableLaw):
     helps nothing against what differs from span to span, and on another line it is not to be used.
     """
 
+    TUNED: ClassVar[Mapping[str, Gain]] = SERIES_GAINS
+
     def __init__(self, gains: Source = "periodic") -> None:
         """gains: (28,) coefficients a_1..a_14, b_1..b_14 (N), or the name or path of a file of gains."""
         super().__init__(gains)
@@ -38,23 +41,8 @@ class Periodic(TunableLaw):
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         return series(self.span_angle(observations, LEAD)) @ self.gains
 
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return series_names()
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.full(2 * HARMONICS, STEP)
-
 
 def series(angle: Array) -> Array:
     """Cosines, then sines, of the harmonics at angles (lanes,): (lanes, 2 HARMONICS)."""
     angles = np.multiply.outer(angle, np.arange(1, HARMONICS + 1))
     return np.concatenate([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def series_names() -> list[str]:
-    """Names of the coefficients of a series, in order."""
-    return [f"{kind}{k}" for kind in ("cosine", "sine") for k in range(1, HARMONICS + 1)]

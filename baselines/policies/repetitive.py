@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, FromAverage, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, LineModel, line_model, mean_line
 from .span_learner import PACE, Pace, SpanLearner, harmonics
 from .span_place import PLACES, SpanPlace
@@ -29,9 +32,13 @@ class Repetitive(TunableLaw):
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
-    learn. Where no sensor tells the place, ``place="counted"`` goes by the speed that is read: what repeats
+    learn. Where no sensor measures the place, ``place="counted"`` goes by the measured speed: what repeats
     is learnt wherever the count begins, and learning follows the drift of a speed that is slightly wrong.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        name: Gain(0.2 * each, each) for name, each in PACE._asdict().items()
+    }
 
     def __init__(
         self, gains: Source = PACE, delay: float = DELAY, lag: float = LAG, place: str = PLACES[0]
@@ -75,18 +82,3 @@ class Repetitive(TunableLaw):
     def whole(self, observations: Observations, learnt: Array) -> Array:
         """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
         return learnt
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return list(Pace._fields)
-
-    @classmethod
-    def first_gains(cls, context: Context) -> Array:
-        """Gains from which a tuner starts."""
-        return np.array(PACE)
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return 0.2 * np.array(PACE)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from panto_env.control.context import Context
+from collections.abc import Mapping
+from typing import ClassVar
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, Gain, Observations, TunableLaw
 
 
 class Skyhook(TunableLaw):
@@ -20,6 +19,8 @@ class Skyhook(TunableLaw):
     It needs to know nothing of the line but its gains, and reads two velocities.
     """
 
+    TUNED: ClassVar[Mapping[str, Gain]] = {"frame": Gain(20.0), "head": Gain(20.0)}
+
     def __init__(self, gains: Source = "skyhook") -> None:
         """gains: (2,): frame and head (N s/m); or the name or path of a file of gains."""
         super().__init__(gains)
@@ -30,13 +31,3 @@ class Skyhook(TunableLaw):
         velocities = [self.read(observations, f"{mass} velocity") for mass in ("frame", "head")]
         force: Array = -frame * velocities[0] - head * velocities[1]
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["frame", "head"]
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([20.0, 20.0])

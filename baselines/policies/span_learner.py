@@ -70,8 +70,8 @@ class SpanLearner:
         """numbers: of the harmonics, (k,); answers: G_k, (k,); share: of a span that passes in a control
         step; limit: of the actuator's force (N).
         """
-        learning, forgetting, least = np.abs(np.array(pace))
-        self._towards = share * learning * 2 * np.conj(answers) / (np.abs(answers) ** 2 + least**2)
+        learning, forgetting, response = np.abs(np.array(pace))
+        self._towards = share * learning * 2 * np.conj(answers) / (np.abs(answers) ** 2 + response**2)
         self._kept, self._share, self._limit = 1 - share * forgetting, share, OVER * limit
         self._numbers = numbers
         self._learnt: NDArray[np.complex128] = np.zeros((lanes, len(numbers)), dtype=complex)

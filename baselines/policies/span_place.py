@@ -1,4 +1,4 @@
-"""The place within the span: as sensors tell it, or counted from the speed where they do not."""
+"""The place within the span: as sensors measure it, or counted from the speed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SpanPlace:
     def angle(self, law: LanesLaw, observations: Observations) -> Array:
         """Angle, (lanes,), rad: 0 at a support, or counted from where the episode began.
 
-        Raises InputError where it is to be read and the observation does not tell it.
+        Raises InputError where it is to be read and the observation does not hold it.
         """
         if not self._counts:
             return law.span_angle(observations)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
+from typing import ClassVar
 
-from panto_env.control.context import Context
+import numpy as np
 
 from .fb_ff import FORCE_RANGE
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, Gain, Observations, TunableLaw
 
 
 class TunedFeedbackFeedforward(TunableLaw):
@@ -22,6 +23,13 @@ class TunedFeedbackFeedforward(TunableLaw):
     It needs to know the nominal force and the place within the span, and nothing of the line but its gains.
     """
 
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "gain": Gain(0.05),
+        "sine": Gain(2.0),
+        "cosine": Gain(2.0),
+        "bias": Gain(1.0),
+    }
+
     def __init__(self, gains: Source = "tuned-fb+ff") -> None:
         """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains."""
         super().__init__(gains)
@@ -34,13 +42,3 @@ class TunedFeedbackFeedforward(TunableLaw):
         feedforward = sine * np.sin(angle) + cosine * np.cos(angle)
         force: Array = gain * (self.context.nominal_force - contact_force) + feedforward + bias
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["gain", "sine", "cosine", "bias"]
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.05, 2.0, 2.0, 1.0])

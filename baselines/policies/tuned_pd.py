@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
+from typing import ClassVar
 
 from panto_env.control.context import Context
 
 from .gains import Source
-from .lanes_law import Array, Observations, TunableLaw
+from .lanes_law import Array, Gain, Observations, TunableLaw
 
 
 class TunedProportionalDerivative(TunableLaw):
@@ -15,10 +16,17 @@ class TunedProportionalDerivative(TunableLaw):
 
     u = gain e + derivative de/dt - damping dz/dt + bias, with e = F_N - F, de/dt its backward difference over
     the control interval (0 at the first step) and dz/dt the frame's velocity, all as measured. Where the mean
-    force is below F_N, feedback alone presses harder; the bias takes that back.
+    force is below F_N, feedback alone raises it; the bias compensates for that.
 
     It needs to know the nominal force, and nothing of the line but its gains.
     """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "gain": Gain(0.05),
+        "derivative": Gain(0.001),
+        "damping": Gain(20.0),
+        "bias": Gain(1.0),
+    }
 
     def __init__(self, gains: Source = "tuned-pd") -> None:
         """gains: (4,): gain (N/N), derivative (N per N/s), damping (N s/m), bias (N); or the name or path of
@@ -44,13 +52,3 @@ class TunedProportionalDerivative(TunableLaw):
             + bias
         )
         return force
-
-    @classmethod
-    def gain_names(cls, context: Context) -> list[str]:
-        """Names of the gains, in order."""
-        return ["gain", "derivative", "damping", "bias"]
-
-    @classmethod
-    def gain_steps(cls, context: Context) -> Array:
-        """Changes of the gains of like, small effect."""
-        return np.array([0.05, 0.001, 20.0, 1.0])

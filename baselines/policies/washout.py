@@ -22,11 +22,11 @@ class WashoutSettings(Settings):
 
 
 class Washout:
-    """A high-pass for what a controller asks for: y = u - a, with a' = f / time constant and a = 0 at first.
+    """A high-pass for a controller's force: y = u - a, with a' = f / time constant and a = 0 at first.
 
     f is what the actuator makes of y, by its lag and its limits of force and rate. An actuator force with an
     average moves the mean contact force, and little else does: without it, a controller cannot buy a smaller
-    sigma by pressing less. (Flight control calls such a filter a washout.) That it is f, not u, which has no
+    sigma by a smaller mean force. (Flight control calls such a filter a washout.) That f, not u, has no
     average matters: limits that cut one side more than the other leave a mean. Where a span passes within a
     second and the time constant is one, the span's harmonics go through with 1 to 2 % and up to 10 degrees of
     difference.
@@ -35,7 +35,7 @@ class Washout:
     def __init__(
         self, settings: WashoutSettings, interval: float, limit: float, shape: tuple[int, ...]
     ) -> None:
-        """interval: of control (s); limit: of force (N); shape: of what is asked for."""
+        """interval: of control (s); limit: of force (N); shape: of requested forces."""
         self._share = 1.0 - math.exp(-interval / settings.time_constant)
         self._settings, self._interval, self._limit = settings, interval, limit
         self._average, self._force = np.zeros(shape), np.zeros(shape)
@@ -45,9 +45,9 @@ class Washout:
         which = ... if lanes is None else lanes
         self._average[which] = self._force[which] = 0.0
 
-    def __call__(self, asked: NDArray[np.floating]) -> NDArray[np.float64]:
+    def __call__(self, requested: NDArray[np.floating]) -> NDArray[np.float64]:
         """What is left of forces (N), within the limit; it moves the averages."""
-        left: NDArray[np.float64] = np.clip(asked - self._average, -self._limit, self._limit)
+        left: NDArray[np.float64] = np.clip(requested - self._average, -self._limit, self._limit)
         self._force += self._change(left - self._force)
         self._average += self._share * self._force
         return left

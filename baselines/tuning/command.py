@@ -53,7 +53,6 @@ def tune(
     --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
     """
     from panto_env.cluster.parts import remove_parts
-    from panto_env.control import Task
     from panto_env.control.settings import run_settings
 
     from ..benchmark.seeds import TRAINING
@@ -69,7 +68,6 @@ def tune(
     )
     kind, path = tunable(policy), output or gain_file(policy)
     check_gain_file(path, policy, settings, force)
-    names = kind.gain_names(Task(settings, keep_samples=False).context(0))
     count = seeds or SEEDS
     speeds = sorted(set(speed or SPEEDS_KMH))
     parts = parts_of(path)
@@ -86,7 +84,7 @@ def tune(
             progress=progress,
         )
     command = this_command()
-    tuning = make_tuning(settings, names, tuned, TRAINING[:count], command)
+    tuning = make_tuning(settings, list(kind.TUNED), tuned, TRAINING[:count], command)
     with written_last() as later:
         later(store, path, policy, tuning)
         later(remove_parts, parts)

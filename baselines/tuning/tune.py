@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
-from panto_env.control import Task
 from panto_env.control.settings import RunSettings
 from panto_env.policies import maker_of, policy_names
 
@@ -64,9 +63,6 @@ def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, pa
     kind, training = tunable(policy), TRAINING[:seeds]
     at_speed = settings.model_copy(update={"speed_kmh": (speed_kmh, speed_kmh)})
     fast = at_speed.model_copy(update={"accuracy": "fast"})
-    task = Task(fast, keep_samples=False)
-    task.reset(0, np.random.default_rng(training[0]))
-    context = task.context(0)
     passive = run_batch(fast, [Still()], training)
     used = len(training)
 
@@ -76,7 +72,7 @@ def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, pa
         laws = [kind(gains=tuple(each.tolist())) for each in candidates]
         return residuals_of(run_batch(fast, laws, training), passive)
 
-    first, steps = kind.first_gains(context), kind.gain_steps(context)
+    steps, first = np.array(list(kind.TUNED.values())).T
     iterations = max(1, passes // ((1 + len(first) + len(DAMPINGS)) * len(training)))
     found = fit(residuals, first, steps, iterations, RIDGE)
     gains = tuple(found.gains.tolist())

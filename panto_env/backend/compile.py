@@ -12,6 +12,7 @@ from numba.core.extending import intrinsic
 
 from .cache import cache_folder
 from .kept_kernels import KeptKernels
+from .parts import KERNEL_OPTIONS, PART_OPTIONS, refuse_calls
 
 F = TypeVar("F", bound=Callable[..., Any])
 E = TypeVar("E", bound=IntEnum)
@@ -23,7 +24,7 @@ hundred times slower: for debuggers and for coverage."""
 # "contract" lets multiply and add fuse; it leaves the order of operations alone. Kernels allocate
 # nothing, so without Numba's run-time they need not count references to the arrays they are given.
 OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
-INLINED = OPTIONS | {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INLINED = OPTIONS | PART_OPTIONS
 """Of what kernels call: a call would cost as much as what most of these functions do."""
 
 
@@ -35,7 +36,7 @@ def kernel(function: F) -> F:
     previous, folder = numba.config.CACHE_DIR, cache_folder()
     numba.config.CACHE_DIR = str(folder or "")  # read by Numba's cache when it is made
     try:
-        compiled: Any = numba.njit(nogil=True, no_cfunc_wrapper=True, **OPTIONS)(function)
+        compiled: Any = numba.njit(nogil=True, **KERNEL_OPTIONS, **OPTIONS)(function)
         if JIT and folder is not None:
             compiled._cache = KeptKernels(function)
     finally:
@@ -46,6 +47,8 @@ def kernel(function: F) -> F:
 def inlined(function: F) -> F:
     """A function that kernels call, compiled by itself and then put in the place of the call."""
     compiled: Any = numba.njit(**INLINED)(function)
+    if JIT:
+        refuse_calls(compiled)
     return compiled  # type: ignore[no-any-return]
 
 

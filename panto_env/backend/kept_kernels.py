@@ -1,7 +1,7 @@
-"""Compiled kernels on disk: Numba's cache; a damaged file is compiled anew, a full disk ends nothing.
+"""Compiled kernels on disk: Numba's cache, where damaged files are compiled anew and no full disk ends a run.
 
-Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself;
-where one overwrites the other's file with the kernel for other types, that is noticed.
+Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself.
+Where one overwrites the other's file with the kernel for other types, that is noticed.
 """
 
 from __future__ import annotations
@@ -75,6 +75,6 @@ def _announce() -> None:
     global _announced
     seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if seen and time.monotonic() - _announced > PAUSE:
-        text = "Compiling kernels, about 15 s, once per version and kind of line ..."
+        text = "Compiling kernels, about 10 s, once per version and kind of line ..."
         print(text, file=sys.stderr, flush=True)
         _announced = time.monotonic()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,13 @@ from ..plant.state import Row
 from ..plant.valid_range import LARGEST_HEIGHT, Ending, reason
 from .identity import identity
 from .state import CONTROLLED, TaskRow
-
-if TYPE_CHECKING:
-    from .task import Task
+from .task_state import TaskState
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
 
 
-def diverged(task: Task, lanes: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
+def diverged(task: TaskState, lanes: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
     """Whether the mean deviation of lanes, (n,), from their nominal force (N), or their wire's height (m),
     is that of no line.
     """
@@ -34,7 +32,7 @@ def diverged(task: Task, lanes: Any, deviation: Array, height: Array) -> NDArray
     return np.asarray(~possible | (endings == Ending.DIVERGED))
 
 
-def divergence(task: Task, lane: int) -> str:
+def divergence(task: TaskState, lane: int) -> str:
     """That a lane's computation diverged, and what to do, as a sentence."""
     plant = task.plant
     return (
@@ -54,7 +52,7 @@ def _way_out(plant: Plant) -> str:
 
 
 def trajectory(
-    task: Task, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
+    task: TaskState, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
 ) -> Trajectory:
     """Record of a lane's run so far. Raises InputError where its computation diverged.
 
@@ -104,7 +102,7 @@ def trajectory(
     )
 
 
-def ending(task: Task, lane: int) -> str:
+def ending(task: TaskState, lane: int) -> str:
     """Where and why a lane's run ended early, as a sentence; empty where it did not."""
     which = _ending(task, lane)
     if which is Ending.NONE:
@@ -118,5 +116,5 @@ def ending(task: Task, lane: int) -> str:
     )
 
 
-def _ending(task: Task, lane: int) -> Ending:
+def _ending(task: TaskState, lane: int) -> Ending:
     return Ending(int(task.episode.table[lane, TaskRow.ENDING]))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +13,24 @@ from ..base.units import to_kmh
 from ..plant.state import SAMPLE_ROWS, Row
 from ..plant.valid_range import Ending
 from .episode import Results
+from .record import ending
 from .running_figures import no_figures
 from .start import LaneGenerators, draw_starts
 from .state import CONTROLLED, Result, TaskRow
-
-if TYPE_CHECKING:
-    from .task import Task
+from .task_state import TaskState
 
 
-def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
-    """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
+def reset(
+    task: TaskState,
+    lanes: Any,
+    random: LaneGenerators,
+    static_forces: Callable[[Array], Array | None],
+    results: Results,
+) -> None:
+    """Start episodes in lanes, (n,), and run them in as far as drawn; arguments as of ``Task.reset``.
+
+    static_forces: of lanes with speeds, (n,) (m/s), in N, or None where they are applied as they are.
+    """
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
     droppers, supports = len(plant.model.droppers), len(plant.model.supports)
@@ -35,7 +44,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
         plant.time_step,
         plant.alignment,
     )
-    forces = task.static_forces(drawn.speed)
+    forces = static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
     end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
@@ -57,14 +66,14 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
         _run_in(task, lanes[run_in > 0], run_in[run_in > 0], results)
 
 
-def _begin(task: Task, lanes: Any, end: Array) -> None:
+def _begin(task: TaskState, lanes: Any, end: Array) -> None:
     """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
     start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
-    if not nominal[low] > 0:  # the reward is told in shares of it
+    if not nominal[low] > 0:  # the reward is in shares of it
         raise InputError(
             f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
             f"against the wire, its lift is {nominal[low]:g} N; give it a static_force or an "
@@ -80,21 +89,21 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
     task.running.peak[lanes] = -np.inf
 
 
-def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
+def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
     rows = task.episode.table[lanes]
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
-        raise InputError(task.ending(lane))
+        raise InputError(ending(task, lane))
     _begin(task, lanes, rows[:, TaskRow.END])
     results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards are not of the episode
     if task.layout.history:
         _forget(task, lanes, rows, results)
 
 
-def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
+def _forget(task: TaskState, lanes: Any, rows: Array, results: Results) -> None:
     """Let the history of lanes that have run in have been as what they read at the end of that.
 
     rows: of ``TaskRow``, (lanes, rows), from before their episodes began.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any
 
@@ -26,17 +25,17 @@ from .length import EpisodeLength
 from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
 from .normalise import normalised
 from .observation import layout
-from .passive_run import LOW_PASSED, PassiveRun, passive_run
+from .passive_run import passive_run
 from .record import diverged, divergence, ending, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
 from .settings import RunSettings
 from .start import LaneGenerators
 from .state import CONTROLLED, TaskRow
-from .stepping import Stepping
+from .task_state import TaskState
 
 
-class Task(Stepping):
+class Task(TaskState):
     """Lanes of one pantograph, line and controller; each lane is reset and judged on its own."""
 
     def __init__(
@@ -71,10 +70,10 @@ class Task(Stepping):
             speeds = length.check_speeds(settings.normalise)
             run = passive_run(known, speeds, passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
-        self.passive: PassiveRun | None = None  # that the reward counts from
+        self.passive = None
         if settings.reward.target == "passive":
             self.passive = passive_run(settings, length.speed_range, passive_pass)
-        self.speed = plant.speed  # of each lane (m/s)
+        self.speed = plant.speed
         odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
@@ -123,7 +122,7 @@ class Task(Stepping):
         """
         lanes = np.atleast_1d(lanes)
         self.begin(lanes)
-        reset(self, lanes, random, results or self.results)
+        reset(self, lanes, random, self.static_forces, results or self.results)
 
     def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is to be met, else None."""
@@ -132,15 +131,6 @@ class Task(Stepping):
         if self.trim is None:
             self.trim = trim_as_designed(self.settings, self.length.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
-
-    def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
-        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
-
-        Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
-        """
-        if self.passive is None:
-            return nominal, nominal
-        return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
 
     def end(self, lane: int) -> int:
         """Plant steps that a lane's episode has."""
@@ -172,7 +162,7 @@ class Task(Stepping):
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
     def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
-        """The same of several lanes, (n,), by name; and which have none, as their computation diverged."""
+        """Figures of several lanes, (n,), by name; and which have none, as their computation diverged."""
         run, supports = self.plant.run.table[CONTROLLED, lanes], self.plant.model.supports
         with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
             figures = figures_so_far(
@@ -190,11 +180,6 @@ class Task(Stepping):
     def divergence(self, lane: int) -> str:
         """That a lane's computation diverged, and what to do, as a sentence."""
         return divergence(self, lane)
-
-    def target_mean(self, lane: int) -> float:
-        """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
-        target = target_mean(self.settings, float(self.speed[lane]))
-        return math.nan if target is None else target
 
     def trajectory(
         self, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False

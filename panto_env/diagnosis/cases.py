@@ -96,9 +96,9 @@ def draw_defect(track: Track, kind: str, severity: float, span: int, random: np.
 
 def every_defect(track: Track, random: np.random.Generator, broken: int = 1) -> list[Defect]:
     """One of each kind and severity, and ``broken`` broken droppers, at places drawn."""
-    wanted = [(kind, severity) for kind, each in SEVERITIES.items() for severity in each]
-    wanted += [(BROKEN, 1.0)] * (broken - 1)
-    return [draw_defect(track, *each, int(random.integers(FIRST, BEYOND)), random) for each in wanted]
+    drawn = [(kind, severity) for kind, each in SEVERITIES.items() for severity in each]
+    drawn += [(BROKEN, 1.0)] * (broken - 1)
+    return [draw_defect(track, *each, int(random.integers(FIRST, BEYOND)), random) for each in drawn]
 
 
 def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajectory:

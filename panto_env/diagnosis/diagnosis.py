@@ -24,7 +24,7 @@ ENOUGH_PASSES = 10
 """Healthy passes from which on how they differ is well known: with fewer, what a pantograph unlike all of
 theirs does is taken for defects (``studies/paper2``)."""
 MANY = 6
-"""Likewise their mean."""
+"""Healthy passes from which on their mean is well known."""
 ALIKE = 2.0
 """Level of healthy passes (N) that those over one line keep to: simulated ones have 0.6 to 1.6 N at 160 to
 280 km/h on two lines. Over several lines of a design, droppers differing by 5 mm rms, it is 2.2 to 5.9 N."""
@@ -96,9 +96,9 @@ def judge(
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
     limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
     evidence, levels = healthy.weigh(passes, limit)
-    asked = classifier or trained()
+    network = classifier or trained()
     found = [
-        _finding(evidence, asked.answer(evidence, region), float(evidence.score[region.peak]))
+        _finding(evidence, network.answer(evidence, region), float(evidence.score[region.peak]))
         for region in regions(evidence)
     ]
     level, changed = _whole_line(levels, healthy.levels)

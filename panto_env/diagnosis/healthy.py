@@ -24,7 +24,7 @@ SMOOTHED = 1.0
 """Way (m) over which the remainder's usual size is smoothed."""
 MOST_PATTERNS = 4
 SPANS_COUNT_AS = 4
-"""Passes that the same place in other spans counts as, where the usual size of a remainder is asked for."""
+"""Passes that the same place in other spans counts as, for the usual size of a remainder."""
 FLOOR = 0.1
 """Share of white noise that whitening reckons with: without, it would amplify what the 20 Hz filter left."""
 QUIET = 0.25
@@ -35,7 +35,7 @@ ROUNDS, FAR = 8, 2.0
 
 @dataclass(frozen=True)
 class Healthy:
-    """A healthy line, as its passes tell."""
+    """What healthy passes over a line have in common, and how they differ."""
 
     mean: Array  # (places,): force (N)
     patterns: Array  # (patterns, places): by which passes differ (N)
@@ -107,7 +107,7 @@ def _against(force: Array, others: Array) -> Array:
 
 
 def _patterns(force: Array) -> Array:
-    """The largest principal components of passes, (patterns, places): half as many as there are passes."""
+    """The first principal components of passes, (patterns, places): half as many as there are passes."""
     _, _, along = np.linalg.svd(force - force.mean(axis=0), full_matrices=False)
     return np.asarray(along[: min(MOST_PATTERNS, len(force) // 2)])
 
@@ -125,7 +125,7 @@ def _remainder(deviation: Array, patterns: Array, size: Array) -> Array:
 
 
 def _usual_size(rest: Array, passes: Passes) -> Array:
-    """Rms of remainders, (passes, places), by place: here, as far as passes are enough to tell, and at the
+    """Rms of remainders, (passes, places), by place: here, weighted by the number of passes, and at the
     same place of all spans.
     """
     from scipy.ndimage import gaussian_filter1d  # slow to import

@@ -1,7 +1,7 @@
 """Which kind of defect it is, and at which candidate: a small neural network, kept as plain arrays.
 
-scikit-learn trains it (``training.py``); here is only its sum. Each candidate about a greatest score is asked
-whether a defect is just there, and of which kind; the surest answer counts.
+scikit-learn trains it (``training.py``); here is only its sum. For each candidate
+about a maximum of the score it estimates whether a defect is there, and of which kind; the surest counts.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def side_by_side(
     """
     if len(healthy) < FEWEST:
         raise InputError(
-            f"What healthy passes have in common takes {FEWEST} of them at least, not {len(healthy)}; "
+            f"What healthy passes have in common takes at least {FEWEST} of them, not {len(healthy)}; "
             "give more with --healthy."
         )
     everything = [*runs, *healthy]
@@ -112,7 +112,7 @@ def side_by_side(
     if last < FIRST_SETTLED:
         raise InputError(
             f"The shortest run ends at {min(run.distance for run in everything):.4g} m, but a run's start is "
-            f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is wanted: run "
+            f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is required: run "
             f"{alignment.support(FIRST_SETTLED) + END:g} m or more."
         )
     per_span = math.ceil(span / min(STEP, from_kmh(speed) / CUTOFF / PER_WAVE) - 1e-9)

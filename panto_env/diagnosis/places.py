@@ -12,7 +12,7 @@ from ..plant.alignment import Alignment
 
 ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
 """Distance (spans) from a defect up to which less than such a share of its score counts as its own waves, as
-simulated ones make them at 160 to 280 km/h. Nearer than the first none is told apart."""
+simulated ones make them at 160 to 280 km/h. Nearer than the first none is distinguished."""
 
 
 @dataclass(frozen=True)

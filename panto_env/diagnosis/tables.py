@@ -49,16 +49,16 @@ def verdict(diagnosis: Diagnosis) -> list[str]:
     """What passes say, in sentences."""
     stretch = f"{diagnosis.begin:.0f} to {diagnosis.end:.0f} m"
     expected = diagnosis.false_alarms * (diagnosis.end - diagnosis.begin) / 1e3
-    told = []
+    sentences = []
     if diagnosis.changed:
-        told.append(
+        sentences.append(
             f"The whole line differs from its healthy state, {diagnosis.level:.1f} times as much as healthy "
             "passes do from one another: lost tension, or a pantograph unlike theirs."
         )
     if diagnosis.findings:
         count = len(diagnosis.findings)
-        told.append(f"{count} defect{'s' if count > 1 else ''} from {stretch}.")
+        sentences.append(f"{count} defect{'s' if count > 1 else ''} from {stretch}.")
     elif not diagnosis.changed:
-        told.append(f"Healthy from {stretch}.")
-    told.append(f"A healthy line would show {expected:.2g} false ones along this way.")
-    return told
+        sentences.append(f"Healthy from {stretch}.")
+    sentences.append(f"A healthy line would show {expected:.2g} false ones along this way.")
+    return sentences

@@ -1,6 +1,6 @@
 """The score from which on a place is called defective: by false alarms per kilometre.
 
-The largest log score of a span is taken to have Gumbel's distribution, the limit of maxima of many values.
+The maximum log score of a span is taken to have Gumbel's distribution, the limit of maxima of many values.
 It is fitted to the spans of healthy passes, each held against the others, and reaches to spans rarer than any
 of them. Where passes are few, another one may differ by more than they do from one another.
 """

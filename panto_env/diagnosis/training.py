@@ -116,7 +116,7 @@ def tracks(seeds: Sequence[int] = SEEDS) -> list[Track]:
 
 
 def main(workers: int | None = None) -> None:
-    """Simulate, train, write; workers: processes, one per core unless told otherwise."""
+    """Simulate, train, write; workers: processes, by default one per core."""
 
     def report(done: int, every: int) -> None:
         print(f"{done} of {every} tracks", file=sys.stderr)

@@ -24,7 +24,7 @@ WINDOW = 0.5
 
 
 class Whiteness(NamedTuple):
-    """Autocorrelation of innovations, of the quantity where it is largest."""
+    """Autocorrelation of innovations, of the quantity where it is greatest in size."""
 
     largest: float  # -1..1: of the largest size, over lags 1 to ``LAGS``
     bound: float  # that a correct model stays below in LEVEL of all records
@@ -68,8 +68,8 @@ def log_likelihood(filtered: Filtered, first: int = 0) -> float:
 def whiteness(normalised: Array) -> Whiteness:
     """Test normalised innovations, (n, m), by their autocorrelations.
 
-    The probability is that of G. M. Ljung and G. E. P. Box, Biometrika 65:297, 1978 (recalled), the least of
-    the quantities', times their number.
+    The probability is that of G. M. Ljung and G. E. P. Box, Biometrika 65:297, 1978 (recalled), the minimum
+    over the quantities, times their number.
     """
     from scipy.stats import chi2  # slow to import
 
@@ -80,7 +80,7 @@ def whiteness(normalised: Array) -> Whiteness:
     correlations = np.array([(centred[lag:] * centred[:-lag]).sum(axis=0) / power for lag in lags])
     sums = n * (n + 2) * (correlations**2 / (n - lags)[:, None]).sum(axis=0)
     largest = correlations.ravel()[np.abs(correlations).argmax()]
-    # The largest of m LAGS independent numbers: each within, so that all are at LEVEL.
+    # The maximum of m LAGS independent numbers: each within, so that all are at LEVEL.
     each = LEVEL ** (1 / (m * LAGS))
     bound = np.sqrt(chi2.ppf(each, 1) / n)
     return Whiteness(float(largest), float(bound), float(min(1.0, m * chi2.sf(sums.max(), LAGS))))

@@ -23,7 +23,7 @@ BLOCK = 4096
 
 
 class Gains(NamedTuple):
-    """Of samples 0, 1, ..., j - 1; the last is that of all later ones."""
+    """Gains of samples 0, 1, ..., j - 1; the last also holds for all later ones."""
 
     gain: Array  # (j, N, m)
     innovation: Array  # (j, m, m): covariance of the innovation
@@ -32,7 +32,7 @@ class Gains(NamedTuple):
     )
 
     def of(self, samples: Index) -> Gains:
-        """Those of some samples, by their numbers, (n,)."""
+        """Gains of the samples with these numbers, (n,)."""
         place = np.minimum(samples, len(self.gain) - 1)
         return Gains(*(each[place] for each in self))
 

@@ -47,8 +47,8 @@ class Parameters:
     pantograph: PantographData  # with these values
 
     @property
-    def told(self) -> Array:
-        """How much of what was unknown of each parameter the record told, (p,): 0 nothing, 1 all."""
+    def resolved(self) -> Array:
+        """Share of each parameter's prior uncertainty that the record removed, (p,): 0 none, 1 all."""
         return 1 - self.deviation / PRIOR
 
 
@@ -76,12 +76,12 @@ def estimate_parameters(
     from scipy.linalg import block_diag  # slow to import
 
     settings = EstimatorSettings() if settings is None else settings
-    # A suspension whose error wanders takes up what the lift tells: all parameters then drift together.
+    # A suspension whose error wanders takes up what the lift determines: all parameters then drift together.
     settings = settings.model_copy(update=PAPER2)
     check_motion(motion, pantograph)
     names = frame_parameters(pantograph) if names is None else tuple(names)
     if not names:
-        raise InputError("Name one parameter at least.")
+        raise InputError("Name at least one parameter.")
     _check(names, pantograph)
     linear = _Linearised(motion, pantograph, settings, names)
     model, p = linear.model, len(names)
@@ -121,7 +121,7 @@ def information(
 
     The inverse bounds the covariance of any unbiased estimate of them (Cramér and Rao). A parameter without
     information cannot be seen; a direction without any, no combination of its parameters. The gain is held:
-    what noise would tell, were its intensities known, does not count.
+    what the noise would add, were its intensities known, does not count.
     """
     check_motion(motion, pantograph)
     _check([name for name in names if name not in (HEAD_MASS, LIFT)], pantograph)

@@ -87,7 +87,7 @@ def _check_time(motion: Motion) -> None:
     duration = samples * motion.time_step
     if not SAMPLING[0] <= rate <= SAMPLING[1]:
         raise InputError(
-            f"The record has {rate:,.4g} samples a second; {SAMPLING[0]:g} to {SAMPLING[1]:,g} are wanted: "
+            f"The record has {rate:,.4g} samples a second; {SAMPLING[0]:g} to {SAMPLING[1]:,g} are required: "
             "is its time in the unit that is said?"
         )
     if samples > MOST_SAMPLES:

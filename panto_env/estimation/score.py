@@ -14,10 +14,10 @@ BANDS = (2.0, 5.0, 20.0)
 """Highest frequencies (Hz) of the bands 0-2, 0-5 and 0-20 Hz."""
 ORDER = 4
 """Of the Butterworth low-pass that cuts a band out, run forward and backward, so that it delays nothing."""
-LARGEST_DELAY = 0.1
+MAXIMUM_DELAY = 0.1
 """Either way, that is looked for (s)."""
 COHERENT = 0.5
-"""Least coherence of a frequency whose phase tells a delay."""
+"""Minimum coherence of a frequency whose phase counts for the delay."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Score:
     bias: float  # mean of estimate less truth (N)
     rms: float  # of estimate less truth without that mean (N)
     correlation: float  # -1..1, as they stand, delay included
-    delay: float  # at which their cross-correlation is largest (s); positive: the estimate is late
+    delay: float  # at which their cross-correlation is maximal (s); positive: the estimate is late
     whole_rms: float  # as rms, at all frequencies: noise and what is lost beyond the band count too (N)
     phase_delay: float  # mean over the band's coherent frequencies, by power (s); nan: none is coherent
 
@@ -98,7 +98,7 @@ def _in_band(values: Array, band: float, time_step: float) -> Array:
 
 def _delay(true: Array, estimated: Array, time_step: float, left_out: int) -> float:
     """Shift (s) of the estimate at which the two resemble each other most, between samples by a parabola."""
-    most = min(round(LARGEST_DELAY / time_step), left_out)
+    most = min(round(MAXIMUM_DELAY / time_step), left_out)
     inner = slice(left_out, len(true) - left_out)
     shifts = np.arange(-most, most + 1)
     like = [

@@ -22,7 +22,7 @@ class EstimatorSettings(Settings):
     force_model: Annotated[ForceModel, BeforeValidator(as_force_model)] = Field(
         default_factory=RandomWalk,
         description="what is believed of the contact force: random-walk, shaped, periodic, with values where "
-        "wanted, as 'shaped:wavelength=5'",
+        "needed, as 'shaped:wavelength=5'",
     )
     displacement_noise: Annotated[float, Between(1e-8, 0.1, "m")] = Field(
         DISPLACEMENT_NOISE, description="white noise of a sample of displacement, rms (m)"

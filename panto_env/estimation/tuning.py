@@ -40,7 +40,7 @@ class Tuning:
     values: dict[str, float]  # by name
     log_likelihood: float  # per sample
     before: float  # of the settings that it began with, per sample
-    at_bounds: tuple[str, ...]  # names that ended at an end of their range: the records do not tell them
+    at_bounds: tuple[str, ...]  # names that ended at an end of their range: the records do not determine them
 
 
 def tune(
@@ -60,7 +60,7 @@ def tune(
     from scipy.optimize import minimize  # slow to import
 
     if not motions:
-        raise InputError("Tuning needs one healthy run at least.")
+        raise InputError("Tuning needs at least one healthy run.")
     for motion in motions:
         check_motion(motion, pantograph)
     ranges = [_range(settings, name) for name in names]

@@ -101,7 +101,7 @@ def _dependence(r: Array, names: tuple[str, ...]) -> float:
     if dependence > DEPENDENT:
         involved = [name for name, share in zip(names, rows[-1], strict=True) if abs(share) > 0.1]
         raise InputError(
-            f"The record cannot tell {' from '.join(involved)}: their columns depend on each other "
+            f"The record cannot separate {' from '.join(involved)}: their columns depend on each other "
             f"(condition number {dependence:.2g}). Excite several frequencies, as a sweep does, "
             "or measure one of them and give it with --measured."
         )

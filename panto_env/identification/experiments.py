@@ -79,15 +79,17 @@ def add_noise(
     generator: np.random.Generator,
     *,
     displacement: float = DISPLACEMENT_NOISE,
-    force: float = FORCE_NOISE,
 ) -> Record:
-    """The record with white noise on every sensor, rms in m and N."""
+    """The record with white noise on every sensor: of displacements (rms, m), and FORCE_NOISE."""
     noise = displacement * generator.standard_normal((3, len(record.plate)))
+    force = record.force
+    if force is not None:
+        force = force + FORCE_NOISE * generator.standard_normal(len(force))
     return Record(
         record.time_step,
         record.plate + noise[0],
         record.head + noise[1],
         record.support + noise[2],
-        None if record.force is None else record.force + force * generator.standard_normal(len(record.force)),
+        force,
         record.start,
     )

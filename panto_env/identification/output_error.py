@@ -33,7 +33,7 @@ IDENTIFIABLE = 1e3
 """Dependence of the columns (condition number, lengths 1) up to which a solution is more than luck."""
 
 START = {"c1T": 1.0, "c2": 1.0, "m3": 1.0, "c3": 1.0, "k3": 1.0}
-"""Least values to start from, and the scales below which a parameter counts as small: the model is stable."""
+"""Minimum values to start from, so that the model is stable, and scales below which a parameter is small."""
 
 
 def fit_output_error(record: Record, known: Parameters, *, band: float, free_offset: bool = False) -> Fit:

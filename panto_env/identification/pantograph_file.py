@@ -18,7 +18,7 @@ EXPLAINS = 50.0
 """Fitting performance (%) of a displacement from which a model explains it."""
 (_FORCE,) = set(ranges_of(PantographData.model_fields["static_force"].rebuild_annotation()))
 MOST_FORCE = _FORCE.high
-"""Largest lifting force (N) of a pantograph."""
+"""Maximum lifting force (N) of a pantograph."""
 SUFFIXES = (".toml",)
 """Of the file that a pantograph is written to."""
 
@@ -56,7 +56,7 @@ def write_pantograph(
         if match.driven_by == "plate" and match.channel != "force" and not match.performance >= EXPLAINS:
             raise InputError(
                 f"The model by {fit.method} does not explain the motion of {match.channel} (fitting "
-                f"performance {match.performance:.3g} %, {EXPLAINS:g} % is wanted), so none is written; "
+                f"performance {match.performance:.3g} %, {EXPLAINS:g} % is required), so none is written; "
                 "check units and signs, or take a record with more motion, another --method, or known values "
                 "by --measured."
             )

@@ -21,7 +21,7 @@ DURATION = (0.5, 3600.0)  # s
 MOST_SAMPLES = 2_000_000
 FARTHEST = 3.0  # m, of any displacement from the rest: no pantograph reaches higher
 MOTION = (20e-6, 0.5)  # m from end to end, of plate and head; laser sensors see some µm
-FORCE = (0.01, 3000.0)  # N: from end to end at least, and at most at all
+FORCE = (0.01, 3000.0)  # N: minimum from end to end, maximum of any
 ALIKE = 30.0
 """How many times as far one may move as another, or as large a force be as the spring makes it."""
 HEAVIEST = 50.0  # kg, of a frame: it follows the head up to its own frequency on k2
@@ -76,12 +76,12 @@ def _check_sizes(record: Record) -> None:
                 "in a column of mm, or mm in a column of µm?"
             )
     plate = float(record.plate.std())
-    for name, values, least in (
+    for name, values, minimum in (
         (COLUMNS[1], record.head, 1 / ALIKE),
         (COLUMNS[2], record.support, 1 / ALIKE**1.5),  # it stays behind where the plate is quick
     ):
         ratio = float(values.std()) / plate
-        if not least <= ratio <= ALIKE:
+        if not minimum <= ratio <= ALIKE:
             far = f"{ratio:,.3g} times as far" if ratio > 1 else f"1/{1 / ratio:,.3g} as far"
             raise InputError(
                 f"Column {name} moves {far} as {COLUMNS[0]}: are both in the units that are said?"
@@ -101,10 +101,10 @@ def _check_signs(record: Record, known: Parameters) -> None:
 
 
 def _check_force(record: Record, force: Array, stiffness: float) -> None:
-    largest, swing = float(np.abs(force).max()), float(np.ptp(force))
-    if largest > FORCE[1]:
+    maximum, swing = float(np.abs(force).max()), float(np.ptp(force))
+    if maximum > FORCE[1]:
         raise InputError(
-            f"Column force holds {largest:,.4g} N, which no pantograph bears: newtons in a column of kN?"
+            f"Column force holds {maximum:,.4g} N, which no pantograph bears: newtons in a column of kN?"
         )
     if swing < FORCE[0]:
         raise InputError(f"Column force changes by {swing:.2g} N only: kilonewtons in a column of N?")

@@ -23,7 +23,7 @@ NARROW, HIGHEST = 2.5, 60.0
 FOLLOWED = 0.10
 """Error, as a share of the reference's rms in a band, up to which it is followed."""
 SLOWEST_STEP = 2.5e-4
-"""Time step (s) of both, unless told otherwise: the same, so that they differ by the rig alone."""
+"""Time step (s) of both by default: the same, so that they differ by the rig alone."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ class RigComputer:
         *,
         force: float,
         spans: int | None = None,
-        line_condition: LineCondition | None = None,
         numerics: Numerics | None = None,
     ) -> None:
         """Build the line, at rest under a force (N) at its start.
@@ -57,7 +56,7 @@ class RigComputer:
         speed = from_kmh(speed_kmh)
         self.interval = data.computer.interval
         """Between two calls of ``step`` (s)."""
-        condition = line_condition or LineCondition()
+        condition = LineCondition()
         runs = Runs((speed, speed), self.interval, (condition,))
         self._model = model = Rig(
             data, lanes=1, collectors=1, spans=spans or data.spans, numerics=numerics or Numerics(), runs=runs
@@ -90,7 +89,7 @@ class RigComputer:
     def step(self, force: float, displacement: float = 0.0) -> float:
         """Displacement to command next (m), from where the contact point is at rest.
 
-        force: with which the collectors press up, measured now (N). displacement: of the cylinder, measured
+        force: of the collectors, upwards, measured now (N). displacement: of the cylinder, measured
         now (m), from the same zero; only ``compensation = "adaptive"`` looks at it. Raises InputError, and
         leaves the line as it is, for a force that is no number or beyond the load cell's range, for a
         displacement that is no number, and at the line's end; and where the line has left its valid range.

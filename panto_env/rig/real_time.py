@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,9 +39,7 @@ class Timing:
         return float(np.quantile(self.steps, share))
 
 
-def against_the_clock(
-    computer: RigComputer, seconds: float, report: Callable[[float], None] = lambda share: None
-) -> Timing:
+def against_the_clock(computer: RigComputer, seconds: float) -> Timing:
     """Step a computer at its interval for so long, under a force as of a pantograph, by the wall clock.
 
     At the line's end it begins anew. Python's garbage collector is off meanwhile, as a rig's program would
@@ -71,8 +68,6 @@ def against_the_clock(
             begin = time.perf_counter()
             computer.step(force[k])
             steps[k], late[k] = time.perf_counter() - begin, begin - due
-            if k % 1000 == 0:
-                report(k / count)
     finally:
         if enabled:
             gc.enable()

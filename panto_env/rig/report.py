@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,16 +49,10 @@ def stability(rig: RigData, pantograph: PantographData, speed_kmh: float) -> Sta
     )
 
 
-def clocked(
-    rig: RigData,
-    pantograph: PantographData,
-    speed_kmh: float,
-    seconds: float,
-    report: Callable[[float], None] = lambda share: None,
-) -> Timing:
+def clocked(rig: RigData, pantograph: PantographData, speed_kmh: float, seconds: float) -> Timing:
     """The rig's computer against the wall clock, for so long (s)."""
     computer = RigComputer(rig, speed_kmh, force=pantograph.nominal_force(from_kmh(speed_kmh)))
-    return against_the_clock(computer, seconds, report)
+    return against_the_clock(computer, seconds)
 
 
 def pair_facts(pair: Pair) -> dict[str, Any]:
@@ -74,12 +67,12 @@ def pair_facts(pair: Pair) -> dict[str, Any]:
 
 
 def stability_facts(found: Stability) -> dict[str, Any]:
-    """The same of stability."""
+    """Stability of a rig's loop, as plain data."""
     return vars(found) | {"linear": vars(found.linear)}
 
 
 def timing_facts(timing: Timing) -> dict[str, Any]:
-    """The same of steps against the clock."""
+    """Times of a rig computer's steps, as plain data."""
     return {
         "interval": timing.interval,
         "steps": len(timing.steps),

@@ -72,7 +72,7 @@ class Study(Protocol):
 
 
 def check_writable(folder: Path) -> None:
-    """Raise InputError unless the numbers of a study can be written into a folder: asked before any work."""
+    """Raise InputError unless a study's numbers can be written into a folder; called before any work."""
     check_output(folder / NUMBERS, (".json",))
 
 

@@ -6,7 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import panto_env
+from panto_env.backend import JIT, kernel
+from panto_env.plant.contact import contact_force
 
 PACKAGE = Path(panto_env.__file__).parent
 CODE = """
@@ -56,3 +60,18 @@ def test_cache_falls_back_where_it_cannot_be_written(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
     assert run(PACKAGE.parent, blocked / "cache")[1] > 0
+
+
+@pytest.mark.skipif(not JIT, reason="plain Python calls any function")
+def test_a_part_of_kernels_is_not_called_by_itself():
+    """It has no machine code: what Numba keeps in its place must never answer."""
+    with pytest.raises(TypeError, match="contact_force is a part of kernels"):
+        contact_force(1e-5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert law(1e-5, 2e-5) == pytest.approx(2.0)
+    with pytest.raises(TypeError, match="contact_force is a part of kernels"):
+        contact_force(1e-5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def law(compliance, gap):
+    return contact_force(compliance, gap, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from panto_baselines.policies.adaptive_fb_ff import AdaptiveFeedforward
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
 from panto_baselines.policies.fitted_fb_ff import FittedFeedback
 from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
-from panto_baselines.policies.linear_feedback import COUNT, SIGNALS, LinearFeedback, feedback_names
+from panto_baselines.policies.linear_feedback import COUNT, FEEDBACK_GAINS, SIGNALS, LinearFeedback
 from panto_baselines.policies.pd import ProportionalDerivative
 from panto_baselines.policies.periodic import HARMONICS
 from panto_baselines.policies.repetitive import Repetitive
@@ -141,13 +141,8 @@ def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
 
 
 def test_gains_are_named_in_order() -> None:
-    names = AdaptiveFeedforward.gain_names(CONTEXT)
-    assert names == [*FittedFeedback.gain_names(CONTEXT), *Pace._fields]
-    assert Adaptive.gain_names(CONTEXT) == [*feedback_names(), *Pace._fields]
-    for kind in (Adaptive, AdaptiveFeedforward):
-        assert (
-            len(kind.first_gains(CONTEXT)) == len(kind.gain_steps(CONTEXT)) == len(kind.gain_names(CONTEXT))
-        )
+    assert list(AdaptiveFeedforward.TUNED) == [*FittedFeedback.TUNED, *Pace._fields]
+    assert list(Adaptive.TUNED) == [*FEEDBACK_GAINS, *Pace._fields]
 
 
 # --- on the line -----------------------------------------------------------------------------------

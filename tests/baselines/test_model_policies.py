@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from panto_baselines.policies.h_infinity import central, least_bound, weighted
+from panto_baselines.policies.h_infinity import central, minimum_bound, weighted
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
 from panto_baselines.policies.lqg import ROUNDING, Disturbed, regulator
@@ -232,7 +232,7 @@ def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
 
 def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
     plant = weighted(MODEL, performance=2.0, centre=12.0, height=2e-3)
-    bound, (a, b, c) = least_bound(plant)
+    bound, (a, b, c) = minimum_bound(plant)
     n, k = len(plant.a), len(a)
     closed = np.block([[plant.a, plant.b2 @ c], [b @ plant.c2, a]])
     assert np.linalg.eigvals(closed).real.max() < 0

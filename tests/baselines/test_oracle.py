@@ -86,7 +86,7 @@ def test_commands_lead_the_force_from_knot_to_knot(actuator: str):
 
 def test_limits_are_those_of_the_real_actuator():
     knots = Knots(actuator_settings("realistic"), 1.25e-3, 8)
-    assert knots.largest_change == pytest.approx(25.0)
+    assert knots.maximum_change == pytest.approx(25.0)
     steepest = np.minimum(25.0 * np.arange(1, 5), 100.0)[:, None]
     assert knots.at_limits(steepest * 0.5) < 1.0
     assert np.allclose(knots.within(1000 * steepest).max(), knots.within(2000 * steepest).max())

@@ -177,8 +177,7 @@ def test_gains_that_come_with_the_project_are_of_their_policy_and_of_training_se
     file = load_gains(path)
     assert gain_file(file.policy) == path
     for tuning in file.tunings:
-        context = a_context(catenary=tuning.catenary, pantograph=tuning.pantograph)
-        assert list(tuning.names) == tunable(file.policy).gain_names(context)
+        assert list(tuning.names) == list(tunable(file.policy).TUNED)
         assert set(tuning.seeds) <= set(seeds.TRAINING)
         assert all(change < 0 for change in tuning.std_change)
         assert all(abs(change) < MEAN_TOLERANCE for change in tuning.mean_change)

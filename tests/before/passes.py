@@ -84,6 +84,10 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
+# Rigs, the pantograph on each, and the speed (km/h).
+RIGS = {"rig": ("atr95", 200.0), "rig-flexible": ("atr95", 200.0)}
+
+
 def cases() -> dict[str, Callable[[Tape], None]]:
     """All cases of this file by name."""
     found: dict[str, Callable[[Tape], None]] = {}
@@ -94,6 +98,8 @@ def cases() -> dict[str, Callable[[Tape], None]]:
             found[f"pass, {title}: {policy}"] = partial(_policy, title, policy)
     for title, settings in SETTINGS.items():
         found[f"pass: {title}"] = partial(_settings, settings)
+    for rig in RIGS:
+        found[f"pass on {rig}"] = partial(_rig, rig)
     found["pass: file"] = _file
     return found
 
@@ -109,6 +115,11 @@ def _add(tape: Tape, name: str, run: Trajectory) -> None:
 def _every_pantograph(line: str, tape: Tape) -> None:
     for pantograph in PANTOGRAPHS:
         _add(tape, pantograph, simulate(line, pantograph, LINES[line]))
+
+
+def _rig(rig: str, tape: Tape) -> None:
+    pantograph, speed = RIGS[rig]
+    tape.add("run", simulate(rig, pantograph, speed, distance=400.0))
 
 
 def _policy(title: str, policy: str, tape: Tape) -> None:

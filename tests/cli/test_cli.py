@@ -7,6 +7,7 @@ from panto_env import Trajectory
 from panto_env.base.checksums import read_checked
 from panto_env.studies.en50318 import reference
 
+from .. import documents
 from ..command import panto
 
 WITH_AGENTS = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra 'agents'")
@@ -117,3 +118,19 @@ def test_reproduce_prints_what_it_writes_as_json(monkeypatch, capsys, tmp_path):
     assert told["paper2"]["comparisons"][0]["high"] is None
     reproduce.reproduce("paper2", tmp_path)
     assert "A study" in capsys.readouterr().out
+
+
+def test_what_is_no_option_is_refused_in_one_line():
+    result = panto("simulate", "--nowhere")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("panto: No such option: --nowhere")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_switch_has_no_opposite():
+    """What is off unless it is given needs no option to turn it off."""
+    groups = [documents.panto()]
+    for group in groups:
+        for command in group.commands.values():
+            groups += [command] if hasattr(command, "commands") else []
+            assert [option for each in command.params for option in each.secondary_opts] == []

@@ -306,7 +306,7 @@ def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
     ("change", "message"),
     [
         ({"catenary": "re330"}, "different lines, 're330' and 'en50318-2002'"),
-        ({"speed_kmh": 224.0}, "Passes at 224 and 220.* cannot be compared: speeds may differ by 1 %"),
+        ({"speed": 224.0 / 3.6}, "Passes at 224 and 220.* cannot be compared: speeds may differ by 1 %"),
         ({"terminated": True, "ending": "It ended."}, "It ended. A run that ended early cannot be judged"),
         ({"dropper_position": np.zeros(0)}, "No run says where the line's droppers are"),
     ],
@@ -320,7 +320,7 @@ def test_runs_that_cannot_be_compared_are_refused(healthy_runs, change, message)
 
 
 def test_runs_that_say_too_little_are_refused(healthy_runs):
-    with pytest.raises(InputError, match="takes 3 of them at least, not 2; give more with --healthy"):
+    with pytest.raises(InputError, match="takes at least 3 of them, not 2; give more with --healthy"):
         diagnose(healthy_runs[:1], healthy_runs[1:3])
     with pytest.raises(InputError, match="One run stands there twice"):
         diagnose(healthy_runs[:1], healthy_runs[:4])

@@ -148,7 +148,7 @@ def test_dependent_columns_are_named():
     # Eq. 2 sees head and support move as one: y3'' = -w² y3 to the last digit.
     time = a.time
     exact = Record(1e-2, a.plate, a.head, 1e-3 * np.sin(2 * np.pi * 2.5 * time), None)
-    with pytest.raises(InputError, match=r"cannot tell .*m3.* from .*k3"):
+    with pytest.raises(InputError, match=r"cannot separate .*m3.* from .*k3"):
         fit_equation_error(exact, KNOWN)
 
 

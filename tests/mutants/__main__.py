@@ -43,10 +43,9 @@ class Workbench:
         self.data = CoverageData(str(folder / "coverage"))
 
     def _python(self, *words: str, seconds: float | None = None) -> subprocess.CompletedProcess[str]:
-        call, pipe = [self.python, *words], subprocess.PIPE
-        return subprocess.run(
-            call, cwd=self.root, env=self.environment, stdout=pipe, text=True, timeout=seconds
-        )
+        outputs = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        call = [self.python, *words]
+        return subprocess.run(call, cwd=self.root, env=self.environment, timeout=seconds, **outputs)
 
     def cover(self) -> None:
         """Run the room's tests once, and keep which of them reaches which line."""
@@ -67,13 +66,11 @@ class Workbench:
         self.data.read()
 
     def tests_of(self, mutant: Mutant) -> list[str]:
-        """The tests that reach a mutant: all of the room where it is reached before any begins."""
+        """The tests that reach a mutant, and all of the room where a fixture does."""
         by_line = self.data.contexts_by_lineno(str(mutant.path))
         found = {context for line in mutant.lines for context in by_line.get(line, ())}
-        if "" in found:
-            return list(self.room["tests"])
-        parts = [context.split(".") for context in sorted(found)]
-        return [f"{'/'.join(names[:-1])}.py::{names[-1]}" for names in parts]
+        tests = [_node(context) for context in sorted(found - {""})]
+        return tests + self.room["tests"] * ("" in found)
 
     def kills(self, mutant: Mutant) -> bool:
         """Whether one of the tests that reach a mutant fails, or hangs."""
@@ -82,11 +79,20 @@ class Workbench:
         mutant.path.write_text(mutant.after, encoding="utf-8")
         try:
             done = self._python("-m", "pytest", "-q", "-x", "-m", self.marks, *tests, seconds=600)
+            if "ERROR: not found" in done.stdout:
+                raise SystemExit(done.stdout)
             return done.returncode != 0
         except subprocess.TimeoutExpired:
             return True
         finally:
             mutant.path.write_text(mutant.before, encoding="utf-8")
+
+
+def _node(context: str) -> str:
+    """The name that pytest has for a test of coverage's: tests.room.test_file.TestClass.test_name."""
+    parts = context.split(".")
+    file = next(k for k, part in enumerate(parts) if part.startswith("test_")) + 1
+    return "::".join(["/".join(parts[:file]) + ".py", *parts[file:]])
 
 
 def judge(name: str, room: dict[str, Any], count: int, seed: int, python: str) -> tuple[int, int]:

@@ -16,15 +16,18 @@ from cosmic_ray.plugins import get_operator, operator_names
 ARITHMETIC, BITS = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"BitOr", "BitAnd"}
 SAME = ({"Is", "Eq"}, {"IsNot", "NotEq"}, {"Is", "NotEq"}, {"IsNot", "Eq"})
 """Comparisons that mean the same of None and of an enumeration's members."""
-ONLY_SPEED = re.compile(r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b")
-"""Decorators whose lines change nothing that is computed, where kernels are plain Python."""
+SPARED = re.compile(
+    r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b|strict=True"
+)
+"""Lines with decorators that change nothing that is computed, or with what only a bug would break."""
 
 
 class Mutant(NamedTuple):
     """One change of a source file."""
 
     path: Path
-    lines: range  # of the statement that it changes
+    line: int
+    lines: range  # that run where it does
     operator: str
     before: str  # the whole file
     after: str
@@ -33,7 +36,7 @@ class Mutant(NamedTuple):
         """File, line and operator, and the lines that differ."""
         changed = difflib.unified_diff(self.before.splitlines(), self.after.splitlines(), lineterm="", n=0)
         lines = [line for line in changed if not line.startswith(("---", "+++", "@@"))]
-        return "\n    ".join([f"{self.path.relative_to(root)}:{self.lines.start} {self.operator}", *lines])
+        return "\n    ".join([f"{self.path.relative_to(root)}:{self.line} {self.operator}", *lines])
 
 
 def _sensible(name: str) -> bool:
@@ -64,8 +67,9 @@ def draw(paths: list[Path], count: int, seed: int) -> list[Mutant]:
             place = rng.choice(sorted(places))
             name, occurrence = rng.choice(places[place])
             after = mutate_code(source, OPERATORS[name], occurrence)
-            mutant = Mutant(path, _statement(tree, place[0]), name.split("/")[1], source, after)
-            drawn.setdefault((path, place), mutant)
+            mutant = Mutant(path, place[0], _statement(tree, place[0]), name.split("/")[1], source, after)
+            if _is_python(after):
+                drawn.setdefault((path, place), mutant)
     return list(drawn.values())
 
 
@@ -76,7 +80,7 @@ def _places(source: str, tree: ast.Module) -> dict[tuple[int, int], list[tuple[s
         positions = (pair for node in nodes for pair in operator.mutation_positions(node))
         for occurrence, (start, _) in enumerate(positions):
             line = source.splitlines()[start[0] - 1]
-            if not any(first <= start < last for first, last in words) and not ONLY_SPEED.search(line):
+            if not any(first <= start < last for first, last in words) and not SPARED.search(line):
                 found.setdefault(start, []).append((name, occurrence))
     return found
 
@@ -94,10 +98,24 @@ def _without_behaviour(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[in
     ]
 
 
+def _is_python(source: str) -> bool:
+    try:
+        ast.parse(source)
+    except SyntaxError:
+        return False
+    return True
+
+
 def _statement(tree: ast.Module, line: int) -> range:
-    """Lines of the smallest statement about a line, without the body of a compound one."""
-    smallest = range(line, line + 1)
+    """Lines of the smallest statement about a line, without the body of a compound one.
+
+    All lines of the file where it runs on import: which test comes first then says nothing.
+    """
     around = [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
+    functions = [node for node in around if isinstance(node, ast.FunctionDef)]
+    if not any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions):
+        return range(1, 1 + max((node.end_lineno or 0 for node in around), default=0))
+    smallest = range(line, line + 1)
     for node in sorted(around, key=lambda node: (node.lineno, -(node.end_lineno or 0))):
         body = getattr(node, "body", None)
         last = body[0].lineno if body else (node.end_lineno or 0) + 1

@@ -142,38 +142,38 @@ EXPECTED = {  # ours, and how far it may move before somebody must look
     "CL with FB+FF, gain 1, 300 km/h": (1.50, 0.1),
     "CL with FB+FF, gain 1, 350 km/h": (0.55, 0.1),
     "CL with FB+FF, gain 1, 400 km/h": (0.0, 0.0),
-    "largest CL with FB+FF, gain 1.75, 100-400 km/h": (0.0, 0.0),
+    "maximum CL with FB+FF, gain 1.75, 100-400 km/h": (0.0, 0.0),
     # Not converged, and no grid settles it: 33 to 38 % by grid, step and window.
-    "largest CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator": (35.5, 4.0),
-    "largest CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator": (5.14, 0.1),
+    "maximum CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator": (35.5, 4.0),
+    "maximum CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator": (5.14, 0.1),
     "raw σ with over without control, 300 km/h": (1.133, 0.01),
     "raw σ with over without control, 350 km/h": (0.813, 0.01),
     "raw σ with over without control, 400 km/h": (0.775, 0.01),
     "CF with over without control, 300 km/h": (1.080, 0.01),
     "CF with over without control, 350 km/h": (0.765, 0.01),
     "CF with over without control, 400 km/h": (0.731, 0.01),
-    "CF with over without control, largest of 100-400 km/h": (1.080, 0.01),
-    "θ of the least CF, 100 km/h": (60, 1),  # in steps of 15
-    "θ of the least CF, 150 km/h": (30, 1),
-    "θ of the least CF, 200 km/h": (-30, 1),
-    "θ of the least CF, 250 km/h": (-105, 1),
-    "θ of the least CF, 300 km/h": (-105, 1),
-    "θ of the least CF, 350 km/h": (-45, 1),
-    "θ of the least CF, 400 km/h": (45, 15),  # the minimum is flat there
+    "CF with over without control, maximum of 100-400 km/h": (1.080, 0.01),
+    "θ of the minimum CF, 100 km/h": (60, 1),  # in steps of 15
+    "θ of the minimum CF, 150 km/h": (30, 1),
+    "θ of the minimum CF, 200 km/h": (-30, 1),
+    "θ of the minimum CF, 250 km/h": (-105, 1),
+    "θ of the minimum CF, 300 km/h": (-105, 1),
+    "θ of the minimum CF, 350 km/h": (-45, 1),
+    "θ of the minimum CF, 400 km/h": (45, 15),  # the minimum is flat there
 }
 DIFFER = {
     "CL with FB+FF, gain 1, 300 km/h",
     "CL with FB+FF, gain 1, 350 km/h",
-    "largest CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator",
-    "largest CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator",
+    "maximum CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator",
+    "maximum CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator",
     "raw σ with over without control, 300 km/h",
     "CF with over without control, 300 km/h",
-    "CF with over without control, largest of 100-400 km/h",
-    "θ of the least CF, 100 km/h",
-    "θ of the least CF, 200 km/h",
-    "θ of the least CF, 250 km/h",
-    "θ of the least CF, 300 km/h",
-    "θ of the least CF, 350 km/h",
+    "CF with over without control, maximum of 100-400 km/h",
+    "θ of the minimum CF, 100 km/h",
+    "θ of the minimum CF, 200 km/h",
+    "θ of the minimum CF, 250 km/h",
+    "θ of the minimum CF, 300 km/h",
+    "θ of the minimum CF, 350 km/h",
 }
 
 

@@ -26,7 +26,7 @@ DIFFER = {
     "II, best P_f of y_p1 by Tables 1 and 2",
     "III, best P_f of y_p1 by Tables 1 and 2",
     # Table 5 against Eq. 9.
-    "I, y_p1, largest mean error that the printed P_f allows",
+    "I, y_p1, maximum mean error that the printed P_f allows",
     # Noise and sampling of the paper's records are not known.
     "I, condition number",
     "II, condition number",

@@ -15,7 +15,7 @@ EXPECTED = {  # ours, and how far it may move before somebody must look
     "relative difference of force over that of collectors": (4.14, 0.21),
     "force up to 5 Hz, rms on the rig over the reference's": (1.47, 0.073),
     "force from 10 to 20 Hz, difference over the reference's rms": (1.51, 0.076),
-    "largest harmonic of the reference above 10 Hz": (10.4, 0.1),
+    "strongest harmonic of the reference above 10 Hz": (10.4, 0.1),
     "the flexible line in the rig: force to 20 Hz, difference over rms": (0.0147, 0.005),
     "delay that rig bears, linear loop over simulation": (0.994, 0.05),
     "delay that rig-flexible bears, linear loop over simulation": (0.994, 0.05),

@@ -14,8 +14,8 @@ from panto_env.studies.paper2.estimation import (
     cases,
     known_pantograph,
     over_noise,
+    parameter_information,
     run,
-    told_parameters,
 )
 from panto_env.studies.paper2.estimation_plots import delay_plot, figure_11_12
 from panto_env.studies.paper2.estimation_tables import (
@@ -85,7 +85,7 @@ def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
 
 
 def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
-    told = told_parameters(trajectory)
+    told = parameter_information(trajectory)
     true = {"masses.1": 13.0, "stiffnesses.0": 7000.0, "dampings.1": 100.0}
     found = dict(zip(told.found.names, told.found.values, strict=True))
     for name, value in true.items():

@@ -15,36 +15,36 @@ PLANT = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
 OURS = {
     "amplitude of F_C over speed": 1.037,
     "amplitude of z_1 over speed": 1.11,
-    "place of the largest F_C in its span, 300 km/h": 0.695,
-    "place of the largest z_1 in its span, 300 km/h": 0.5717,
-    "place of the largest F_C in its span, 350 km/h": 0.7197,
-    "place of the largest z_1 in its span, 350 km/h": 0.6264,
-    "σ of F_C over speed in steps of 5 km/h, least over the largest before": 0.9185,
-    "largest F_C, 200 km/h": 156.4,
-    "largest F_C, 250 km/h": 176.9,
-    "largest F_C, 300 km/h": 242.9,
-    "largest F_C, 350 km/h": 416.8,
-    "largest F_C of all variants, 300 km/h": 313.7,
+    "place of the maximum F_C in its span, 300 km/h": 0.695,
+    "place of the maximum z_1 in its span, 300 km/h": 0.5717,
+    "place of the maximum F_C in its span, 350 km/h": 0.7197,
+    "place of the maximum z_1 in its span, 350 km/h": 0.6264,
+    "σ of F_C over speed in steps of 5 km/h, minimum over the maximum before": 0.9185,
+    "maximum F_C, 200 km/h": 156.4,
+    "maximum F_C, 250 km/h": 176.9,
+    "maximum F_C, 300 km/h": 242.9,
+    "maximum F_C, 350 km/h": 416.8,
+    "maximum F_C of all variants, 300 km/h": 313.7,
     "F_m over its limit, any speed": 0.9994,
     "σ / F_m, 200 km/h": 0.2476,
     "σ / F_m, 250 km/h": 0.2189,
     "σ / F_m, 300 km/h": 0.3711,
     "σ / F_m, 350 km/h": 0.7759,
-    "ε lower: change of the largest F_C": -70.77,
-    "ε lower: change of the least F_C": 79.24,
-    "ε lower: change of the largest z_1": -33.28,
-    "ε lower: change of the least z_1": 15.71,
-    "k_m higher: change of the largest F_C": -95.83,
-    "k_m higher: change of the least F_C": 97.01,
-    "k_m higher: change of the largest z_1": -71.46,
-    "k_m higher: change of the least z_1": 14.96,
+    "ε lower: change of the maximum F_C": -70.77,
+    "ε lower: change of the minimum F_C": 79.24,
+    "ε lower: change of the maximum z_1": -33.28,
+    "ε lower: change of the minimum z_1": 15.71,
+    "k_m higher: change of the maximum F_C": -95.83,
+    "k_m higher: change of the minimum F_C": 97.01,
+    "k_m higher: change of the maximum z_1": -71.46,
+    "k_m higher: change of the minimum z_1": 14.96,
     "k_m higher: reduction of z_1 in the middle half over that of all": 1.759,
     "k_m higher: share of the way with less F_C minus that with less z_1": -0.1733,
     "k_m higher: |change| in the middle half over that of all, F_C's over z_1's": 0.5656,
-    "m_1 lower: change of the largest F_C": -31.02,
-    "m_1 lower: change of the least F_C": 33.84,
-    "m_1 lower: change of the largest z_1": -9.047,
-    "m_1 lower: change of the least z_1": 6.046,
+    "m_1 lower: change of the maximum F_C": -31.02,
+    "m_1 lower: change of the minimum F_C": 33.84,
+    "m_1 lower: change of the maximum z_1": -9.047,
+    "m_1 lower: change of the minimum z_1": 6.046,
     "k_1: change of the amplitude of F_C": -0.04986,
     "k_1: change of the amplitude of z_1": -0.06719,
     "k_1: change of σ of F_C": -0.06517,
@@ -58,8 +58,8 @@ OURS = {
 """Every comparison of the study, contact that may pull; pinned within 1 %."""
 
 DIFFER = {
-    "σ of F_C over speed in steps of 5 km/h, least over the largest before",
-    "largest F_C, 350 km/h",
+    "σ of F_C over speed in steps of 5 km/h, minimum over the maximum before",
+    "maximum F_C, 350 km/h",
     "σ / F_m, 300 km/h",
     "σ / F_m, 350 km/h",
     "k_m higher: share of the way with less F_C minus that with less z_1",
@@ -154,7 +154,7 @@ def test_forces_scale_with_the_lift_so_that_static_force_drops_out(bilateral):
 
 
 def test_largest_static_force_brings_the_maximum_to_its_limit(outcome):
-    note = next(each.note for each in outcome.comparisons if each.quantity == "largest F_C, 350 km/h")
+    note = next(each.note for each in outcome.comparisons if each.quantity == "maximum F_C, 350 km/h")
     force = float(note.split("up to ")[1].split(" N")[0])
     (row,) = sweep(
         {"pantograph.static_force": [force]}, **PLANT, speed_kmh=350, spans=(11, 12), bilateral=True

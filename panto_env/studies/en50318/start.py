@@ -21,7 +21,7 @@ FIRST_SPANS = (1, 4, 7, FIRST_SETTLED)
 SETTLED = (33, 62)
 """Spans of a long run that σ is compared with."""
 FASTEST = 0.95
-"""Largest share of the wave speed."""
+"""Maximum share of the wave speed."""
 
 
 @dataclass(frozen=True)

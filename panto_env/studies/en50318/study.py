@@ -22,7 +22,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last five are empty where they were not asked for."""
+    """What was found; the last five are empty where they were not requested."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
@@ -40,7 +40,7 @@ class Validation:
 
     @property
     def tables(self) -> list[Table]:
-        """For people: of the standard's table and of what was asked for."""
+        """For people: of the standard's table and of what was requested."""
         return [
             tables.checks_table(self.checks),
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
@@ -76,7 +76,7 @@ def run(
     with_lines: bool = False,
     with_start: bool = False,
 ) -> Validation:
-    """Run the standard's table, and whatever else is asked for."""
+    """Run the standard's table, and whatever else is requested."""
     report("the reference model")
     runs = reference.reference_runs()
     rows: list[dict[str, Any]] = []

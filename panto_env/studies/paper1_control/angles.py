@@ -18,8 +18,8 @@ class CostOverAngle:
     """Cost function over the phase angle at one speed."""
 
     cost: tuple[float, ...]  # CF at THETAS (N m)
-    best: float  # theta of the least CF (rad)
-    least: float  # CF there (N m)
+    best: float  # theta of the minimum CF (rad)
+    minimum: float  # CF there (N m)
     without: float  # CF of the feedback alone (N m)
     at_paper: float  # CF at the paper's pi/6 (N m)
     cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
@@ -35,11 +35,11 @@ def cost_over_angle(
         return results[Case(speed, policy, fine=fine)].figures.cost_function
 
     costs = tuple(cost(AMPLITUDE, theta) for theta in THETAS)
-    least = min(costs)
+    minimum = min(costs)
     return CostOverAngle(
         cost=costs,
-        best=THETAS[costs.index(least)],
-        least=least,
+        best=THETAS[costs.index(minimum)],
+        minimum=minimum,
         without=without_feedforward(results, speed, gain, fine).figures.cost_function,
         at_paper=cost(AMPLITUDE, min(THETAS, key=lambda theta: abs(theta - THETA))),
         cancelling=cancelling(results, speed, gain, fine),

@@ -31,9 +31,9 @@ SAMPLED = 0.01
 DEFAULT_GAIN = 1.0
 """The gain of the policy as shipped (N/N): the paper prints none."""
 GAIN = 1.75
-"""Calibrated: the least of ``GAINS`` that leaves no contact loss at 300, 350 and 400 km/h."""
+"""Calibrated: the minimum of ``GAINS`` that leaves no contact loss at 300, 350 and 400 km/h."""
 REAL_GAIN = 0.5
-"""The one of ``GAINS`` with the least of the largest losses at 300 to 400 km/h, realistic actuator."""
+"""The one of ``GAINS`` with the minimum of the maximum losses at 300 to 400 km/h, realistic actuator."""
 GAINS = tuple(0.25 * k for k in range(1, 13))
 THETA = math.pi / 6  # the paper's, for all speeds
 AMPLITUDE = 10.0  # N, the paper's

@@ -56,7 +56,7 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
         ]
     most = max(loss(speed, control()) for speed in SPEEDS)
     compared.append(
-        none(f"largest CL with FB+FF, gain {GAIN}, 100-400 km/h", most, CALIBRATED + "; not at the others")
+        none(f"maximum CL with FB+FF, gain {GAIN}, 100-400 km/h", most, CALIBRATED + "; not at the others")
     )
     worst = {
         gain: max(
@@ -66,7 +66,7 @@ def _losses(results: Mapping[Case, Result]) -> list[Comparison]:
     }
     best = min(worst, key=worst.__getitem__)
     for gains, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
-        quantity = f"largest CL with FB+FF, {gains}, 300-400 km/h, realistic actuator"
+        quantity = f"maximum CL with FB+FF, {gains}, 300-400 km/h, realistic actuator"
         compared.append(none(quantity, ours, REAL, "0 (ideal actuator)"))
     return compared
 
@@ -95,7 +95,7 @@ def _calm(results: Mapping[Case, Result]) -> list[Comparison]:
         quantity = f"CF with over without control, {speed} km/h"
         compared.append(Comparison(quantity, "-", ratio[speed], "below 1", 0.0, 1.0, note))
     worst = max(ratio, key=ratio.__getitem__)
-    quantity = "CF with over without control, largest of 100-400 km/h"
+    quantity = "CF with over without control, maximum of 100-400 km/h"
     compared.append(Comparison(quantity, "-", ratio[worst], "below 1", 0.0, 1.0, f"at {worst} km/h"))
     return compared
 
@@ -104,7 +104,7 @@ def _angles(results: Mapping[Case, Result]) -> list[Comparison]:
     low, high = math.degrees(THETA - THETA_STEP), math.degrees(THETA + THETA_STEP)
     return [
         Comparison(
-            f"θ of the least CF, {speed} km/h",
+            f"θ of the minimum CF, {speed} km/h",
             "°",
             math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best),
             math.degrees(THETA),

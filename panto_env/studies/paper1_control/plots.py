@@ -66,13 +66,13 @@ def phase_angle(results: Results) -> Figure:
             axis.plot(
                 [math.degrees(theta) for theta in THETAS], curve.cost, color=colour, label=f"{speed} km/h"
             )
-            axis.plot(math.degrees(curve.best), curve.least, "o", color=colour)
+            axis.plot(math.degrees(curve.best), curve.minimum, "o", color=colour)
         axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
     figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=8, fontsize="small")
-    figure.suptitle(f"Fig. 13: cost function for phase angle (dots: least), gain {GAIN}")
+    figure.suptitle(f"Fig. 13: cost function for phase angle (dots: minimum), gain {GAIN}")
     return figure
 
 

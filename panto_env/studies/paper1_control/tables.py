@@ -127,7 +127,7 @@ def _actuators(results: Results) -> Table:
 
 
 def _worst(results: Results) -> Table:
-    """The largest contact loss of ``SHOWN_SPEEDS``; the passive pantograph has no actuator."""
+    """The maximum contact loss of ``SHOWN_SPEEDS``; the passive pantograph has no actuator."""
     passive = f"{max(results[Case(speed)].figures.contact_loss for speed in SHOWN_SPEEDS):.2f}"
     rows = [("passive", *(passive for _ in ACTUATORS))]
     for name, policy in ON_A_TRAIN.items():
@@ -137,12 +137,12 @@ def _worst(results: Results) -> Table:
         ]
         rows.append((name, *(f"{loss:.2f}" for loss in losses)))
     return Table(
-        "Largest CL (%) of 300, 350 and 400 km/h, control every 10 ms", ("control", *ACTUATORS), tuple(rows)
+        "Maximum CL (%) of 300, 350 and 400 km/h, control every 10 ms", ("control", *ACTUATORS), tuple(rows)
     )
 
 
 def _dampings(results: Results) -> Table:
-    """The largest contact loss of ``FAST_SPEEDS``."""
+    """The maximum contact loss of ``FAST_SPEEDS``."""
     rows = []
     for damping, fine in product(DAMPINGS, (False, True)):
         losses = [
@@ -154,7 +154,7 @@ def _dampings(results: Results) -> Table:
         ]
         rows.append((f"{damping:g}", _numerics(fine), *(f"{loss:.2f}" for loss in losses)))
     return Table(
-        "Largest CL (%) of 300, 325, ... 400 km/h: pd over gain and damping, realistic actuator",
+        "Maximum CL (%) of 300, 325, ... 400 km/h: pd over gain and damping, realistic actuator",
         ("damping (N s/m)", "time step, grid", *(f"gain {gain:g}" for gain in DAMPED_GAINS)),
         tuple(rows),
     )
@@ -175,14 +175,14 @@ def _angles(results: Results) -> Table:
                 f"{reading}, gain {gain:g}, {_numerics(fine)}",
                 str(speed),
                 f"{math.degrees(curve.best):.0f}",
-                *(f"{value:.0f}" for value in (curve.least, curve.at_paper, max(curve.cost), curve.without)),
+                *(f"{cost:.0f}" for cost in (curve.minimum, curve.at_paper, max(curve.cost), curve.without)),
                 f"{math.degrees(curve.cancelling):.0f}" if span else "–",
             )
         )
     return Table(
         "Phase angle of the feed-forward (Fig. 13)",
         (
-            "reading", "km/h", "best θ (°)", "least CF (N m)", "CF at π/6", "largest CF", "CF of FB alone",
+            "reading", "km/h", "best θ (°)", "minimum CF (N m)", "CF at π/6", "maximum CF", "CF of FB alone",
             "θ that cancels once per span (°)",
         ),
         tuple(rows),

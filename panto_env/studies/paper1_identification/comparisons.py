@@ -127,7 +127,7 @@ def _performance(matches: Sequence[Match]) -> list[Comparison]:
     note = "ours on synthetic records: of the method, not of the rig"
     return [
         Comparison("lowest fitting performance", "%", lowest, "above 60 %", 60.0, 100.0, note),
-        Comparison("largest mean error", "mm", largest, "below 1.0 mm", 0.0, 1.0, "likewise"),
+        Comparison("maximum mean error", "mm", largest, "below 1.0 mm", 0.0, 1.0, "likewise"),
     ]
 
 
@@ -149,7 +149,7 @@ def _tables_together(truth: Parameters) -> list[Comparison]:
         mean_error = printed.mean_error[0]
         rows.append(
             Comparison(
-                f"{printed.name}, y_p1, largest mean error that the printed P_f allows",
+                f"{printed.name}, y_p1, maximum mean error that the printed P_f allows",
                 "mm",
                 largest_mean_error(printed, 0),
                 mean_error,

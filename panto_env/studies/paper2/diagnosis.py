@@ -1,4 +1,4 @@
-"""Paper 2, section 4.2: what can be told of an overhead line from the estimated contact force.
+"""Paper 2, section 4.2: what is found out about an overhead line from the estimated contact force.
 
 The force is the estimator's, which knows the pantograph as designed. The classifier has seen other speeds,
 another pantograph and other lines; see ``diagnosis_cases``.
@@ -75,12 +75,10 @@ def tracks(seeds: Sequence[int] = SEEDS, lines: Sequence[str] = LINES) -> list[T
     ]
 
 
-def all_cases(
-    seeds: Sequence[int] = SEEDS, workers: int | None = None, progress: Progress | None = None
-) -> list[Case]:
+def all_cases(progress: Progress | None = None) -> list[Case]:
     """Every kind of defect on every track, at all thresholds."""
-    jobs = [partial(judge_track, track, MEANS, RATES) for track in tracks(seeds)]
-    return [case for cases in in_processes(jobs, workers=workers, progress=progress) for case in cases]
+    jobs = [partial(judge_track, track, MEANS, RATES) for track in tracks()]
+    return [case for cases in in_processes(jobs, progress=progress) for case in cases]
 
 
 def with_fewer_healthy(count: int, track: Track) -> list[Case]:
@@ -107,23 +105,21 @@ def rate_rows(cases: Sequence[Case]) -> list[dict[str, float]]:
     return rows
 
 
-def reference_table(
-    seeds: Sequence[int] = REFERENCE_SEEDS, workers: int | None = None, progress: Progress | None = None
-) -> Table:
+def reference_table(progress: Progress | None = None) -> Table:
     """Broken droppers by number of healthy passes over the same line, or over other lines instead."""
-    here = tracks(seeds, LINES[:1])
-    wanted = [(f"{count} over the same line", partial(with_fewer_healthy, count)) for count in COUNTS]
-    wanted += [
+    here = tracks(REFERENCE_SEEDS, LINES[:1])
+    references = [(f"{count} over the same line", partial(with_fewer_healthy, count)) for count in COUNTS]
+    references += [
         (
             f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms",
             partial(against_other_lines, scatter),
         )
         for scatter in SCATTERS
     ]
-    jobs = [partial(job, track) for _, job in wanted for track in here]
-    found = in_processes(jobs, workers=workers, progress=progress)
+    jobs = [partial(job, track) for _, job in references for track in here]
+    found = in_processes(jobs, progress=progress)
     rows = []
-    for k, (name, _) in enumerate(wanted):
+    for k, (name, _) in enumerate(references):
         own = [case for cases in found[k * len(here) : (k + 1) * len(here)] for case in cases]
         rows.append((name, *broken_row(own)))
     headings = ("healthy passes", *BROKEN_HEADINGS)
@@ -170,8 +166,8 @@ def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
 def example() -> Figure:
     """Picture of a line with a broken dropper, a hard spot and a raised support, each some spans apart."""
     random = np.random.default_rng(EXAMPLE.seed)
-    wanted = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
-    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in wanted)
+    chosen = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
+    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in chosen)
     healthy = [drive(EXAMPLE, k) for k in range(HEALTHY)]
     found = diagnose([drive(EXAMPLE, HEALTHY, defects)], healthy)
     figure = plot_diagnosis(

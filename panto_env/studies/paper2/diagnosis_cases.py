@@ -56,12 +56,11 @@ def judge_track(
     track: Track,
     means: Sequence[int] = MEANS,
     rates: Sequence[float] = (FALSE_ALARMS,),
-    healthy: int = HEALTHY,
 ) -> list[Case]:
-    """Every kind and severity on one track, and healthy controls; healthy: passes to compare with."""
+    """Every kind and severity on one track, and healthy controls."""
     random = np.random.default_rng([track.seed, round(track.speed_kmh)])
     defects: list[Defect | None] = [*every_defect(track, random, BROKEN_EACH), *[None] * CONTROLS]
-    return judge_defects(track, defects, means, rates, [drive(track, k) for k in range(healthy)])
+    return judge_defects(track, defects, means, rates, [drive(track, k) for k in range(HEALTHY)])
 
 
 def judge_defects(

@@ -49,7 +49,7 @@ START = 2.0
 """Time (s) in which pass and filters forget their start."""
 OBSERVATIONS = ("displacements and velocities", "displacements")
 CUTOFFS = {OBSERVATIONS[0]: 80.0, OBSERVATIONS[1]: 50.0}
-"""Low-pass of what has no filter's model (Hz): about the least error at all frequencies over all speeds."""
+"""Low-pass of what has no filter's model (Hz): about the minimum error at all frequencies over all speeds."""
 LAG = 0.1
 """Of the smoother (s)."""
 FREE = 1e5
@@ -148,12 +148,12 @@ def _assess(motion: Motion, seed: int) -> dict[tuple[str, str], tuple[Score, ...
 
 
 def _median(which: tuple[float, str, str, str], seeds: Sequence[tuple[Score, ...]]) -> Case:
-    scores, least = [], []
+    scores, lowest = [], []
     for of_band in zip(*seeds, strict=True):
         medians = np.median([list(vars(each).values()) for each in of_band], axis=0)
         scores.append(Score(*medians.tolist()))
-        least.append(min(each.correlation for each in of_band))
-    return Case(*which, tuple(scores), tuple(least))
+        lowest.append(min(each.correlation for each in of_band))
+    return Case(*which, tuple(scores), tuple(lowest))
 
 
 def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
@@ -174,26 +174,26 @@ def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a pass tells of parameters."""
+class ParameterInformation:
+    """Parameters as the extended filter found them, and how well a pass can determine them at all."""
 
     known: PantographData
     found: Parameters
-    bounds: Mapping[str, float]  # least relative standard deviation of each alone, by name, of the true ones
-    scale: float  # least relative standard deviation of all frame parameters and the lift by one factor
+    bounds: Mapping[str, float]  # minimum relative standard deviation of each alone, by name
+    scale: float  # minimum relative standard deviation of all frame parameters and the lift by one factor
 
 
-def told_parameters(trajectory: Trajectory, observation: str = OBSERVATIONS[1], seed: int = 0) -> Told:
-    """Parameters by the extended filter, and what the pass can tell of each at most."""
-    motion, true = measure(trajectory, seed=seed), load_pantograph(PANTOGRAPH)
-    settings = EstimatorSettings(observation=observation)
-    found = estimate_parameters(motion, known_pantograph(seed), settings)
+def parameter_information(trajectory: Trajectory) -> ParameterInformation:
+    """Parameters by the extended filter, and how well the pass can determine each."""
+    motion, true = measure(trajectory), load_pantograph(PANTOGRAPH)
+    settings = EstimatorSettings(observation=OBSERVATIONS[1])
+    found = estimate_parameters(motion, known_pantograph(0), settings)
     free = settings.model_copy(update={**PAPER2, "force_model": RandomWalk(intensity=FREE)})
     names = (*parameter_names(true), LIFT)
     single = np.diag(information(motion, true, free, names)) ** -0.5
     together = information(motion, true, free, (*frame_parameters(true), LIFT))
-    return Told(
-        known=known_pantograph(seed),
+    return ParameterInformation(
+        known=known_pantograph(0),
         found=found,
         bounds=dict(zip(names, single.tolist(), strict=True)),
         scale=float(np.linalg.eigvalsh(together)[0] ** -0.5),

@@ -9,7 +9,7 @@ from ...catalog import load_pantograph
 from ...estimation.score import BANDS, Score
 from ...terminal import number
 from ..study import Comparison
-from .estimation import MISMATCH, OBSERVATIONS, PANTOGRAPH, SEEDS, SPEED_KMH, Case, Told
+from .estimation import MISMATCH, OBSERVATIONS, PANTOGRAPH, SEEDS, SPEED_KMH, Case, ParameterInformation
 
 QUANTITIES: dict[str, Callable[[Score], str]] = {
     "correlation with the true force": lambda score: number(score.correlation, 4),
@@ -89,26 +89,26 @@ def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
     return Table(f"Noise, velocities' in proportion; {SPEED_KMH:g} km/h, 0 to 20 Hz", headings, rows)
 
 
-def parameters_table(told: Told) -> Table:
-    """True, known and found values, and how unsure each must be at least."""
+def parameters_table(estimated: ParameterInformation) -> Table:
+    """True, known and found values, and the minimum uncertainty of each."""
     true = load_pantograph(PANTOGRAPH)
-    found = dict(zip(told.found.names, told.found.values.tolist(), strict=True))
-    deviation = dict(zip(told.found.names, told.found.deviation.tolist(), strict=True))
+    found = dict(zip(estimated.found.names, estimated.found.values.tolist(), strict=True))
+    deviation = dict(zip(estimated.found.names, estimated.found.deviation.tolist(), strict=True))
     rows = []
-    for name, bound in told.bounds.items():
+    for name, bound in estimated.bounds.items():
         key, _, place = name.partition(".")
         if not place:
             rows.append((name, "–", "–", "–", "–", f"{100 * bound:.3g}"))
             continue
-        right, known = (float(getattr(each, key)[int(place)]) for each in (true, told.known))
+        right, known = (float(getattr(each, key)[int(place)]) for each in (true, estimated.known))
         known_error = f"{100 * (known / right - 1):+.2f}"
         if name in found:
             cells = (f"{100 * (found[name] / right - 1):+.2f}", f"{100 * deviation[name]:.2f}")
         else:
-            cells = ("not told", "–")
+            cells = ("not determined", "–")
         rows.append((name, f"{right:g}", known_error, *cells, f"{100 * bound:.3g}"))
-    rows.append(("frame and lift by one factor", "–", "–", "–", "–", f"{100 * told.scale:.3g}"))
-    headings = ("parameter", "true", "known, error (%)", "found, error (%)", "± (%)", "alone, at least ± (%)")
+    rows.append(("frame and lift by one factor", "–", "–", "–", "–", f"{100 * estimated.scale:.3g}"))
+    headings = ("parameter", "true", "known, error (%)", "found, error (%)", "± (%)", "alone, minimum ± (%)")
     return Table(
         "Parameters from one pass by the extended filter; ± is one standard deviation", headings, rows
     )
@@ -123,7 +123,7 @@ def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
     }
     both, one = (found[observation, "filter, random-walk"] for observation in OBSERVATIONS)
     smoothed = found[OBSERVATIONS[1], "smoother, 100 ms"]
-    note = f"mismatch {100 * MISMATCH:g} %, least of {SEEDS} seeds"
+    note = f"mismatch {100 * MISMATCH:g} %, minimum of {SEEDS} seeds"
     return (
         Comparison(
             "displacements and velocities: correlation", "", both.least_correlation[-1],

@@ -15,22 +15,22 @@ from .estimation import (
     filtered,
     known_pantograph,
     over_noise,
+    parameter_information,
     run,
-    told_parameters,
 )
 from .estimation_plots import delay_plot, figure_11_12
 from .estimation_tables import comparisons, noise_table, over_speed_tables, parameters_table, ways_table
 
 
 def outcome(report: Report) -> Outcome:
-    """Every way at every speed, over noise, what parameters a pass tells, and the figures."""
+    """Every way at every speed, over noise, which parameters a pass determines, and the figures."""
     report("estimator: a pass over the line", 0.0)
     trajectory = run(SPEED_KMH)
     every = cases(progress=lambda done, all_: report("estimator: every way", 0.05 + 0.75 * done / all_))
     report("estimator: noise", 0.8)
     scores = over_noise(trajectory)
     report("estimator: parameters", 0.9)
-    told = told_parameters(trajectory)
+    parameters = parameter_information(trajectory)
     motion, known = measure(trajectory), known_pantograph(0)
     by_filter = {kind: filtered("random-walk", 0.0, motion, known, kind) for kind in OBSERVATIONS}
     smoothed = filtered("random-walk", LAG, motion, known, OBSERVATIONS[1])
@@ -40,7 +40,12 @@ def outcome(report: Report) -> Outcome:
     return Outcome(
         title="Paper 2, section 4.1: the contact force from the pantograph's motion",
         comparisons=comparisons(every),
-        tables=(ways_table(every), *over_speed_tables(every), noise_table(scores), parameters_table(told)),
+        tables=(
+            ways_table(every),
+            *over_speed_tables(every),
+            noise_table(scores),
+            parameters_table(parameters),
+        ),
         plots={
             "fig11-displacements-and-velocities": draw(by_filter[OBSERVATIONS[0]], OBSERVATIONS[0]),
             "fig12-displacements": draw(by_filter[OBSERVATIONS[1]], OBSERVATIONS[1]),

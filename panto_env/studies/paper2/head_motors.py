@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 SPEEDS_KMH = (250.0, 300.0)
 WATTS, NEWTONS = 15.0, 50.0
-"""Electrical power of all motors, and largest force at each place, at which places are compared."""
+"""Electrical power of all motors, and maximum force at each place, at which places are compared."""
 BENCH_KMH, BENCH_GAINS = 250.0, (1.0, 2.0, 4.0)
 HEAD_GAIN = 2.0
 """Of the proportional control on the whole pantograph, beside that of the bench (N/N)."""
 LOW, MEDIUM = 0, (2, 3)
 """Bands, by their places in BANDS: what "low" and "medium" frequencies are taken to be."""
 LARGE = 0.1
-"""Of the largest harmonic: from there on one is large."""
+"""Share of the maximum harmonic from which on a harmonic counts as large."""
 SHOWN = 3.0
 """Seconds of Fig. 14."""
 
@@ -55,7 +55,7 @@ def outcome(report: Report) -> Outcome:
         at = f"{speed_kmh:g} km/h"
         tables += [
             places_table(f"Motors at {at} that take {WATTS:g} W", passive, at_watts),
-            places_table(f"Motors at {at} that press by {NEWTONS:g} N at most", passive, at_newtons),
+            places_table(f"Motors of at most {NEWTONS:g} N at {at}", passive, at_newtons),
             places_table(f"Proportional control at {at} by the head's motors", passive, [gained]),
         ]
         named = (

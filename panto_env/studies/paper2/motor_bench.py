@@ -1,7 +1,7 @@
 """One collector on a bench, controlled by a DC motor (paper 2, Figs 14 and 15).
 
 The collector is half of the head of ``atr95``, on half of its suspension, whose foot stands still; one of the
-two motors presses on it. It runs under a contact point that moves as that of the line: the strongest
+two motors acts on it. It runs under a contact point that moves as that of the line: the strongest
 harmonics of the span in the height of the contact wire over the pantograph, found by a pass along the line
 without motors. Paper 2 says neither how the collector was excited nor what it touched.
 """
@@ -79,15 +79,15 @@ def motion_of_line(record: Trajectory) -> Array:
 def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
     """The collector under the contact point of a pass, and proportional control of this gain (N/N).
 
-    None: without a motor. The force that is wanted is half of the mean of the pass.
+    None: without a motor. The target force is half of the mean of the pass.
     """
-    wanted = 0.5 * float(record.contact_force[record.inside(SPANS)].mean())
-    plant, waves = _bench(record, wanted, gain is not None)
+    target = 0.5 * float(record.contact_force[record.inside(SPANS)].mean())
+    plant, waves = _bench(record, target, gain is not None)
     span_time, steps = record.alignment.mean_length / record.speed, round(CONTROL_INTERVAL / TIME_STEP)
     controls, command = round(RUN_SPANS * span_time / CONTROL_INTERVAL), np.zeros((1, 1, 2))
     samples = plant.samples(steps * controls + 1)
     for _ in range(controls):
-        command[0, 0, 1] = (gain or 0.0) * (wanted - plant.of(0, Row.CONTACT_FORCE))
+        command[0, 0, 1] = (gain or 0.0) * (target - plant.of(0, Row.CONTACT_FORCE))
         plant.advance(command, steps, samples)
     time = TIME_STEP * (np.arange(steps * controls) + 0.5)
     shown = time > time[-1] - SHOWN_SPANS * span_time
@@ -106,7 +106,7 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
     )
 
 
-def _bench(record: Trajectory, wanted: float, driven: bool) -> tuple[Plant, Array]:
+def _bench(record: Trajectory, target: float, driven: bool) -> tuple[Plant, Array]:
     """The bench at rest under a mean force (N), and the waves that the contact point goes through."""
     whole = load_pantograph(PANTOGRAPH)
     suspension = 0.5 * whole.stiffnesses[0]
@@ -116,7 +116,7 @@ def _bench(record: Trajectory, wanted: float, driven: bool) -> tuple[Plant, Arra
             "stiffnesses": (suspension,),
             "dampings": (0.5 * whole.dampings[0],),
             # The suspension pulls back by what the pad gives way.
-            "static_force": wanted * (PAD_STIFFNESS + suspension) / PAD_STIFFNESS,
+            "static_force": target * (PAD_STIFFNESS + suspension) / PAD_STIFFNESS,
             "aerodynamic_coefficient": 0.0,
             "contact_stiffness": PAD_STIFFNESS,
             "contact_damping": PAD_DAMPING,

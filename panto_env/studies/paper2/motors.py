@@ -38,20 +38,20 @@ CONTROL_INTERVAL = 2.5e-3
 BANDS = ((0.0, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0))
 """Bands of frequency (Hz) of the contact force, the mean in none."""
 GAINS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-"""Gains (N/N) among which that of the least sigma is taken under a limit of force."""
+"""Gains (N/N) among which that of the minimum sigma is taken under a limit of force."""
 GAIN_RANGE = (0.05, 8.0)
 """Gains (N/N) among which one of a given power is looked for."""
 MEAN_SHIFT = 0.015
 """Own choice, of the mean force: beyond it a smaller sigma is that of another mean."""
 SPANS = (10, 19)
-"""Those of the figures: the start has died out."""
+"""Spans that the figures cover: the start has died out before."""
 
 
 class ForceFeedback:
     """Force proportional to what the contact force lacks of a mean, in every place where there are motors."""
 
     def __init__(self, gain: float, mean: float) -> None:
-        """Take a gain (N/N) and the contact force that is wanted (N)."""
+        """Take a gain (N/N) and the contact force that is aimed at (N)."""
         self.gain, self.mean = gain, mean
 
     def reset(self, context: Context) -> None:
@@ -137,8 +137,8 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
             taken = [*taken[:1], (plant.of(0, Row.STEP) * plant.time_step, motors.energy(0))]
     record = task.trajectory(0, policy=f"force feedback, gain {gain:g}", last=True)
     if record.terminated:
-        told = record.ending.removesuffix(".")
-        raise InputError(f"With motors on the {place} a gain of {gain:g} is too much: {told}; take less.")
+        reason = record.ending.removesuffix(".")
+        raise InputError(f"With motors on the {place} a gain of {gain:g} is too much: {reason}; take less.")
     (start, before), (stop, after) = taken
     supplied, copper = ((after - before) / (stop - start)).T  # W, (places,)
     borne = actuator.continuous_force**2 / actuator.shorted_damping
@@ -154,7 +154,7 @@ def _kept(record: Trajectory, place: str, gain: float, power: float, copper: flo
     return MotorPass(record.speed_kmh, place, gain, record, figures, bands, *watts, float(heat))
 
 
-def at_power(speed_kmh: float, place: str, watts: float, motor: str = MOTOR) -> MotorPass:
+def at_power(speed_kmh: float, place: str, watts: float) -> MotorPass:
     """The pass whose motors take this much from the supply on average (W), within 1 %, by its gain.
 
     Raises InputError where no gain in ``GAIN_RANGE`` does.
@@ -164,14 +164,14 @@ def at_power(speed_kmh: float, place: str, watts: float, motor: str = MOTOR) -> 
     mean, found = without_motors(speed_kmh).figures.mean, dict[float, MotorPass]()
 
     def lacking(logarithm: float) -> float:
-        found[logarithm] = motor_pass(speed_kmh, place, math.exp(logarithm), mean, motor)
+        found[logarithm] = motor_pass(speed_kmh, place, math.exp(logarithm), mean, MOTOR)
         return math.log(max(found[logarithm].power, 1e-6) / watts)
 
     ends = [math.log(gain) for gain in GAIN_RANGE]
     if lacking(ends[0]) > 0 or lacking(ends[1]) < 0:
-        least, most = (found[end].power for end in ends)
+        low, high = (found[end].power for end in ends)
         raise InputError(
-            f"Motors on the {place} take {least:.3g} to {most:.3g} W with gains from {GAIN_RANGE[0]:g} to "
+            f"Motors on the {place} take {low:.3g} to {high:.3g} W with gains from {GAIN_RANGE[0]:g} to "
             f"{GAIN_RANGE[1]:g} at {speed_kmh:g} km/h, never {watts:g} W; take a power between."
         )
     brentq(lacking, *ends, xtol=2e-3)
@@ -184,7 +184,7 @@ def at_power(speed_kmh: float, place: str, watts: float, motor: str = MOTOR) -> 
 
 
 def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence[float] = GAINS) -> MotorPass:
-    """The pass of the least sigma among gains, of motors that press by so much at most at each place (N).
+    """The pass of minimum sigma among gains, with motors of this maximum force (N) at each place.
 
     Raises InputError where every gain moves the mean force by more than ``MEAN_SHIFT``.
     """

@@ -52,6 +52,8 @@ VARIANTS: Mapping[str, dict[str, dict[str, Any]]] = {
     "inertia of 1.5 kg not compensated for": {"load_cell": {"compensated_mass": 0.0}},
 }
 """The rig with the flexible line, one part of it changed."""
+HARMONICS = 12
+"""Of the span, whose amplitudes a table shows."""
 BELOW, ABOVE = (0.0, 5.0), (10.0, 20.0)
 """Bands (Hz) of the paper's statement on the spectrum."""
 
@@ -112,7 +114,7 @@ def statements(pairs: Mapping[str, Pair]) -> tuple[Comparison, ...]:
             inf,
         ),
         Comparison(
-            "largest harmonic of the reference above 10 Hz",
+            "strongest harmonic of the reference above 10 Hz",
             "Hz",
             passing,
             "the frequency of droppers passing is above 10 Hz",
@@ -160,25 +162,25 @@ def variants_table() -> Table:
     return Table(title, ("", "0-10 Hz", "10-20 Hz", "20-40 Hz", "followed to (Hz)"), rows)
 
 
-def harmonics_table(pairs: Mapping[str, Pair], count: int = 12) -> Table:
+def harmonics_table(pairs: Mapping[str, Pair]) -> Table:
     """Amplitudes of the first harmonics of the span, as Fig. 8 shows them."""
     first = next(iter(pairs.values())).reference
     once = from_kmh(SPEED_KMH) / first.alignment.mean_length
-    found = {LINE: _harmonics(first, once, count)}
-    found |= {name: _harmonics(pair.rig, once, count) for name, pair in pairs.items()}
+    found = {LINE: _harmonics(first, once)}
+    found |= {name: _harmonics(pair.rig, once) for name, pair in pairs.items()}
     rows = [
         (f"{(k + 1) * once:.2f}", *(f"{amplitude[k]:.1f}" for amplitude in found.values()))
-        for k in range(count)
+        for k in range(HARMONICS)
     ]
     return Table("Amplitude of the contact force's harmonics (N)", ("Hz", *found), rows)
 
 
-def _harmonics(run: Any, once: float, count: int) -> Any:
+def _harmonics(run: Any, once: float) -> Any:
     """Amplitudes (N) of the harmonics of ``once`` (Hz), over whole periods."""
     force = run.contact_force[run.inside()]
     whole = round(np.floor(len(force) * run.time_step * once) / once / run.time_step)
     time = run.time_step * np.arange(whole)
-    turns = np.exp(-2j * np.pi * np.outer(once * np.arange(1, count + 1), time))
+    turns = np.exp(-2j * np.pi * np.outer(once * np.arange(1, HARMONICS + 1), time))
     return 2 / whole * np.abs(turns @ force[:whole])
 
 

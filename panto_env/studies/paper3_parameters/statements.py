@@ -52,7 +52,7 @@ def statements(
 def _speed(passes: Sequence[Pass]) -> list[Comparison]:
     """Figs 4 and 5."""
     words = "larger amplitudes at higher speed"
-    steps = f"least ratio from one speed to the next, {SPEEDS_KMH[0]:g} to {SPEEDS_KMH[-1]:g} km/h"
+    steps = f"minimum ratio from one speed to the next, {SPEEDS_KMH[0]:g} to {SPEEDS_KMH[-1]:g} km/h"
     swing = min(b.swing / a.swing for a, b in pairwise(passes))
     travel = min(b.travel / a.travel for a, b in pairwise(passes))
     compared = [
@@ -64,7 +64,7 @@ def _speed(passes: Sequence[Pass]) -> list[Comparison]:
             place = float(one_pass.position[np.argmax(values)] / one_pass.span % 1)
             compared.append(
                 Comparison(
-                    f"place of the largest {name} in its span, {one_pass.speed_kmh:g} km/h",
+                    f"place of the maximum {name} in its span, {one_pass.speed_kmh:g} km/h",
                     "spans",
                     place,
                     "in the middle of the span",
@@ -79,7 +79,7 @@ def _small_steps(rows: Sequence[Mapping[str, Any]]) -> Comparison:
     sigmas = [row["std"] for row in rows if SPEEDS_KMH[0] <= row["speed_kmh"] <= SPEEDS_KMH[-1]]
     step = rows[1]["speed_kmh"] - rows[0]["speed_kmh"]
     return Comparison(
-        f"σ of F_C over speed in steps of {step:g} km/h, least over the largest before",
+        f"σ of F_C over speed in steps of {step:g} km/h, minimum over the maximum before",
         "",
         min(value / max(sigmas[: k + 1]) for k, value in enumerate(sigmas)),
         "larger amplitudes at higher speed",
@@ -96,14 +96,14 @@ def _standard(passes: Passes) -> list[Comparison]:
         limit, largest = en50367.maximum_limit(from_kmh(one_pass.speed_kmh)), float(one_pass.force.max())
         bound = largest_static_force(one_pass)
         note = "" if largest <= limit else f"kept only with F_S up to {bound:.0f} N, which is not printed"
-        name = f"largest F_C, {one_pass.speed_kmh:g} km/h"
+        name = f"maximum F_C, {one_pass.speed_kmh:g} km/h"
         compared.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit, note))
     others = [
         one_pass for varied in passes.values() for one_pass in varied if one_pass.speed_kmh == SPEED_KMH
     ]
     largest = max(float(one_pass.force.max()) for one_pass in others)
     limit = en50367.maximum_limit(from_kmh(SPEED_KMH))
-    name = f"largest F_C of all variants, {SPEED_KMH:g} km/h"
+    name = f"maximum F_C of all variants, {SPEED_KMH:g} km/h"
     compared.append(Comparison(name, "N", largest, f"at most {limit:g}", 0.0, limit))
 
     words = "in accordance with EN 50367"
@@ -130,8 +130,8 @@ def _extremes(what: str, passes: Sequence[Pass], better: str) -> list[Comparison
         ours, worse = scale * getattr(good, array), scale * getattr(bad, array)
         top, bottom = float(ours.max() - worse.max()), float(ours.min() - worse.min())
         compared += [
-            Comparison(f"{what}: change of the largest {name}", unit, top, "less", -inf, 0.0, note),
-            Comparison(f"{what}: change of the least {name}", unit, bottom, "more", 0.0, inf, note),
+            Comparison(f"{what}: change of the maximum {name}", unit, top, "less", -inf, 0.0, note),
+            Comparison(f"{what}: change of the minimum {name}", unit, bottom, "more", 0.0, inf, note),
         ]
     return compared
 

@@ -114,7 +114,7 @@ def _agreeing(comparisons: Sequence[Comparison]) -> str:
 
 
 def static_force_table(passes: Sequence[Pass]) -> Table:
-    """What does not depend on F_S, and the largest F_S that keeps the maximum within EN 50367."""
+    """What does not depend on F_S, and the maximum F_S that keeps the maximum within EN 50367."""
     rows = tuple(
         (
             f"{one_pass.speed_kmh:g}",
@@ -125,7 +125,7 @@ def static_force_table(passes: Sequence[Pass]) -> Table:
         )
         for one_pass in passes
     )
-    headings = ("km/h", "max / F(v)", "σ / F(v)", "limit of max (N)", "largest F_S that keeps it (N)")
+    headings = ("km/h", "max / F(v)", "σ / F(v)", "limit of max (N)", "maximum F_S that keeps it (N)")
     return Table("F_S is not printed: all forces scale with F(v)", headings, rows)
 
 

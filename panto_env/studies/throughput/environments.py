@@ -29,7 +29,7 @@ LANES = {
 SHARED = (("Pantograph-v0", 64), ("Pantograph-v0", 256), ("PantographStiffness-v0", 4096))
 """Vector environments, and their lanes, whose speed is measured on one core and more."""
 LEAST = 0.3
-"""Least time (s) of a repeat: as many whole episodes as that takes."""
+"""Minimum time (s) of a repeat: as many whole episodes as that takes."""
 BLOCK = 0.05
 """Time (s) after which an environment and its yardstick take turns: a machine's clock may change."""
 

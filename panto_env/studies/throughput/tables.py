@@ -23,7 +23,7 @@ def machine(result: Row) -> str:
 
 
 def _numbers(results: Sequence[Row]) -> list[str]:
-    """What tells machines apart, empty of one alone."""
+    """Column that distinguishes machines; empty for a single one."""
     return [f"({k + 1})" for k in range(len(results))] if len(results) > 1 else [""]
 
 

@@ -1,0 +1,41 @@
+"""What recording and resetting need of a task: its settings, its arrays, and what its lanes run at."""
+
+from __future__ import annotations
+
+import math
+
+from ..base.arrays import Array
+from ..plant.actuators import ActuatorSettings
+from .length import EpisodeLength
+from .mean_force import target_mean
+from .observation import Layout
+from .passive_run import LOW_PASSED, PassiveRun
+from .settings import RunSettings
+from .stepping import Stepping
+
+
+class TaskState(Stepping):
+    """Lanes of a plant with the settings of their episodes."""
+
+    settings: RunSettings
+    actuator: ActuatorSettings
+    length: EpisodeLength
+    layout: Layout
+    passive: PassiveRun | None  # that the reward counts from
+    speed: Array  # of each lane (m/s)
+    keep_samples: bool  # of whole episodes
+    record_droppers: bool
+
+    def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
+
+        Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        """
+        if self.passive is None:
+            return nominal, nominal
+        return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
+
+    def target_mean(self, lane: int) -> float:
+        """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
+        target = target_mean(self.settings, float(self.speed[lane]))
+        return math.nan if target is None else target
