@@ -168,7 +168,7 @@ def test_gains_of_another_policy_or_number_are_refused(tmp_path: Path) -> None:
         Skyhook(gains=(1.0, 2.0, 3.0)).reset(CONTEXT)
     with pytest.raises(InputError, match="holds gains of 'skyhook'"):
         check_gain_file(path, "periodic", run_settings({}), force=False)
-    with pytest.raises(InputError, match="There are no gains in"):
+    with pytest.raises(InputError, match="There is no file of gains"):
         find_gains("nowhere", ["frame"], CONTEXT)
 
 
