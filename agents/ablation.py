@@ -1,4 +1,4 @@
-"""What each part of an agent is worth: the same training without it, or with another, under several seeds."""
+"""Ablation: the effect of each part of an agent, from trainings without it, under several seeds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .settings import Training, parse_training
 from .trainings import train_all
 
 REFERENCE = "as it is"
-"""The variant that nothing is changed in."""
+"""Name of the variant without any change."""
 
 
 class Ablation(Settings):
@@ -32,18 +32,18 @@ class Ablation(Settings):
     training: str = Field(description="name or path of the training that is varied")
     total_steps: Count = Field(description="environment steps of each run")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        min_length=2, description="of the runs of each variant"
+        min_length=2, description="seeds of the runs of each variant"
     )
     judged_by: str = Field(description="name or path of the benchmark that compares the runs' best models")
     judged_on: Count = Field(description="number of the benchmark's seeds")
     variants: dict[str, dict[str, Any]] = Field(
         min_length=1,
-        description="by name: settings of the training that are changed, in tables as there; a value of "
-        '"default" takes a setting out',
+        description="by name: settings of the training to change, in the same tables; the value "
+        '"default" removes a setting',
     )
 
     def trainings(self) -> dict[tuple[str, int], Training]:
-        """Trainings by variant and seed. Raises InputError, naming the variant, where one is not valid."""
+        """Trainings by variant and seed. Raises InputError, naming the variant, if one is not valid."""
         base = read_toml(find(self.training, "training"))
         made = {}
         as_it_is: dict[str, dict[str, Any]] = {REFERENCE: {}}
@@ -64,7 +64,7 @@ class Ablation(Settings):
 def load_ablation(source: str | Path) -> Ablation:
     """Read an ablation from a TOML file, given by its path or by a name of ``configs/``.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
     ablation = parse(Ablation, read_toml(find(source, "ablation")), str(source))
     if REFERENCE in ablation.variants:
@@ -81,11 +81,10 @@ def run(
     progress: Progress | None = None,
     command: str | None = None,
 ) -> tuple[dict[tuple[str, int], Path], Benchmark]:
-    """Train every variant under every seed, each into a folder of its own, and compare the best models.
+    """Train every variant under every seed, each into its own folder, and compare the best models.
 
-    Runs that ``output`` holds already are not repeated, and one that was broken off goes on: the same call
-    again finishes what was begun. workers, ray, command: as ``train_all`` takes them. Returns each run's best
-    model, and the benchmark of all.
+    Runs that are complete in ``output`` are not repeated, and an interrupted one continues: call it again to
+    finish. workers, ray, command: see ``train_all``. Returns each run's best model, and the benchmark of all.
     """
     trainings = ablation.trainings()
     folders = {(name, seed): _folder(output, name, seed) for name, seed in trainings}
@@ -100,7 +99,7 @@ def _folder(output: Path, name: str, seed: int) -> Path:
 
 
 def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with changes, tables within it changed likewise."""
+    """A copy of a table with changes, which apply to nested tables too."""
     made = dict(table)
     for key, value in changes.items():
         if value == "default":

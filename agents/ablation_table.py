@@ -1,4 +1,4 @@
-"""The outcome of an ablation: each variant's figures over its runs, beside those of the training as it is."""
+"""The outcome of an ablation: each variant's figures over its runs, and those of the unchanged training."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Variant:
     """One variant over its runs, each a training under another seed."""
 
     name: str
-    changes: tuple[float, ...]  # of sigma against the pressed passive pantograph, by run (%)
-    change: float  # interquartile mean of these (%)
-    interval: Interval | None  # 95 %, runs drawn anew
-    lost: Interval | None  # 95 % interval of how much less that is than the training as it is gains (points)
-    worse: float | None  # share of pairs of runs in which it gains less than that; None: it is that
+    changes: tuple[float, ...]  # of sigma from the passive pantograph at the same mean force, by run (%)
+    change: float  # interquartile mean of the changes (%)
+    interval: Interval | None  # 95 % interval of ``change``, runs resampled
+    lost: Interval | None  # 95 % interval of the gain lost against the unchanged training (points)
+    worse: float | None  # share of pairs of runs in which the unchanged training gains more; None: it is that
     qualified: float  # share of runs whose mean force stays within its range in every cell
 
 
 def variants(models: Mapping[tuple[str, int], Path], outcome: Benchmark) -> tuple[Variant, ...]:
-    """Variants, that which is the training as it is first."""
+    """Variants, the unchanged training first."""
     by_policy: dict[str, list[float]] = {}
     disqualified = {cell.policy for cell in outcome.cells if cell.disqualified}
     for cell in outcome.cells:
@@ -61,17 +61,17 @@ def _variant(name: str, changes: Array, base: Array, disqualified: Sequence[bool
 
 
 def _difference(changes: Array, base: Array) -> Interval:
-    """95 % bootstrap interval of the difference of two means, the runs of each drawn anew."""
+    """95 % bootstrap interval of the difference of two means, with the runs of each resampled."""
     from scipy.stats import bootstrap
 
-    told = bootstrap(
+    found = bootstrap(
         (changes, base),
         lambda a, b, axis: a.mean(axis=axis) - b.mean(axis=axis),
         vectorized=True,
         method="percentile",
         rng=np.random.default_rng(0),
     )
-    low, high = told.confidence_interval
+    low, high = found.confidence_interval
     return float(low), float(high)
 
 

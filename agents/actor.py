@@ -23,7 +23,7 @@ class Actor:
     weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)
     biases: tuple[Weights, ...]  # of each layer, (outputs,)
     activation: Literal["tanh", "relu"]  # of the hidden layers
-    squashed: bool = False  # whether the last layer goes through tanh; it is clipped otherwise
+    squashed: bool = False  # whether the last layer goes through tanh; otherwise it is clipped
 
     def squash(self) -> Actor:
         """The same actor with tanh after its last layer."""

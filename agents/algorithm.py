@@ -1,4 +1,4 @@
-"""What every algorithm has in common: hyperparameters that can make the learner."""
+"""Base of algorithms: hyperparameters that can make the learner."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Algorithm(Settings, ABC):
         """The learner's deterministic policy."""
 
     @abstractmethod
-    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
-        """Bring a new learner to do what a policy has shown."""
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+        """Fit a new learner to a policy's demonstrations."""
 
     def check(self, lanes: int, total_steps: int) -> None:
         """Raise InputError where the hyperparameters do not fit this number of lanes and steps."""

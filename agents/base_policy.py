@@ -1,4 +1,4 @@
-"""A policy that an agent starts from, or adds to: one for each lane of a vector environment."""
+"""The policy that an agent starts from, or adds to, in the lanes of a vector environment."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 class PolicyLanes:
-    """Policies of one name, one a lane: each has an episode, and a memory, of its own."""
+    """One policy per lane, all of the same name: each has its own episode and memory."""
 
     def __init__(self, name: str, task: Any) -> None:
-        """name: as ``find_policy`` takes it. task: ``Task`` of the lanes."""
+        """name: see ``find_policy``. task: ``Task`` of the lanes."""
         self.name, self._task = name, task
         self._policies = [find_policy(name) for _ in range(task.lanes)]
 
@@ -32,18 +32,18 @@ class PolicyLanes:
     def act(self, observations: NDArray[np.float32]) -> Array:
         """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""
         with errors_name(self.name, "act"):
-            # Copies: a policy may keep what it was shown.
+            # Copies: a policy may keep its observation.
             pairs = zip(self._policies, observations.copy(), strict=True)
             actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
         return np.clip(actions, -1.0, 1.0)
 
 
 def check_wishes(name: str, settings: RunSettings) -> None:
-    """Raise InputError unless a policy is found that can see what the environment shows."""
-    for key, wanted in wishes(find_policy(name)).items():
+    """Raise InputError unless the policy exists and the environment has the observation that it requests."""
+    for key, requested in wishes(find_policy(name)).items():
         offered = getattr(settings, key)
-        if wanted != offered:
+        if requested != offered:
             raise InputError(
-                f"the policy '{name}' asks for {key} = {shown(wanted)}, and the environment has "
-                f"{shown(offered)}; set it so"
+                f"the policy '{name}' needs {key} = {shown(requested)}, but the environment has "
+                f"{shown(offered)}; set it to what the policy needs"
             )

@@ -1,4 +1,4 @@
-"""What happens beside the learning: calls every so many steps, the log of episodes, the progress bar."""
+"""Callbacks of a training: regular calls, the log of episodes, the progress bar."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ REFRESH = 0.2  # s between two updates of the progress bar
 
 
 class EveryNSteps(BaseCallback):  # type: ignore[misc]
-    """Calls ``function`` each time that ``interval`` more training steps are done, and at the end.
+    """Calls ``function`` every ``interval`` training steps, and at the end.
 
-    It waits until a rollout ends: between two rollouts the learner's state is complete.
+    It waits until a rollout ends, since the learner's state is complete between two rollouts.
     """
 
     def __init__(self, interval: int, function: Callable[[], None]) -> None:

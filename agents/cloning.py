@@ -1,4 +1,4 @@
-"""Behaviour cloning: an agent learns by regression what a policy does, before it learns from rewards."""
+"""Behaviour cloning: an agent learns a policy's actions by regression before it learns from rewards."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from .cloning_settings import Cloning, CloningError
 from .demonstrations import Demonstrations
 
 HELD_OUT = 0.125
-"""Share of the steps, the last ones, that nothing is fitted to: the error is told on them."""
+"""Share of the steps, the last ones, that are held out of the fit; the error is computed on them."""
 
 
-def clone(actor: Any, parameters: list[Any], shown: Demonstrations, cloning: Cloning) -> CloningError:
-    """Fit an actor to what a policy does.
+def clone(actor: Any, parameters: list[Any], examples: Demonstrations, cloning: Cloning) -> CloningError:
+    """Fit an actor to a policy's actions.
 
-    actor: actions, (n, actions), as a differentiable function of observations, (n, entries). parameters: its
-    own, of torch.
+    actor: actions, (n, actions), as a differentiable function of observations, (n, entries). parameters:
+    torch parameters of the actor.
     """
-    (seen, wanted), (unseen, unseen_wanted) = _split(shown.observations, shown.wanted)
-    regress(actor, parameters, seen, wanted, cloning)
+    (seen, intended), (unseen, unseen_intended) = _split(examples.observations, examples.intended)
+    regress(actor, parameters, seen, intended, cloning)
     with torch.no_grad():
-        difference = actor(torch.as_tensor(unseen)).numpy() - unseen_wanted
-    return CloningError(error=_rms(difference), rms=_rms(unseen_wanted))
+        difference = actor(torch.as_tensor(unseen)).numpy() - unseen_intended
+    return CloningError(error=_rms(difference), rms=_rms(unseen_intended))
 
 
 def regress(
@@ -36,7 +36,7 @@ def regress(
     outputs: NDArray[np.float32],
     cloning: Cloning,
 ) -> None:
-    """Least squares by Adam: bring function(inputs) to the outputs, both (n, width)."""
+    """Least squares by Adam: fit function(inputs) to the outputs, both (n, width)."""
     x, y = torch.as_tensor(inputs), torch.as_tensor(outputs)
     batches = -(-len(x) // cloning.batch_size)
     optimiser = torch.optim.Adam(parameters, lr=cloning.learning_rate)
@@ -51,7 +51,7 @@ def regress(
 
 
 def _split(*arrays: NDArray[np.float32]) -> list[list[NDArray[np.float32]]]:
-    """Arrays, (steps, lanes, width), as (n, width): those of the first steps, and those held out."""
+    """Split arrays, (steps, lanes, width), into first steps and held-out ones, each as (n, width)."""
     first = round((1 - HELD_OUT) * len(arrays[0]))
     parts = [[each[:first] for each in arrays], [each[first:] for each in arrays]]
     return [[each.reshape(-1, each.shape[-1]) for each in part] for part in parts]

@@ -1,4 +1,4 @@
-"""``panto train`` and ``panto evaluate``. Torch, and all that needs it, is imported only when they run."""
+"""``panto train``, ``panto export`` and ``panto evaluate``. Torch is imported only when they run."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ROWS = (
 )
 """Figures that `panto evaluate` prints."""
 SHOWN = (FIRST_SETTLED, FIRST_SETTLED + 1)
-"""Spans that its plot shows."""
+"""Spans in the plot of `panto evaluate`."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
@@ -104,9 +104,9 @@ def export(
         str, typer.Argument(help="Model file to write (.safetensors).", callback=writable((".safetensors",)))
     ],
 ) -> None:
-    """Write a model file for others: what a policy needs, arrays and JSON, and nothing that is pickled.
+    """Write a model file to publish: only what the policy needs, as arrays and JSON, with nothing pickled.
 
-    It is a policy as it was; it cannot be trained further.
+    The policy is the same, but it cannot be trained further.
     """
     from .model_file import export_model
 

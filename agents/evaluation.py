@@ -1,4 +1,4 @@
-"""A policy beside the passive pantograph, paired by line, speed and seed."""
+"""A policy compared with the passive pantograph, paired by line, speed and seed."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from panto_env.metrics.criterion import Criterion
 from panto_env.metrics.figures import Figures
 
 NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans", "run_in")
-"""Arguments of an environment that a pass does not take over: it has a speed of its own and no reward, and
-runs from the line's start until that has died out."""
+"""Arguments of an environment that do not apply to a pass: it has its own speed and no reward, and runs from
+the line's start until the start has died out."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One pass under a policy and the same pass without; a pass that ended early has no figures."""
+    """One pass with a policy and the same pass without; a pass that ended early has no figures."""
 
     speed_kmh: float
     seed: int
-    spans: str  # that the figures cover, as "10-19"; "" if there are none
+    spans: str  # spans that the figures cover, such as "10-19"; "" if there are none
     policy: Figures
     passive: Figures
     policy_compliance: tuple[Criterion, ...]  # with EN 50367 and EN 50119; empty where there are no figures
@@ -44,14 +44,14 @@ class Pair:
     def ratio(self) -> float:
         """Sigma divided by that of the passive pantograph.
 
-        Infinite where the policy's pass ended early; else nan where the passive one did: there is nothing
-        to compare with.
+        Infinite if the policy's pass ended early; otherwise nan if the passive one did, so that there is
+        nothing to compare with.
         """
         return math.inf if self.terminated else self.policy.std / self.passive.std
 
     @property
     def mean_range(self) -> tuple[float, float]:
-        """Lowest and highest mean force (N) that qualifies."""
+        """Minimum and maximum mean force (N) that qualify."""
         qualifying: tuple[float, float] = mean_range(self.passive.mean)
         return qualifying
 
@@ -62,7 +62,7 @@ class Pair:
         return low <= self.policy.mean <= high
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, for JSON."""
+        """The whole pair as plain data for JSON."""
         return {
             "speed_kmh": self.speed_kmh,
             "seed": self.seed,
@@ -82,26 +82,26 @@ class Pair:
 
 @dataclass
 class Comparison:
-    """Passes along one line, given by the environment's arguments; passive passes are run only once."""
+    """Paired passes along one line, from the environment's arguments; passive passes are run only once."""
 
     arguments: Mapping[str, Any]
     speeds_kmh: Sequence[float]
     seeds: Sequence[int]
-    distance: float | None = None  # of a pass (m), by default until its start has died out and on
+    distance: float | None = None  # of a pass (m); by default it goes on until its start has died out
     _passive: dict[tuple[float, int], Trajectory] = field(default_factory=dict)
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """What identifies the passes that have been run, but for speed and seed: plain data."""
+        """Settings of the passes, except speed and seed, as plain data."""
         run = next(iter(self._passive.values()))
         return {name: value for name, value in run.settings.items() if name != "speed_kmh"}
 
     def run(self, policy: Any) -> list[Pair]:
-        """Pairs at every speed and seed. Raises InputError where the policy does not fit the task."""
+        """Run pairs at every speed and seed. Raises InputError if the policy does not fit the task."""
         return [pair(*self.passes(policy, speed, seed)) for speed in self.speeds_kmh for seed in self.seeds]
 
     def passes(self, policy: Any, speed_kmh: float, seed: int) -> tuple[Trajectory, Trajectory]:
-        """Records of one pass under the policy and of the same pass without."""
+        """Run one pass with the policy and the same pass without it; their records, in this order."""
         arguments = {key: value for key, value in self.arguments.items() if key not in NOT_OF_A_PASS}
         arguments |= {"speed_kmh": speed_kmh, "seed": seed, "distance": self.distance}
         arguments |= {"record_droppers": False}
@@ -111,7 +111,7 @@ class Comparison:
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
-    """Figures of two passes over the spans after the start."""
+    """Pair of two passes, with their figures over the spans after the start."""
 
     def figures(run: Trajectory) -> Figures:
         return Figures.none() if run.terminated else run.summary()
@@ -139,7 +139,7 @@ def verdict(pairs: Sequence[Pair]) -> tuple[float, bool]:
 
 
 def in_words(pairs: Sequence[Pair]) -> str:
-    """The verdict as a clause."""
+    """The verdict on pairs as a clause."""
     ratio, qualified = verdict(pairs)
     if any(pair.passive_ending for pair in pairs):
         return "the passive pantograph's run ended early: there is nothing to compare with"

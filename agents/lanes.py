@@ -18,9 +18,9 @@ from .washout import WashoutVecEnv
 
 
 def make_lanes(training: Training) -> Any:
-    """``VecEnv`` of the training's lanes, in which its base policy acts, too, if it has one.
+    """``VecEnv`` of the training's lanes; if the training has a base policy, it acts there too.
 
-    Raises InputError where the environment's arguments are not valid.
+    Raises InputError if the environment's arguments are not valid.
     """
     arguments = {key: value for key, value in training.environment.items() if key != "id"}
     native = gymnasium.make_vec(
@@ -37,7 +37,7 @@ def make_lanes(training: Training) -> Any:
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:
-    """Seeds of the lanes, all for training: others for a training of another seed, or after more steps."""
+    """Seeds of the lanes, within those for training, by the training's seed and the steps done."""
     places = len(TRAINING) - training.lanes + 1
     first = TRAINING[(training.seed * training.lanes + steps) % places]
     seeds = range(first, first + training.lanes)

@@ -1,4 +1,4 @@
-"""What a learner of Stable-Baselines3 has learnt, as arrays by name, and put back into a new one."""
+"""State of a Stable-Baselines3 learner as arrays by name, and its restoration into a new learner."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "t
 
 
 def learnt(model: Any, replay: bool) -> Arrays:
-    """Arrays of networks, optimisers and the coefficient of entropy. replay: with the replay buffer.
+    """Arrays of networks, optimisers and the coefficient of entropy. replay: include the replay buffer.
 
-    Optimisers: without their settings, which a new learner has from the training's.
+    Settings of optimisers are not included: a new learner gets them from the training.
     """
     tensors = dict(_variables(model))
     for name, state in model.get_parameters().items():
@@ -37,7 +37,7 @@ def learnt(model: Any, replay: bool) -> Arrays:
 def learn_again(model: Any, arrays: Arrays) -> None:
     """Put arrays of ``learnt`` into a new learner.
 
-    Raises LookupError, RuntimeError, TypeError or ValueError where the algorithm or a shape is another one.
+    Raises LookupError, RuntimeError, TypeError or ValueError if the algorithm or a shape differs.
     """
     import torch
 
@@ -68,11 +68,11 @@ def learn_again(model: Any, arrays: Arrays) -> None:
 
 
 def _is_optimiser(state: Any) -> bool:
-    """Whether a learner's parameters are those of an optimiser of torch, not of a network."""
+    """Whether a state dictionary belongs to a torch optimiser, not to a network."""
     return "param_groups" in state
 
 
 def _variables(model: Any) -> Iterator[tuple[str, Any]]:
-    """Tensors beside networks and optimisers, such as SAC's coefficient of entropy, by name."""
+    """Tensors outside networks and optimisers, by name, such as SAC's coefficient of entropy."""
     for name in model._get_torch_save_params()[1]:
         yield name, getattr(model, name)

@@ -1,7 +1,7 @@
 """The model file: arrays and a table of facts, as safetensors, so that no code runs from it.
 
 The table holds the facts below. The arrays under ``actor/`` are the deterministic policy, which runs without
-torch. Those under ``learner/`` and ``replay/`` are what a resumed training goes on with (``learner.py``).
+torch. The arrays under ``learner/`` and ``replay/`` let a training resume (``learner.py``).
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from .actor import Actor
 from .learner import Arrays, learn_again, learnt
 
 DRIVEN = ((0,), (1,), (0, 1))
-"""What the actions of a policy can drive: frame, head, or both."""
+"""Actuators that the actions of a policy can drive: frame, head, or both."""
 
 
 class Needs(Settings):
-    """What a policy was trained with and needs in every task that it runs in."""
+    """Observation and actuator that a policy was trained with, which every task that it runs in must have."""
 
     observation: str  # kind of the layout
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps that are observed
-    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that readings count from
+    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
     entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
-    channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
+    channels: tuple[int, ...]  # actuator that each action drives: 0 frame, 1 head
     force_limit: float  # N
     control_interval: float  # s
 
@@ -48,9 +48,9 @@ class Needs(Settings):
 
     @classmethod
     def of(cls, context: Context) -> Needs:
-        """What an episode offers a policy."""
+        """Observation and actuator of an episode."""
         layout = context.layout
-        # What readings are counted from is then that of each line: the policy is meant to take it so.
+        # Normalised readings use each line's own centre and slope, which the policy is meant to see.
         names = (*(name for name, _, _ in READING_ENTRIES), "speed") if layout.normalise else ()
         return cls(
             observation=layout.kind,
@@ -68,39 +68,39 @@ class Needs(Settings):
 
 
 class Facts(Settings):
-    """What a model file says about itself."""
+    """Facts that a model file holds about its policy."""
 
     format: Literal[2] = 2
     version: str = __version__  # of panto_env
     commit: str | None = None  # of the checkout that it was trained with
-    command: str | None = None  # that trained it
+    command: str | None = None  # command that trained it
     algorithm: str
     seed: int
     steps: int  # environment steps that it has learnt from
     updates: int  # of the networks, as Stable-Baselines3 counts them
-    environment: dict[str, Any]  # that it was trained in: id and arguments
+    environment: dict[str, Any]  # environment that it was trained in: id and arguments
     needs: Needs
     residual_of: str | None = None  # policy that its action is added to
-    residual_share: float = 1.0  # to which share
-    washout: WashoutSettings | None = None  # the slow average that is taken off its action
-    ratio: float | None = None  # when last evaluated: mean of sigma over that of the passive pantograph
-    qualified: bool = False  # when last evaluated: whether the mean force kept within its range
+    residual_share: float = 1.0  # factor on its action when added
+    washout: WashoutSettings | None = None  # the slow average that is subtracted from its action
+    ratio: float | None = None  # from the last evaluation: mean of sigma over the passive pantograph's
+    qualified: bool = False  # from the last evaluation: whether the mean force stayed within its range
     activation: Literal["tanh", "relu"]
     squashed: bool
 
 
 def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
-    """Write a model file, whole or not at all. replay: with the replay buffer.
+    """Write a model file, whole or not at all. replay: include the replay buffer.
 
-    Raises InputError where it can't be written.
+    Raises InputError if it can't be written.
     """
     _write(path, facts, layers(actor) | learnt(model, replay))
 
 
 def export_model(source: Path, target: Path) -> None:
-    """Write what a policy needs of a model file, facts and layers, and nothing to go on learning with.
+    """Copy only the policy of a model file, facts and layers, without the state for further training.
 
-    Raises InputError, naming the file, where ``source`` is damaged or ``target`` cannot be written.
+    Raises InputError, naming the file, if ``source`` is damaged or ``target`` cannot be written.
     """
     facts, actor = read_model(source)
     _write(target, facts, layers(actor))
@@ -109,7 +109,7 @@ def export_model(source: Path, target: Path) -> None:
 def read_model(path: Path) -> tuple[Facts, Actor]:
     """Facts and policy of a model file.
 
-    Raises InputError, naming the file, where it is damaged, or `panto train` did not write it.
+    Raises InputError, naming the file, if it is damaged or not a model file of `panto train`.
     """
     facts, actor, _ = _read(path)
     return facts, actor
@@ -118,7 +118,7 @@ def read_model(path: Path) -> tuple[Facts, Actor]:
 def restore(path: Path, model: Any) -> Facts:
     """Put a checkpoint's networks, optimisers, counts and replay buffer into a new learner.
 
-    Raises InputError where the file is damaged or of another algorithm or shape.
+    Raises InputError if the file is damaged or belongs to another algorithm or shape.
     """
     facts, _, arrays = _read(path)
     try:
@@ -144,13 +144,13 @@ def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
     except (OSError, ValueError) as error:
         reason = "its facts are not valid" if isinstance(error, ValidationError) else str(error)
         raise InputError(
-            f"{path} is not a whole model file ({reason.rstrip('.')}); take another, such as an earlier "
-            "checkpoint, or train anew with `panto train`."
+            f"{path} is not a whole model file ({reason.rstrip('.')}); take another one, such as an earlier "
+            "checkpoint, or train a model with `panto train`."
         ) from error
 
 
 def layers(actor: Actor) -> Arrays:
-    """Weights and biases of a policy's network, as they are named in a model file."""
+    """Weights and biases of a policy's network, with their names in a model file."""
     weights = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
     return weights | {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
 
@@ -164,10 +164,10 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))
     for k, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
         if not all(each.dtype.kind == "f" and np.isfinite(each).all() for each in (weight, bias)):
-            raise ValueError(f"layer {k} of its network holds something else than finite numbers")
+            raise ValueError(f"layer {k} of its network holds values that are not finite numbers")
         if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
             raise ValueError(f"layer {k} of its network does not fit the one before, or what it observes")
         width = len(bias)
     if width != len(facts.needs.channels):
-        raise ValueError("its network has another shape than it says")
+        raise ValueError("its network differs in shape from its facts")
     return Actor(weights, biases, facts.activation, facts.squashed)

@@ -1,4 +1,4 @@
-"""Packages of the extra 'agents', asked for before anything of them is imported."""
+"""Check for the packages of the extra 'agents' before any of them is imported."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PACKAGES = ("torch", "stable_baselines3", "tensorboard")
 
 
 def check_packages() -> None:
-    """Raise InputError, naming them, where packages that a training needs are not installed."""
+    """Raise InputError, naming them, if packages that a training needs are not installed."""
     missing = [name for name in PACKAGES if find_spec(name) is None]
     if missing:
         raise InputError(

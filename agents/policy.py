@@ -19,14 +19,14 @@ from .residual_policy import Residual
 from .washout_policy import WashedOut
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
-"""Place of the actuator, by what its actions drive."""
+"""Place of the actuator, by the actuators that the actions drive."""
 
 
 class TrainedPolicy:
-    """Deterministic policy of a model file; it runs only in tasks that offer what it was trained with."""
+    """Deterministic policy of a model file; it runs only in tasks that match its training."""
 
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
-        """path: of the model file, for messages of errors."""
+        """path: of the model file, for error messages."""
         self.path, self.facts = path, facts
         self._policy = policy_of(actor, facts)
         needs = facts.needs
@@ -34,7 +34,7 @@ class TrainedPolicy:
         self.normalise = needs.normalise
 
     def reset(self, context: Context) -> None:
-        """Raises InputError where the episode's observation, actuator or control interval differs."""
+        """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""
         needs, offered = self.facts.needs, Needs.of(context)
         if offered != needs:
             difference = _first_difference(needs, offered)
@@ -47,7 +47,7 @@ class TrainedPolicy:
 
 
 def policy_of(actor: Actor, facts: Facts) -> Policy:
-    """What a network does as the model's facts say: without its slow average, added to a policy's action."""
+    """Policy from a network and its facts: with its washout, and added to a base policy, if it has these."""
     policy: Policy = actor if facts.washout is None else WashedOut(actor, facts.washout)
     if facts.residual_of is None:
         return policy
@@ -55,43 +55,42 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 
 def load(path: str | Path) -> TrainedPolicy:
-    """Policy of a model file. Raises InputError, naming the file, where it is not a whole one."""
+    """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
     facts, actor = read_model(Path(path))
     try:
         return TrainedPolicy(Path(path), facts, actor)
     except RecursionError as error:
         raise InputError(
-            f"The model file {path} says that it is added to a policy which is, in the end, itself; take "
-            "another."
+            f"The model file {path} is, through its base policies, added to itself; take another model file."
         ) from error
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
-    """The first property that differs, and what to do about it."""
+    """First property that differs, and what to do about it; "" if none differs."""
     for name in OBSERVATION_SETTINGS:
         needed, here = getattr(needs, name), getattr(offered, name)
         if needed != here:
-            return f"it was trained with {name}={shown(needed)}, this is {shown(here)}; set it so"
+            return f"it was trained with {name}={shown(needed)}, this task has {shown(here)}; set it to match"
     if needs.channels != offered.channels:
         needed, here = PLACES[needs.channels], PLACES[offered.channels]
         return (
-            f"it was trained with an actuator on place '{needed}', this is on '{here}'; "
+            f"it was trained with an actuator on place '{needed}', this task has one on '{here}'; "
             f"set actuator={{'place': '{needed}'}}"
         )
     if needs.force_limit != offered.force_limit:
         return (
-            f"its actuator had a force_limit of {needs.force_limit:g} N, this has "
+            f"its actuator had a force_limit of {needs.force_limit:g} N, this one has "
             f"{offered.force_limit:g} N; set the actuator's force_limit to {needs.force_limit:g}"
         )
     if needs.control_interval != offered.control_interval:
         return (
-            f"it was trained with a control_interval of {needs.control_interval:g} s, this is "
-            f"{offered.control_interval:g} s; set it so"
+            f"it was trained with a control_interval of {needs.control_interval:g} s, this task has "
+            f"{offered.control_interval:g} s; set control_interval to {needs.control_interval:g}"
         )
     return (
         f"it was trained with other observations ({len(needs.entries)}: {_entries(needs)}) than this "
-        f"task has ({len(offered.entries)}: {_entries(offered)}); take the pantograph of its training "
-        "or train it anew"
+        f"task has ({len(offered.entries)}: {_entries(offered)}); use the pantograph of its training "
+        "or train another model"
     )
 
 

@@ -24,18 +24,18 @@ class PPO(Algorithm):
     n_steps: Count = Field(512, description="steps of each lane between two updates")
     n_epochs: Count = Field(10, description="passes over these steps in an update")
     gae_lambda: Share = Field(0.95, description="bias against variance of the advantage")
-    clip_range: Positive = Field(0.2, description="largest change of an action's probability")
+    clip_range: Positive = Field(0.2, description="maximum relative change of an action's probability")
     ent_coef: NonNegative = Field(0.0, description="weight of the entropy")
     vf_coef: NonNegative = Field(0.5, description="weight of the value's loss")
     max_grad_norm: Positive = Field(0.5, description="clip of the gradient")
     target_kl: Positive | None = Field(None, description="divergence that ends an update early")
-    log_std_init: float = Field(-1.0, description="log of the action's first standard deviation")
+    log_std_init: float = Field(-1.0, description="log of the action's initial standard deviation")
 
     def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where minibatches do not divide the steps of an update evenly, or are too many."""
+        """Raise InputError if minibatches do not divide the steps of an update, or these are too many."""
         if lanes * self.n_steps > MOST_KEPT:
             raise InputError(
-                f"lanes x n_steps = {lanes * self.n_steps:,} must be at most {MOST_KEPT:,}: so many steps "
+                f"lanes x n_steps = {lanes * self.n_steps:,} must be at most {MOST_KEPT:,}: these steps "
                 "are kept in memory"
             )
         if lanes * self.n_steps % self.batch_size or lanes * self.n_steps == 1:
@@ -67,8 +67,8 @@ class PPO(Algorithm):
             device="cpu",
         )
 
-    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
-        """Bring actor and critic of a new learner to what a policy has shown, and to what came of it."""
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+        """Fit a new learner's actor to a policy's actions, and its critic to the rewards that followed."""
         from .cloning import clone, regress
         from .demonstrations import returns
 
@@ -79,14 +79,14 @@ class PPO(Algorithm):
 
         extractor, values = policy.mlp_extractor, policy.value_net
         own = [*extractor.policy_net.parameters(), *policy.action_net.parameters()]
-        told = clone(mean, own, shown, cloning)
-        # A critic that knows nothing would lead the actor astray in its first updates.
-        sums, known = returns(shown, self.gamma)
+        error = clone(mean, own, examples, cloning)
+        # An untrained critic would mislead the actor in its first updates.
+        sums, known = returns(examples, self.gamma)
         if known.any():
             values.bias.data.fill_(float(sums[known].mean()))
             own = [*extractor.value_net.parameters(), *values.parameters()]
-            regress(policy.predict_values, own, shown.observations[known], sums[known][:, None], cloning)
-        return told
+            regress(policy.predict_values, own, examples.observations[known], sums[known][:, None], cloning)
+        return error
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mean of the action, clipped."""

@@ -1,4 +1,4 @@
-"""Lanes of an agent that adds to a policy's action: it begins as good as that, and learns what that lacks."""
+"""Lanes of an agent that adds to a base policy's action, and so starts as good as that policy."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .residual_policy import added
 
 
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]
-    """Lanes in which a base policy acts, too: an agent's action is added to its."""
+    """Lanes in which a base policy acts too: the agent's action is added to the base policy's."""
 
     def __init__(self, lanes: VecEnv, base: PolicyLanes, share: float) -> None:
-        """share: of the actuator's force limit that an agent's action of 1 adds."""
+        """share: part of the actuator's force limit that an agent's action of 1 adds."""
         super().__init__(lanes)
         self._base, self._share = base, share
 

@@ -1,4 +1,4 @@
-"""A policy and an agent that adds to it, as one policy."""
+"""A base policy and an agent that adds to its action, as one policy."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from panto_env.policies import Policy
 
 
 def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
-    """Action of a base policy and, to a share, an agent's: both in -1..1, as is what comes out."""
+    """Base policy's action plus a share of an agent's; all of them, the sum too, in -1..1."""
     return np.clip(base + share * action.astype(np.float64), -1.0, 1.0)
 
 
 class Residual:
-    """A policy whose action is a base policy's and, to a share, an agent's."""
+    """A policy whose action is a base policy's plus a share of an agent's."""
 
     def __init__(self, base: Policy, agent: Policy, share: float) -> None:
-        """share: of the actuator's force limit that the agent may add."""
+        """share: part of the actuator's force limit that the agent may add."""
         self._base, self._agent, self._share = base, agent, share
 
     def reset(self, context: Context) -> None:

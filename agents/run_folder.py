@@ -22,13 +22,13 @@ from .model_file import read_model
 from .settings import Training, parse_training
 
 CHECKPOINTS_KEPT = 3
-"""Older ones are removed: a checkpoint of SAC carries the replay buffer."""
+"""Number of checkpoints kept; older ones are removed, because a checkpoint of SAC holds the replay buffer."""
 EXTENDABLE = "total_steps"
-"""The only setting that a resumed run may change, and only upwards."""
+"""The only setting that a resumed run may change; it may only be raised."""
 
 
 class RunFolder:
-    """Paths of a run's files; it reads and writes those that are neither models nor TensorBoard logs."""
+    """Paths of a run's files; reads and writes those that are neither models nor TensorBoard logs."""
 
     def __init__(self, path: str | Path) -> None:
         check_path(path)
@@ -36,20 +36,20 @@ class RunFolder:
         self.settings = self.path / "settings.json"
         self.model = self.path / "model.safetensors"  # at the end of the training
         self.best = self.path / "best.safetensors"  # at the best evaluation
-        self.cloning = self.path / "cloning.json"  # how near the start came to another policy, if asked for
+        self.cloning = self.path / "cloning.json"  # error of the start from another policy, if there is one
         self.evaluations = self.path / "evaluations.csv"
         self.tensorboard = self.path / "tensorboard"
         self.checkpoints = self.path / "checkpoints"
 
     def check_new(self) -> None:
-        """Raise InputError where the folder holds something already."""
+        """Raise InputError if the folder holds anything already."""
         if os.path.exists(self.path) and (not self.path.is_dir() or any(map(_counts, self.path.iterdir()))):
             raise InputError(
-                f"{self.path} exists already; go on with it by --resume, or give another --output."
+                f"{self.path} exists already; continue it with --resume, or give another --output."
             )
 
     def check_resumable(self, training: Training) -> None:
-        """Raise InputError unless the folder holds a run with these settings, but for more steps."""
+        """Raise InputError unless the folder holds a run with these settings; only the steps may be more."""
         if not self.settings.is_file():
             raise InputError(
                 f"{self.path} holds no run to resume (no {self.settings.name}); train without --resume."
@@ -64,9 +64,9 @@ class RunFolder:
         if differing:
             raise InputError(
                 f"The settings differ from those of the run in {self.path}: {'; '.join(differing)}. "
-                "Take the run's settings, or train into another --output."
+                "Use the run's settings, or train into another --output."
             )
-        self._rows()  # which are gone on with, too
+        self._rows()  # the table of evaluations is continued, so it must be readable
         if training.total_steps < before.total_steps:
             raise InputError(
                 f"The run in {self.path} has total_steps = {before.total_steps}; a resumed run may have "
@@ -74,22 +74,22 @@ class RunFolder:
             )
 
     def alone(self) -> AbstractContextManager[None]:
-        """Within it no other process trains into the folder; as ``alone_in``."""
+        """Context in which no other process trains into the folder; see ``alone_in``."""
         return alone_in(self.path, "trains into")
 
     def read_settings(self) -> Training:
-        """Settings of the run. Raises InputError where the file is damaged."""
+        """Read the settings of the run. Raises InputError if the file is damaged."""
         return parse_training(read_checked(self.settings), str(self.settings))
 
     def write_settings(self, training: Training) -> None:
-        """Note what the run is; with it a new run begins."""
-        # First of all, so that whatever a killed run leaves is either nothing or can be resumed.
+        """Write the settings of a new run."""
+        # Before anything else, so that a killed run leaves either nothing or a folder that can be resumed.
         write_checked(self.settings, training.model_dump(mode="json"))
         make_folder(self.checkpoints)
 
-    def note_cloning(self, policy: str, told: Any) -> None:
-        """Write how far the agent is from the policy that it starts from (``CloningError``)."""
-        write_checked(self.cloning, {"policy": policy} | told.model_dump(mode="json"))
+    def note_cloning(self, policy: str, error: Any) -> None:
+        """Write the error between the agent and the policy that it starts from (``CloningError``)."""
+        write_checked(self.cloning, {"policy": policy} | error.model_dump(mode="json"))
 
     def checkpoint(self, steps: int) -> Path:
         """Path of the checkpoint at ``steps``."""
@@ -126,12 +126,12 @@ class RunFolder:
         self._write_rows(rows)
 
     def drop_evaluations_after(self, steps: int) -> None:
-        """Forget evaluations that a run resumed at ``steps`` will repeat; -1: all."""
+        """Remove evaluations that a run resumed at ``steps`` will repeat; -1: all."""
         if self.evaluations.is_file():
             self._write_rows([row for row in self._rows() if int(row["steps"]) <= steps])
 
     def _rows(self) -> list[dict[str, str]]:
-        """Rows of the table of evaluations. Raises InputError where it is damaged."""
+        """Rows of the table of evaluations. Raises InputError if it is damaged."""
         if not self.evaluations.is_file():
             return []
         rows: list[dict[str, str]] = []
@@ -143,12 +143,12 @@ class RunFolder:
                 for cells in table:
                     int(cells["steps"])
                     if None in cells or None in cells.values():
-                        raise ValueError("it has another number of cells than the header")
+                        raise ValueError("its number of cells differs from the header's")
                     rows.append(cells)
         except (OSError, ValueError, LookupError, TypeError, csv.Error) as error:
             raise InputError(
-                f"{self.evaluations} is damaged after {len(rows)} whole rows; mend or remove it, and resume "
-                "again."
+                f"{self.evaluations} is damaged after {len(rows)} whole rows; correct or remove it, and "
+                "resume again."
             ) from error
         return rows
 
@@ -162,7 +162,7 @@ class RunFolder:
 
 
 def _counts(path: Path) -> bool:
-    """Whether it is more than a lock, or a file that a killed process left half-written."""
+    """Whether a path is neither a lock nor a file that a killed process left half-written."""
     return not path.name.startswith(".")
 
 

@@ -23,7 +23,7 @@ class SAC(Algorithm):
 
     activation: Literal["tanh", "relu"] = Field("relu", description="of the hidden layers")
     buffer_size: Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)] = Field(
-        200_000, description="transitions that the replay buffer holds"
+        200_000, description="maximum number of transitions in the replay buffer"
     )
     learning_starts: Annotated[int, Field(ge=0, le=MOST_KEPT, strict=True)] = Field(
         2_000, description="steps with random actions before learning starts"
@@ -32,11 +32,11 @@ class SAC(Algorithm):
     train_freq: Count = Field(1, description="steps of each lane between two updates")
     gradient_steps: Count = Field(1, description="minibatches in an update")
     ent_coef: NonNegative | Literal["auto", "auto_0.1", "auto_0.01"] = Field(
-        "auto", description="weight of the entropy; auto: adapted, beginning at 1 or at the number after it"
+        "auto", description="weight of the entropy; auto: adapted, starting at 1 or at the number after it"
     )
 
     def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where learning would never start."""
+        """Raise InputError if learning would never start."""
         if self.learning_starts >= total_steps:
             raise InputError(
                 f"learning_starts = {self.learning_starts} must be less than total_steps = {total_steps}"
@@ -63,10 +63,10 @@ class SAC(Algorithm):
             device="cpu",
         )
 
-    def begin_with(self, model: Any, shown: Demonstrations, cloning: Cloning) -> CloningError:
-        """Bring a new learner's actor to what a policy has shown, and remember it, instead of random actions.
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+        """Fit a new learner's actor to a policy's actions, and fill the replay buffer with them.
 
-        The critics learn from what is remembered, as from all that follows.
+        They take the place of random actions; the critics learn from the buffer as usual.
         """
         from .cloning import clone
 
@@ -74,18 +74,21 @@ class SAC(Algorithm):
             return model.actor(observations, deterministic=True)
 
         own = [*model.actor.latent_pi.parameters(), *model.actor.mu.parameters()]
-        told = clone(mode, own, shown, cloning)
-        for step in range(len(shown.rewards)):
+        error = clone(mode, own, examples, cloning)
+        for step in range(len(examples.rewards)):
             model.replay_buffer.add(
-                shown.observations[step],
-                shown.following[step],
-                shown.taken[step],
-                shown.rewards[step],
-                shown.ended[step],
-                [{"TimeLimit.truncated": bool(cut)} for cut in shown.ended[step] & ~shown.terminated[step]],
+                examples.observations[step],
+                examples.following[step],
+                examples.taken[step],
+                examples.rewards[step],
+                examples.ended[step],
+                [
+                    {"TimeLimit.truncated": bool(cut)}
+                    for cut in examples.ended[step] & ~examples.terminated[step]
+                ],
             )
         model.learning_starts = 0
-        return told
+        return error
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mode of the action, squashed by tanh."""

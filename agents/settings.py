@@ -1,4 +1,4 @@
-"""A training as TOML, validated."""
+"""Settings of a training, from a TOML file."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}
 
 
 MOST_LANES = 65_536
-"""Of which each has a line of its own in memory."""
+"""Maximum number of lanes; each has its own line in memory."""
 
 
 LARGEST_SEED = 1_000_000_000
-"""Of the libraries' generators, which take no number of any size."""
+"""Maximum seed that the libraries' random generators accept, rounded down."""
 
 
 class Evaluation(Settings):
-    """How often the policy, without its exploration, is compared with the passive pantograph."""
+    """Regular comparison of the policy, without exploration, with the passive pantograph."""
 
     interval_steps: Count = Field(description="training steps between evaluations")
     speeds_kmh: tuple[Positive, ...] | None = Field(
@@ -53,11 +53,11 @@ class Training(Settings):
 
     algorithm: str = Field(description="one of ALGORITHMS")
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = Field(
-        0, description="of all random numbers"
+        0, description="seed of all random numbers"
     )
     total_steps: Count = Field(description="environment steps, summed over all lanes")
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
-        8, description="environments stepped together"
+        8, description="number of environments stepped together"
     )
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
@@ -68,10 +68,10 @@ class Training(Settings):
     cloning: Cloning = Field(Cloning(), description="how it learns them")
     residual_of: str | None = Field(None, description="policy that the agent's action is added to")
     residual_share: Share = Field(
-        0.3, description="of the actuator's force limit that the agent may add to that policy's action"
+        0.3, description="share of the actuator's force limit that the agent may add to that policy's action"
     )
     washout: WashoutSettings | None = Field(
-        None, description="the slow average that is taken off the agent's action, if any"
+        None, description="the slow average that is subtracted from the agent's action, if any"
     )
     hyperparameters: SerializeAsAny[Algorithm] = Field(description="of the algorithm")
 
@@ -87,9 +87,9 @@ class Training(Settings):
 
 
 def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of an environment that a table with its id describes.
+    """Arguments of an environment, from a table that also holds its id.
 
-    Raises InputError where the id or the name of an argument is unknown.
+    Raises InputError if the id or the name of an argument is unknown.
     """
     name = environment.get("id")
     if not isinstance(name, str) or name not in IDS:
@@ -100,7 +100,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
-    """Ends and middle of an environment's range of speeds, or its one speed (km/h)."""
+    """Minimum, middle and maximum of an environment's range of speeds, or its single speed (km/h)."""
     low, high = Task(run_settings(arguments(environment))).length.speed_range
     return tuple(sorted({round(to_kmh(v), 6) for v in (low, (low + high) / 2, high)}))
 
@@ -108,9 +108,9 @@ def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
 def load_training(path: str | Path, **changes: Any) -> Training:
     """Read a training from a TOML file, given by its path or by a name of ``configs/``.
 
-    ``changes`` (seed, total_steps) replace the file's unless None.
+    ``changes`` (seed, total_steps) replace the file's values unless None.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
     file = find(path, "training")
     replacements = {key: value for key, value in changes.items() if value is not None}
@@ -118,7 +118,7 @@ def load_training(path: str | Path, **changes: Any) -> Training:
 
 
 def parse_training(table: Mapping[str, Any], name: str) -> Training:
-    """Training from a table. Raises InputError, beginning with ``name``, where it is not valid."""
+    """Training from a table. Raises InputError, beginning with ``name``, if it is not valid."""
     try:
         _check_keys(table, tuple(Training.model_fields), "the top level")
         algorithm = table.get("algorithm")
@@ -157,7 +157,7 @@ def _check_environment(training: Training) -> None:
 
 def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
-        raise InputError("start_from and residual_of exclude each other: one that adds starts with nothing")
+        raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
     settings = run_settings(training.arguments)
     for name in (training.start_from, training.residual_of):
         if name is not None:

@@ -7,29 +7,29 @@ from pathlib import Path
 from .policy import TrainedPolicy, load
 
 FOLDER = Path(__file__).parent / "models"
-"""Their model files: arrays and JSON."""
+"""Folder of their model files."""
 
 
 def known_line() -> TrainedPolicy:
-    """One agent for en50318-2002 and its pantograph, 200 to 350 km/h, actuator on the frame.
+    """Agent for en50318-2002 and its pantograph, 200 to 350 km/h, actuator on the frame.
 
-    It began as ``fitted-fb+ff`` and learnt on by PPO; realistic actuator and sensors. It knows its line by
-    heart and is of no use on another one.
+    It started from ``fitted-fb+ff`` and was trained further by PPO, with realistic actuator and sensors. It
+    has learnt this line by heart and is of no use on another one.
     """
     return load(FOLDER / "known-line.safetensors")
 
 
 def head() -> TrainedPolicy:
-    """One agent for en50318-2002 and its pantograph, 200 to 350 km/h, motors in the head (``head-motor``).
+    """Agent for en50318-2002 and its pantograph, 200 to 350 km/h, motors in the head (``head-motor``).
 
-    It began as ``periodic`` of the head and learnt on by PPO; realistic sensors.
+    It started from ``periodic`` for the head and was trained further by PPO, with realistic sensors.
     """
     return load(FOLDER / "head.safetensors")
 
 
 def high_speed() -> TrainedPolicy:
-    """One agent for shinkansen-simple under identified-2dof, 250 to 400 km/h, as lines are built.
+    """Agent for identified-2dof on shinkansen-simple, 250 to 400 km/h, for lines as built.
 
-    It learnt by PPO from nothing but rewards; realistic actuator, on the frame, and sensors.
+    It was trained by PPO from rewards only, with a realistic actuator on the frame and realistic sensors.
     """
     return load(FOLDER / "high-speed.safetensors")

@@ -43,8 +43,8 @@ def train(
     resume: continue from the newest undamaged checkpoint of the run in ``output`` (from the beginning,
     if there is none), up to ``total_steps``. What was learnt is restored; random numbers and running
     episodes are not, so a resumed run is as good as an uninterrupted one, but not identical to it.
-    progress: show a bar on stderr. command: to be noted in the model files. Raises InputError where the run
-    exists already (or, with ``resume``, does not exist), has other settings, or is being trained by another
+    progress: show a bar on stderr. command: stored in the model files. Raises InputError if the run exists
+    already (or, with ``resume``, does not exist), has other settings, or is being trained by another
     process.
     """
     with _torch_on_one_thread(), ExitStack() as stack:
@@ -65,10 +65,10 @@ def train(
 
 
 class Run:
-    """A learner and its folder, and what happens with both between two rollouts."""
+    """A learner and its folder, with evaluations and checkpoints between rollouts."""
 
     def __init__(self, training: Training, folder: RunFolder, lanes: Any, command: str | None = None) -> None:
-        """lanes: ``VecEnv`` to learn from. command: to be noted in the model files."""
+        """lanes: ``VecEnv`` to learn from. command: stored in the model files."""
         self.training, self.folder, self._command = training, folder, command
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation since the run was begun or resumed
@@ -92,24 +92,24 @@ class Run:
         if self.folder.best.is_file():
             facts, _ = read_model(self.folder.best)
             self._best_score = (facts.qualified, -math.inf if facts.ratio is None else -facts.ratio)
-        # Without a checkpoint the run begins anew, with the evaluation of what it begins as.
+        # Without a checkpoint the run begins anew, with an evaluation of its initial policy.
         self.folder.drop_evaluations_after(-1 if newest is None else self.model.num_timesteps)
 
     def _seed_lanes(self) -> None:
-        """Give the lanes seeds that are for training: the learner would number them from its own."""
+        """Give the lanes seeds for training: the learner would count from its own seed."""
         self.model.get_env().seed(lane_seeds(self.training, self.model.num_timesteps)[0])
 
     def begin_with_policy(self) -> None:
-        """Bring the new learner to do what the policy does that it is to start from; note the error."""
+        """Fit a new learner to the policy that it starts from, and store the error."""
         training, name = self.training, self.training.start_from
         if name is None or self.model.num_timesteps > 0:
             return
         native, steps = self.model.get_env().unwrapped.env, training.cloning.steps
         seeds = lane_seeds(training)
         policy = PolicyLanes(name, native.task)
-        shown = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
-        told = training.hyperparameters.begin_with(self.model, shown, training.cloning)
-        self.folder.note_cloning(name, told)
+        examples = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
+        error = training.hyperparameters.begin_with(self.model, examples, training.cloning)
+        self.folder.note_cloning(name, error)
         self._seed_lanes()
 
     def learn(self, stack: ExitStack, progress: bool) -> None:
@@ -120,7 +120,7 @@ class Run:
         self.model.set_logger(configure(str(self.folder.tensorboard), ["tensorboard"]))
         stack.callback(self.model.logger.close)
         if self.model.num_timesteps == 0 and (self.training.start_from or self.training.residual_of):
-            self.evaluate()  # what it begins as may be hard to better
+            self.evaluate()  # the initial policy may be hard to beat
         # Evaluations come first, so that no checkpoint is newer than the table of evaluations.
         callbacks: list[Any] = [
             EpisodeLog(LOGGED_FIGURES),
@@ -140,7 +140,7 @@ class Run:
         self._save(self.folder.model)
 
     def evaluate(self) -> None:
-        """Compare the policy with the passive pantograph; note it in table and log; keep the best model."""
+        """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
         self.pairs = self._comparison.run(self._policy())
         self._verdict = ratio, qualified = verdict(self.pairs)
@@ -156,7 +156,7 @@ class Run:
             self._save(self.folder.best)
 
     def _policy(self) -> Any:
-        """The policy as it is now, as its model file would have it."""
+        """The present policy, in the form of its model file."""
         actor = self.training.hyperparameters.actor(self.model)
         return policy_of(actor, self._facts(actor))
 

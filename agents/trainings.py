@@ -18,20 +18,20 @@ from .settings import Training, load_training
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a finished run has learnt: its best model."""
+    """Outcome of a finished run: its best model."""
 
     folder: str
     algorithm: str
     seed: int
     steps: int  # of the whole training
     best: str  # model file of the best evaluation
-    best_steps: int  # learnt by then
+    best_steps: int  # steps trained by then
     ratio: float | None  # mean of sigma over that of the passive pantograph; None: a run ended early
     qualified: bool  # whether every mean force was within its range
 
 
 def run_name(config: Path, training: Training) -> str:
-    """Name of a run's folder, unless the user gives another."""
+    """Default name of a run's folder."""
     return f"{config.stem}-{training.algorithm}-seed{training.seed}"
 
 
@@ -40,8 +40,8 @@ def plan(
 ) -> dict[Path, Training]:
     """Trainings of all configurations under all seeds, by the folder of each run, in ``output``.
 
-    seeds: None for that of each file. total_steps: None for those of each file. Raises InputError for a file
-    that is not valid, and where two runs would have the same folder.
+    seeds, total_steps: None for those of each file. Raises InputError for a file that is not valid, and if
+    two runs would have the same folder.
     """
     planned: dict[Path, Training] = {}
     for config in configs:
@@ -50,8 +50,8 @@ def plan(
             folder = output / run_name(config, training)
             if folder in planned:
                 raise InputError(
-                    f"Two of the trainings would go into {folder}; leave out a seed that is given twice, or "
-                    "give a configuration another file name."
+                    f"Two of the trainings would go into {folder}; omit a repeated seed, or rename "
+                    "a configuration file."
                 )
             planned[folder] = training
     return planned
@@ -68,10 +68,10 @@ def train_all(
 ) -> list[Outcome]:
     """Train each into its folder; outcomes in the order of the trainings.
 
-    resume: go on with runs that have begun, begin those that have not. workers, ray: as ``spread`` takes
-    them; on a cluster all machines must see the folders, and a run whose worker died goes on from its newest
-    checkpoint. command: to be noted in the model files. Raises InputError, before anything begins, where
-    without ``resume`` one of the folders holds something, and as ``train`` does.
+    resume: continue runs that have begun, begin the others. workers, ray: see ``spread``; on a cluster all
+    machines must see the folders, and a run whose worker died continues from its newest checkpoint. command:
+    stored in the model files. Raises InputError before anything begins if, without ``resume``, one of the
+    folders holds anything, and for the same reasons as ``train``.
     """
     if not resume:
         for path in trainings:
@@ -84,8 +84,8 @@ def train_all(
 
 
 def _begin_or_go_on(training: Training, path: Path, command: str | None) -> None:
-    """One training, which may have lost its worker before."""
-    from .train import train  # with it comes torch, which only those that train need
+    """Run one training, or continue it if its worker died before."""
+    from .train import train  # imports torch, which only a training needs
 
     resume = RunFolder(path).settings.is_file()
     train(training, path, resume=resume, progress=False, command=command)

@@ -1,4 +1,4 @@
-"""``panto trainings``. Torch, and all that needs it, is imported only where something is trained."""
+"""``panto trainings``. Torch is imported only where a training runs."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ def trainings(
         Path, typer.Option(help="Folder in which each run has one, NAME-ALGORITHM-seedK.")
     ] = Path("runs"),
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with runs that have begun, and begin the others.")
+        bool, typer.Option("--resume", help="Continue runs that have begun, and begin the others.")
     ] = False,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:
-    """Train several configurations under several seeds, side by side, each run as by `panto train`.
+    """Train several configurations under several seeds in parallel, each run as by `panto train`.
 
-    On a Ray cluster all machines must see the folder of the runs. A run whose worker dies goes on from its
-    newest checkpoint there; here, repeat the command with --resume.
+    On a Ray cluster all machines must see the folder of the runs, and a run whose worker dies continues from
+    its newest checkpoint. On one machine, repeat the command with --resume.
     """
     check_packages()
     from .trainings import plan, train_all
@@ -64,7 +64,7 @@ def trainings(
 
 
 def _table(outcomes: Sequence[Outcome]) -> Table:
-    """Best models, one row a run."""
+    """Table of the best models, one row per run."""
     rows = []
     for each in outcomes:
         change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"

@@ -18,16 +18,16 @@ from panto_env.envs import IDS, PantographVectorEnv
 class PantographVecEnv(VecEnv):  # type: ignore[misc]
     """A ``VecEnv`` around a vector environment of Gymnasium, ``PantographVectorEnv`` or a wrapper of one.
 
-    Any mode of autoreset will do. Observations and rewards are those of the environment, not copied again.
+    Any autoreset mode works. Observations and rewards are the environment's own arrays, not copies.
     When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the
     episode's "figures".
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        """Raises InputError for what is no vector environment of this project."""
+        """Raises InputError if ``env`` is not a vector environment of this project."""
         if not (isinstance(env, VectorEnv) and isinstance(env.unwrapped, PantographVectorEnv)):
             raise InputError(
-                f"PantographVecEnv takes what gymnasium.make_vec makes of {', '.join(IDS)}, "
+                f"PantographVecEnv needs an environment of gymnasium.make_vec for {', '.join(IDS)}, "
                 f"not {type(env).__name__}; Stable-Baselines3 takes single environments as they are."
             )
         self.env: Any = env
@@ -57,10 +57,12 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         if done.any():
             if "final_obs" in info:  # same-step autoreset
                 last, figures = info["final_obs"], info["final_info"]["figures"]
-            else:  # next-step or no autoreset: those that have ended begin anew now, as is expected here
+            else:  # next-step or no autoreset: ended lanes are reset now, as Stable-Baselines3 expects
                 last, figures = observation, info["figures"]
                 observation, _ = self.env.reset(options={"reset_mask": done})
-            names = [name for name in figures if not name.startswith("_")]  # "_name" says who has one
+            names = [
+                name for name in figures if not name.startswith("_")
+            ]  # "_name" marks lanes that have one
             for lane in np.flatnonzero(done).tolist():
                 infos[lane] = {
                     "terminal_observation": last[lane],
@@ -75,19 +77,19 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The native environment's attribute, repeated for each lane asked for."""
+        """The native environment's attribute, repeated for each requested lane."""
         return [getattr(self.env, attr_name)] * len(self._lanes(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: lanes share one environment, so an attribute cannot be set for some of them."""
+        """Refused, because lanes share one environment: an attribute cannot be set for some of them only."""
         raise NotImplementedError("The lanes share one environment; make it anew to change an attribute.")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the native environment once; its answer, repeated for each lane asked for."""
+        """Call a method of the native environment once; its result, repeated for each requested lane."""
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """No lane has a wrapper of its own."""
+        """False for each lane: no lane has a wrapper of its own."""
         return [False] * len(self._lanes(indices))
 
     def _lanes(self, indices: Any) -> Sequence[int]:

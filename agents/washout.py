@@ -1,4 +1,4 @@
-"""Lanes of an agent whose action has no slow part: it steadies the force and leaves its mean alone."""
+"""Lanes of an agent whose action has no slow part, so that it cannot move the mean contact force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from panto_env.control.context import Context
 
 
 class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
-    """Lanes that act on what is left of an agent's actions without their slow averages."""
+    """Lanes that get an agent's actions minus their slow averages."""
 
     def __init__(self, lanes: VecEnv, context: Context, settings: WashoutSettings) -> None:
         """context: of any of the lanes."""
@@ -29,7 +29,7 @@ class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
         return observations
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Keep what is left of these actions, (lanes, actions), for ``step_wait``."""
+        """Keep these actions, (lanes, actions), minus their slow averages for ``step_wait``."""
         self.venv.step_async(self._washout(actions.astype(np.float64) * self._limit) / self._limit)
 
     def step_wait(self) -> Any:

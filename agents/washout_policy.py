@@ -12,7 +12,7 @@ from .actor import Actor
 
 
 class WashedOut:
-    """A network as a policy, its action without its slow average."""
+    """A network as a policy; the slow average is subtracted from its action."""
 
     def __init__(self, actor: Actor, settings: WashoutSettings) -> None:
         self._actor, self._settings = actor, settings

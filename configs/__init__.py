@@ -1,4 +1,4 @@
-"""Trainings, benchmarks, data sets and more of the project; commands take them by name, files by path."""
+"""The project's trainings, benchmarks, data sets and more as TOML; commands find them by name."""
 
 from __future__ import annotations
 

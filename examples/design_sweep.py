@@ -2,7 +2,7 @@ r"""A sweep over two parameters of a design: the collector head's mass and the c
 
     python examples/design_sweep.py --plot design.png
 
-printed twelve designs, and at last "least sigma: 23.0 N, head 4 kg, tension 24 kN". The same as a command:
+printed twelve designs, and at last "minimum sigma: 23.0 N, head 4 kg, tension 24 kN". The same as a command:
 
     panto sweep pantograph.masses.0=4:10:4 catenary.contact_wire.tension=16e3:24e3:3 \
       --speed 275 --mean-force 130 --plot design.png
@@ -28,7 +28,7 @@ def designs() -> list[Row]:
         catenary="en50318-2002",
         pantograph="en50318-2002",
         speed_kmh=SPEED_KMH,
-        mean_force=130.0,  # N, in all designs alike: one that presses less would look better
+        mean_force=130.0,  # N, the same in all designs: one with a smaller mean would look better
     )
 
 
@@ -41,7 +41,7 @@ def main() -> None:
     for row in rows:
         print(f"head {row[HEAD]:g} kg, tension {row[TENSION] / 1e3:g} kN: sigma {row['std']:.1f} N")
     best = min(rows, key=lambda row: row["std"])
-    print(f"least sigma: {best['std']:.1f} N, head {best[HEAD]:g} kg, tension {best[TENSION] / 1e3:g} kN")
+    print(f"minimum sigma: {best['std']:.1f} N, head {best[HEAD]:g} kg, tension {best[TENSION] / 1e3:g} kN")
     if plot is not None:
         save(plot_sweep(rows, [HEAD, TENSION]), plot)
 

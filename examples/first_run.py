@@ -1,7 +1,7 @@
 """One pass of a pantograph along a line: its figures, a plot, and the same pass as an environment.
 
-The line is the reference model of EN 50318:2002, at 300 km/h. As an environment that nobody acts on it is the
-same simulation, step by step, so that its figures are the same.
+The line is the reference model of EN 50318:2002, at 300 km/h. An environment without any action is the same
+simulation, step by step, so that its figures are the same.
 
     python examples/first_run.py --plot first_run.png
 
@@ -33,9 +33,9 @@ def one_pass() -> Trajectory:
 
 def same_as_environment(distance: float) -> Trajectory:
     """The same pass over a distance (m) through Gymnasium, with an action of zero: no force added."""
-    # BARE: line and pantograph as designed, without the scatter, delays and noise that Pantograph-v0 has.
+    # BARE: line and pantograph as designed, without the scatter, delays and noise of Pantograph-v0.
     task = BARE | {"catenary": "en50318-2002", "pantograph": "en50318-2002", "speed_kmh": SPEED_KMH}
-    task |= {"distance": distance}  # an episode is shorter unless told otherwise
+    task |= {"distance": distance}  # by default an episode is shorter
     env = gymnasium.make("panto_env:Pantograph-v0", **task)
     env.reset(seed=0)
     passive = np.zeros(env.action_space.shape, dtype=np.float32)

@@ -1,7 +1,7 @@
 """Identify a pantograph from a rig's record, a CSV file, and compare it with the truth.
 
 The record is made here: a plate moves the collector head of a known pantograph up and down at 0.3 to 4 Hz;
-three displacement sensors and a load cell, with noise, write what they see. With a record of yours leave out
+three displacement sensors and a load cell, with noise, record the motion. If you have a record, leave out
 ``write_rig_record``. `panto identify rig.csv --measured k1T=32992 m2=5 k2=14544` does the same.
 
     python examples/identify_from_csv.py
@@ -38,11 +38,11 @@ from panto_env.identification import (
 )
 
 TRUTH = parameters_of(load_pantograph("identified-2dof"))
-KNOWN = {name: TRUTH[name] for name in MEASURED}  # weighed, or pressed with a spring balance
+KNOWN = {name: TRUTH[name] for name in MEASURED}  # weighed, or measured with a spring balance
 
 
 def write_rig_record(path: Path) -> None:
-    """The file that a rig would write: time, force and three displacements, a thousand times a second."""
+    """Write the file that a rig would write: time, force and three displacements, 1000 rows per second."""
     write_record(add_noise(clean_record(FREQUENCY_SWEEP, TRUTH), np.random.default_rng(0)), path)
 
 

@@ -1,4 +1,4 @@
-"""Learnt from data sets alone: a controller from recorded episodes, and sigma from a table of designs.
+"""Learning from data sets only: a controller from recorded episodes, and sigma from a table of designs.
 
     panto dataset episodes dataset-known-line --only fitted-fb-ff-noisy
     panto dataset designs
@@ -14,12 +14,12 @@ printed, after about two minutes on one core,
     sigma of unseen designs by linear: R2 0.806, median error 8.1 %
     sigma of unseen designs by trees: R2 0.941, median error 5.1 %
 
-The controller is a network that imitates `fitted-fb+ff` (behaviour cloning). It sees what the data set
-holds, the observation of Pantograph-v0, and makes of it what a controller can remember: the place within
-the span as 14 harmonics, three control steps of readings, slow averages of them, and its own last two
-commands. It imitates what the policy wanted in states that noise on the actions had led to, so that it
-has seen how to find back. It is judged like any policy of the benchmark: on lines of other seeds, beside
-a passive pantograph that presses as hard.
+The controller is a network that imitates `fitted-fb+ff` (behaviour cloning). Its features come from the
+observation of Pantograph-v0, which the data set holds, and from what a controller can remember: the place
+within the span as 14 harmonics, three control steps of readings, slow averages of them, and its own last two
+commands. It imitates the policy's actions in states that noise on the actions had led to, so that it has
+seen how to recover. It is judged like any policy of the benchmark: on lines of other seeds, against a passive
+pantograph at the same mean force.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ SPEEDS_KMH = (250.0, 300.0, 350.0)
 
 
 class Features:
-    """What a network is shown: of this observation, and of what is remembered of those before."""
+    """Features of a network: from the present observation and from memory of earlier ones."""
 
     def __init__(self) -> None:
         self._past: list[Array] = []
         self._average: Array | None = None
 
     def __call__(self, observation: NDArray[np.float32], commands: list[Array]) -> NDArray[np.float32]:
-        """(features,); commands: the controller's own so far."""
+        """Features, (features,), of an observation; commands: the controller's own so far."""
         readings = observation[READINGS].astype(float)
         average = readings if self._average is None else self._average
         self._average = average + (readings - average) / AVERAGED
@@ -89,30 +89,30 @@ class Clone:
         return action
 
 
-def shown(data: Path, dataset: str = DATASET) -> Iterator[tuple[Array, Array]]:
-    """Features, (steps, features), and what the policy wanted, (steps, 1), of each episode of a data set."""
+def examples(data: Path, dataset: str = DATASET) -> Iterator[tuple[Array, Array]]:
+    """Features, (steps, features), and the policy's actions, (steps, 1), of each episode of a data set."""
     os.environ["MINARI_DATASETS_PATH"] = str(data.resolve())
     import minari  # reads the path above
 
     for episode in minari.load_dataset(dataset):
-        features, wanted = Features(), episode.infos["policy_action"][1:]
+        features, actions = Features(), episode.infos["policy_action"][1:]
         yield (
-            np.array([features(seen, list(wanted[max(0, k - COMMANDS) : k]))
+            np.array([features(seen, list(actions[max(0, k - COMMANDS) : k]))
                       for k, seen in enumerate(episode.observations[:-1])]),
-            wanted,
+            actions,
         )  # fmt: skip
 
 
 def clone(data: Path, model: Path, *, dataset: str = DATASET, epochs: int = 40) -> float:
-    """Fit a network to a data set and write it; returns its rms error over the rms action, unseen."""
+    """Fit a network to a data set and write it; returns rms error over rms action on unseen episodes."""
     import torch
 
     torch.manual_seed(0)
     torch.set_num_threads(1)
-    episodes = list(shown(data, dataset))
+    episodes = list(examples(data, dataset))
     held_out = max(1, len(episodes) // 10)
     x, y = (np.concatenate(each).astype(np.float32) for each in zip(*episodes[:-held_out], strict=True))
-    unseen, wanted = (
+    unseen, actions = (
         np.concatenate(each).astype(np.float32) for each in zip(*episodes[-held_out:], strict=True)
     )
     layers = [torch.nn.Linear(*shape) for shape in ((x.shape[1], 256), (256, 128), (128, y.shape[1]))]
@@ -129,10 +129,10 @@ def clone(data: Path, model: Path, *, dataset: str = DATASET, epochs: int = 40) 
             optimiser.step()
             decay.step()
     with torch.no_grad():
-        error = net(torch.from_numpy(unseen)).numpy() - wanted
+        error = net(torch.from_numpy(unseen)).numpy() - actions
     arrays = {f"weight{k}": layer.weight.detach().numpy() for k, layer in enumerate(layers)}
     np.savez(model, **arrays, **{f"bias{k}": layer.bias.detach().numpy() for k, layer in enumerate(layers)})
-    return float(np.sqrt(np.mean(error**2) / np.mean(wanted**2)))
+    return float(np.sqrt(np.mean(error**2) / np.mean(actions**2)))
 
 
 def judge(
@@ -156,10 +156,10 @@ def judge(
 
 
 def surrogate(table: Path) -> dict[str, tuple[float, float]]:
-    """By model: R2 and median relative error (%) of sigma, on the last fifth of the designs, unseen by it.
+    """By model: R2 and median relative error (%) of sigma on the last fifth of the designs, unseen by it.
 
-    "mean" predicts the mean of the others and "linear" is a linear model of all parameters: yardsticks for
-    "trees", which are gradient-boosted and see what engineers go by, too.
+    "mean" predicts the mean of the other designs and "linear" is a linear model of all parameters: yardsticks
+    for "trees", which are gradient-boosted and also see the ratios that engineers use.
     """
     import pyarrow.parquet as pq
     from sklearn.dummy import DummyRegressor
@@ -180,16 +180,16 @@ def surrogate(table: Path) -> dict[str, tuple[float, float]]:
     first, scores = round(0.8 * there.sum()), {}
     for name, (model, seen) in models.items():
         model.fit(seen[there][:first], np.log(sigma[there][:first]))
-        told, true = np.exp(model.predict(seen[there][first:])), sigma[there][first:]
-        r2 = 1 - np.mean((told - true) ** 2) / np.var(true)
-        scores[name] = float(r2), float(100 * np.median(np.abs(told / true - 1)))
+        predicted, true = np.exp(model.predict(seen[there][first:])), sigma[there][first:]
+        r2 = 1 - np.mean((predicted - true) ** 2) / np.var(true)
+        scores[name] = float(r2), float(100 * np.median(np.abs(predicted / true - 1)))
     return scores
 
 
 def ratios(columns: dict[str, Array]) -> Array:
-    """Of designs, (designs, 5): speed over wave speeds, spans per second, and waves sent back by droppers.
+    """Ratios of designs, (designs, 5): speed over wave speeds, spans per second, wave reflection by droppers.
 
-    The share that a dropper sends back and the Doppler factor are those of the usual theory of two strings.
+    The reflection coefficient of a dropper and the Doppler factor are from the usual theory of two strings.
     """
     speed, span = from_kmh(columns["speed_kmh"]), columns["catenary.span_length"]
     (contact, contact_mass), (messenger, messenger_mass) = (
@@ -203,7 +203,7 @@ def ratios(columns: dict[str, Array]) -> Array:
 
 
 def main() -> None:
-    """Both, with a line for each number."""
+    """Train both models and print each figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("data"), help="folder of the data sets")
     parser.add_argument("--model", type=Path, default=Path("clone.npz"), help="file to write the clone to")

@@ -1,4 +1,4 @@
-"""A line of your own, written as TOML: simulated, held against the standards, and at several speeds.
+"""A line of your own, written as TOML: simulated, checked against the standards, and at several speeds.
 
     python examples/line_from_toml.py --plot line.png
 
@@ -27,12 +27,12 @@ SPEEDS_KMH = (200.0, 220.0, 240.0, 260.0, 280.0)
 
 
 def one_pass() -> Trajectory:
-    """The record of one pass, pressed to the mean force that EN 50367 has for the speed."""
+    """Record of one pass at the mean force that EN 50367 gives for the speed."""
     return simulate(LINE, PANTOGRAPH, SPEED_KMH, mean_force="en50367")
 
 
 def over_speed() -> list[Row]:
-    """One row of figures per speed, each pressed to its own mean force."""
+    """One row of figures per speed, each at its own mean force."""
     return sweep({"speed_kmh": SPEEDS_KMH}, catenary=LINE, pantograph=PANTOGRAPH, mean_force="en50367")
 
 

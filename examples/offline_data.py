@@ -1,4 +1,4 @@
-"""Episodes written as a Minari data set, read back as libraries for offline learning do, and replayed.
+"""Episodes written as a Minari data set, read back like libraries for offline learning do, and replayed.
 
     python examples/offline_data.py
 
@@ -31,8 +31,8 @@ def main() -> tuple[list[float], bool]:
 
         data = minari.load_dataset(made.dataset_id)
         returns = [float(episode.rewards.sum()) for episode in data]
-        told = " and ".join(f"{each:.1f}" for each in returns)
-        print(f"{data.id}: {len(data)} episodes, {data.total_steps:,} steps, returns {told}")
+        values = " and ".join(f"{each:.1f}" for each in returns)
+        print(f"{data.id}: {len(data)} episodes, {data.total_steps:,} steps, returns {values}")
         first, facts = data[0], next(iter(data.storage.get_episode_metadata([0])))
         env = data.recover_environment()
         env.reset(seed=facts["seed"], options=facts.get("options"))

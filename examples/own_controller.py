@@ -1,8 +1,8 @@
 """A controller of your own, judged by the benchmark beside passive and pd.
 
-It feeds back the frame's velocity and a slowly found mean of the contact force, so that it damps without
-pressing harder. What counts is sigma against a passive pantograph that is pressed to the same mean force; a
-policy that moves the mean by more than 1.5 %, as pd does, is shown and not ranked.
+It feeds back the frame's velocity and the contact force's deviation from its slow mean, so that it damps
+without raising the mean force. The benchmark compares sigma with a passive pantograph at the same mean
+force; a policy that moves the mean by more than 1.5 %, as pd does, is shown but not ranked.
 
     python examples/own_controller.py
 
@@ -29,11 +29,11 @@ class Damper:
     """Damping of the frame, and feedback on how the contact force deviates from its own slow mean."""
 
     def __init__(self, gain: float = 0.5, damping: float = 100.0, seconds: float = 2.0) -> None:
-        """gain: N/N. damping: N s/m. seconds: over which the mean is found."""
+        """gain: N/N. damping: N s/m. seconds: time constant of the slow mean."""
         self.gain, self.damping, self.seconds = gain, damping, seconds
 
     def reset(self, context: Context) -> None:
-        """Prepare for an episode. The context knows the observation's entries and the actuator's limit."""
+        """Prepare for an episode. The context holds the observation's entries and the actuator's limit."""
         self.context, self.mean = context, context.nominal_force
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -41,8 +41,8 @@ class Damper:
         read = self.context.layout.read
         force, velocity = read(observation, "contact force"), read(observation, "frame velocity")
         self.mean += self.context.control_interval / self.seconds * (force - self.mean)
-        wanted = self.gain * (self.mean - force) - self.damping * velocity  # N
-        return np.array([wanted / self.context.force_limit])
+        command = self.gain * (self.mean - force) - self.damping * velocity  # N
+        return np.array([command / self.context.force_limit])
 
 
 def judge() -> Benchmark:
@@ -59,7 +59,7 @@ def judge() -> Benchmark:
 
 
 def main() -> None:
-    """Print what each policy takes off sigma."""
+    """Print each policy's change of sigma."""
     for cell in judge().cells:
         name = cell.policy.rpartition(":")[2]
         ranked = f"not ranked: {cell.disqualified}" if cell.disqualified else f"rank {cell.rank}"

@@ -1,8 +1,8 @@
-"""PPO in one file, in the style of CleanRL: everything that it does stands here, to be read and changed.
+"""PPO in one file, in the style of CleanRL: the whole algorithm stands here, to be read and changed.
 
 It learns in 64 lanes of the native vector environment, at 300 km/h on lines that differ from one another,
-with a real actuator and real sensors. What it has learnt is judged on seeds that it has not seen, against a
-passive pantograph that is pressed to the same mean force.
+with a realistic actuator and realistic sensors. The result is judged on seeds that it has not seen, against a
+passive pantograph at the same mean force.
 
     python examples/ppo_cleanrl.py --steps 400000
 
@@ -81,17 +81,17 @@ class Agent(nn.Module):
 
 
 def train(steps: int, report: bool = True) -> tuple[Agent, list[float]]:
-    """An agent after about so many steps of all lanes together, and the mean reward of each rollout."""
+    """Train an agent for about this number of steps, summed over lanes; also the mean reward per rollout."""
     torch.manual_seed(0)
     torch.set_num_threads(1)
-    # "SameStep": with an episode's end comes the first observation of the next one; its own last one is in
-    # info["final_obs"]. With "NextStep", the default of Gymnasium, the step after an end only begins the
-    # next episode, and would have to be left out of what is learnt from.
+    # "SameStep": the step that ends an episode returns the first observation of the next one; the last one
+    # of the old episode is in info["final_obs"]. With "NextStep", the default of Gymnasium, the step after an
+    # end only begins the next episode, and must be excluded from learning.
     envs = gymnasium.make_vec(
         "panto_env:Pantograph-v0",
         LANES,
         autoreset_mode=AutoresetMode.SAME_STEP,
-        accuracy="fast",  # coarser than what judges: an agent learns the same on it
+        accuracy="fast",  # coarser than in the evaluation; an agent learns equally well
         run_in=10,  # episodes begin up to ten spans after the line's start
         distance=900.0,
         reward="agent",  # what the benchmark measures
@@ -114,7 +114,7 @@ def train(steps: int, report: bool = True) -> tuple[Agent, list[float]]:
 
 @torch.no_grad()
 def collect(envs: Any, agent: Agent, observation: torch.Tensor) -> tuple[list[torch.Tensor], torch.Tensor]:
-    """What the lanes went through, in the order that ``advantages`` takes it, and what is seen next."""
+    """Rollout of all lanes, in the order of the arguments of ``advantages``, and the next observation."""
     rows = []
     for _ in range(ROLLOUT):
         action = agent.actions(observation).sample()
@@ -140,7 +140,7 @@ def advantages(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Advantages and returns, (steps, lanes), of a rollout in tensors of (steps, lanes, ...).
 
-    Nothing follows a termination. After a truncation the line goes on: the critic says what that is worth.
+    Nothing follows a termination. After a truncation the line continues: the critic estimates its value.
     """
     values = agent.values(seen)
     surprise = reward + GAMMA * agent.values(following) * ~terminated - values
@@ -176,19 +176,19 @@ def learn(
 
 
 def judge(policy: Any) -> tuple[float, float]:
-    """Change of sigma (%) to the passive pantograph of the same mean, and of the mean (%) to it as it is."""
+    """Changes (%) of sigma from the passive pantograph at the same mean, and of the mean from passive."""
     changes = []
     for seed in TEST_SEEDS:
         task = TASK | {"seed": seed, "record_droppers": False}
         own, passive = simulate(policy=policy, **task).summary(), simulate(**task).summary()
-        pressed = simulate(mean_force=own.mean, **task).summary()
-        changes.append((100 * (own.std / pressed.std - 1), 100 * (own.mean / passive.mean - 1)))
+        same_mean = simulate(mean_force=own.mean, **task).summary()
+        changes.append((100 * (own.std / same_mean.std - 1), 100 * (own.mean / passive.mean - 1)))
     sigma, mean = np.mean(changes, axis=0)
     return float(sigma), float(mean)
 
 
 def main() -> None:
-    """Train, then print what the agent takes off sigma."""
+    """Train, then print the agent's change of sigma."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=400_000)
     agent, rewards = train(parser.parse_args().steps)

@@ -1,8 +1,8 @@
-"""A rig's computer over the network: one process computes the line, another one stands in for the rig.
+"""A rig's computer over the network: one process computes the line, another one simulates the rig.
 
-The stand-in has a cylinder and a pantograph, simulated with small steps of its own, and knows nothing of the
-line. Every millisecond of its time it sends the force that its load cell reads, as one packet of 8 bytes, and
-gets the displacement to command back as another. A real rig's controller would do the same by its own clock.
+The simulated rig has a cylinder and a pantograph, computed with smaller steps, and knows nothing of the line.
+Every millisecond of its time it sends the force that its load cell reads, as one packet of 8 bytes, and gets
+the displacement to command in return. A real rig's controller would do the same at the rate of its own clock.
 
     python examples/rig_over_udp.py --seconds 5
 """
@@ -31,9 +31,9 @@ STOP = math.nan
 
 
 def compute(port: int, seconds: float, ready: multiprocessing.synchronize.Event) -> None:
-    """The computer: answer forces (N) with displacements (m) to command, until a force is no number."""
+    """The computer: answer forces (N) with displacements (m) to command, until a force is nan."""
     data = load_rig(RIG)
-    cell = data.load_cell.model_copy(update={"filter_frequency": 1e4})  # the stand-in has no filter
+    cell = data.load_cell.model_copy(update={"filter_frequency": 1e4})  # the simulated rig has no filter
     data = data.model_copy(update={"load_cell": cell})
     speed = from_kmh(SPEED_KMH)
     force, spans = load_pantograph(PANTOGRAPH).nominal_force(speed), data.spans
@@ -52,14 +52,14 @@ def compute(port: int, seconds: float, ready: multiprocessing.synchronize.Event)
 
 
 def stand_in(port: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """The rig: forces (N) and round trips (s), one for each millisecond."""
+    """The simulated rig: forces (N) and round-trip times (s), one for each millisecond."""
     panto, step, substeps = load_pantograph(PANTOGRAPH), 1e-3, 20
     dt, omega, ratio = step / substeps, 2 * math.pi * 60.0, 0.7
     (head_mass, frame_mass), (k_head, k_frame) = panto.masses, panto.stiffnesses
     c_head, c_frame = panto.dampings
     lift, strip = panto.nominal_force(from_kmh(SPEED_KMH)), panto.contact_stiffness
     cylinder = velocity = head = frame = head_velocity = frame_velocity = 0.0
-    head = lift / strip  # at rest, pressed against the cylinder
+    head = lift / strip  # at rest, in contact with the cylinder
     frame = head + lift / k_head
     lift += k_frame * frame
     forces, trips, command = [], [], 0.0
@@ -85,27 +85,27 @@ def stand_in(port: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def free_port() -> int:
-    """A port of this machine that nobody uses."""
+    """A free port of this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
         channel.bind(("127.0.0.1", 0))
         return int(channel.getsockname()[1])
 
 
 def run(seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Both sides, the computer in a process of its own."""
+    """Run both sides, the computer in its own process."""
     context = multiprocessing.get_context("spawn")
     port, ready = free_port(), context.Event()
     computer = context.Process(target=compute, args=(port, seconds, ready), daemon=True)
     computer.start()
     if not ready.wait(10 * PATIENCE):  # the first run compiles
-        raise RuntimeError("The computer did not come up.")
+        raise RuntimeError("The computer did not start.")
     found = stand_in(port, seconds)
     computer.join(PATIENCE)
     return found
 
 
 def main() -> None:
-    """Run the example and print what came of it."""
+    """Run the example and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=5.0)
     forces, trips = run(parser.parse_args().seconds)

@@ -1,7 +1,7 @@
-"""Soft actor-critic with Stable-Baselines3, in some twenty lines, and what it has learnt beside passive.
+"""Soft actor-critic with Stable-Baselines3, in some twenty lines, compared with the passive pantograph.
 
-At 300 km/h on lines that differ from one another, with a real actuator and real sensors. It is judged on
-seeds that it has not seen, against a passive pantograph that is pressed to the same mean force.
+At 300 km/h on lines that differ from one another, with a realistic actuator and realistic sensors. It is
+judged on seeds that it has not seen, against a passive pantograph at the same mean force.
 
     python examples/train_sac.py --steps 120000
 
@@ -9,7 +9,7 @@ printed after two minutes of one core
 
     sigma -20.2 % of the passive pantograph of the same mean, mean force +0.4 %
 
-With other settings that were tried it ended between -8 and -20 %. SAC is sparing with steps, which cost
+With other settings that were tried it reached between -8 and -20 %. SAC needs few steps, but steps cost
 little here; PPO reaches more in a third of the time (examples/ppo_cleanrl.py).
 """
 
@@ -41,7 +41,7 @@ TRAINING_SEED, TEST_SEEDS = 2000, (0, 1)
 
 
 def train(steps: int) -> SAC:
-    """A learner after so many steps of eight lanes together: they step abreast, then it learns once."""
+    """Train a learner for this number of steps, summed over eight lanes; it learns once per vector step."""
     torch.set_num_threads(1)  # such small networks are slower on more
     envs = gymnasium.make_vec(
         "panto_env:Pantograph-v0", 8, accuracy="fast", run_in=10, distance=900.0, reward=REWARD, **TASK
@@ -67,7 +67,7 @@ def train(steps: int) -> SAC:
 
 
 class Learned:
-    """What has been learnt, as a policy of `panto_env`."""
+    """A trained learner as a policy of `panto_env`."""
 
     name = "sac"
 
@@ -83,19 +83,19 @@ class Learned:
 
 
 def judge(policy: Any) -> tuple[float, float]:
-    """Change of sigma (%) to the passive pantograph of the same mean, and of the mean (%) to it as it is."""
+    """Changes (%) of sigma from the passive pantograph at the same mean, and of the mean from passive."""
     changes = []
     for seed in TEST_SEEDS:
         task = TASK | {"seed": seed, "record_droppers": False}
         own, passive = simulate(policy=policy, **task).summary(), simulate(**task).summary()
-        pressed = simulate(mean_force=own.mean, **task).summary()
-        changes.append((100 * (own.std / pressed.std - 1), 100 * (own.mean / passive.mean - 1)))
+        same_mean = simulate(mean_force=own.mean, **task).summary()
+        changes.append((100 * (own.std / same_mean.std - 1), 100 * (own.mean / passive.mean - 1)))
     sigma, mean = np.mean(changes, axis=0)
     return float(sigma), float(mean)
 
 
 def main() -> None:
-    """Train, then print what the agent takes off sigma."""
+    """Train, then print the agent's change of sigma."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=120_000)
     sigma, mean = judge(Learned(train(parser.parse_args().steps)))

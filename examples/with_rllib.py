@@ -1,6 +1,6 @@
 """RLlib's PPO on the native vector environment, which is stepped in the learner's process or in others.
 
-RLlib pins a Gymnasium of its own: `make rllib` makes an environment for it, in which this is run and tested.
+RLlib pins a version of Gymnasium: `make rllib` makes an environment for it, where this is run and tested.
 
     .venv-rllib/bin/python examples/with_rllib.py --iterations 40
 
@@ -41,7 +41,7 @@ LANES, BATCH = 64, 8192
 def train(iterations: int, runners: int = 0) -> list[float]:
     """Mean reward per control step of each iteration in which episodes ended.
 
-    runners: processes beside the learner's that step the lanes; 0: it does so itself.
+    runners: processes that step the lanes, besides the learner's; 0: the learner's process does.
     """
     ray.init(num_cpus=max(1, runners), include_dashboard=False, logging_level="ERROR")
     try:

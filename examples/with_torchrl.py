@@ -1,7 +1,7 @@
 """PPO of TorchRL on the native vector environment.
 
-TorchRL and other libraries have an environment of their own, made by `make libraries`, in which this is run
-and tested.
+TorchRL and other libraries have their own environment, made by `make libraries`, where this is
+run and tested.
 
     .venv-libraries/bin/python examples/with_torchrl.py --steps 200000
 
@@ -44,7 +44,7 @@ LANES, ROLLOUT, EPOCHS, MINIBATCHES = 64, 128, 8, 4
 
 
 def network(entries: int, outputs: int) -> nn.Sequential:
-    """Two hidden layers; at first it gives little, so that an actor begins near the passive pantograph."""
+    """Two hidden layers; the initial output is small, so that an actor starts near the passive pantograph."""
     last = nn.Linear(128, outputs)
     nn.init.orthogonal_(last.weight, 0.01)
     nn.init.zeros_(last.bias)
@@ -52,10 +52,10 @@ def network(entries: int, outputs: int) -> nn.Sequential:
 
 
 def train(steps: int) -> list[float]:
-    """Mean reward per control step in each rollout of about so many steps of all lanes together."""
+    """Train for about this number of steps, summed over lanes: mean reward per control step and rollout."""
     torch.manual_seed(0)
     torch.set_num_threads(1)
-    # "Disabled": TorchRL itself begins anew the lanes whose episodes have ended.
+    # "Disabled": TorchRL resets the lanes whose episodes have ended.
     env = GymWrapper(gymnasium.make_vec("panto_env:Pantograph-v0", LANES, autoreset_mode="Disabled", **TASK))
     env.set_seed(2000)
     entries = env.observation_spec["observation"].shape[-1]

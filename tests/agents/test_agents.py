@@ -540,7 +540,7 @@ class TestStart:
         assert known[:, 0].tolist() == [True, True, True, False, False, False]
 
     def test_a_policy_that_asks_for_another_observation_is_refused(self, finished):
-        with pytest.raises(InputError, match="asks for history = 0, and the environment has 2; set it so"):
+        with pytest.raises(InputError, match="needs history = 0, but the environment has 2; set it to"):
             settings("ppo", residual_of=str(finished.model), environment=LINE | {"history": 2})
         with pytest.raises(InputError, match="did you mean 'fb"):
             settings("ppo", start_from="fb+fff")

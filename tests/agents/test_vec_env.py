@@ -27,7 +27,9 @@ def test_stable_baselines_given_a_vector_environment_itself_names_its_wrapper(ma
 
 def test_what_is_no_vector_environment_is_refused():
     for other in (gymnasium.make(NAME), gymnasium.make_vec("CartPole-v1"), "env"):
-        with pytest.raises(InputError, match=r"takes what gymnasium.make_vec makes of Pantograph-v0, .* not"):
+        with pytest.raises(
+            InputError, match=r"needs an environment of gymnasium.make_vec for Pantograph-v0, .* not"
+        ):
             PantographVecEnv(other)
 
 
