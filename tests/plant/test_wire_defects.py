@@ -231,7 +231,7 @@ def test_wires_of_several_kinds_in_one_plant_are_refused():
 
 
 def test_a_window_that_travels_is_refused_where_the_wire_is_not_even():
-    with pytest.raises(InputError, match=r"computed whole, .* leave out window=8, or give 0"):
+    with pytest.raises(InputError, match=r"computed as a whole, .* leave out window=8, or set it to 0"):
         simulate(line_condition=WORN, window=8)
     assert simulate(line_condition=WORN, distance=200.0).settings["window"] == 10
 
