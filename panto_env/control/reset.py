@@ -1,4 +1,4 @@
-"""How episodes begin: lanes put at their start, run in, observed."""
+"""Start of episodes: lanes are put at the line's start, run in, and observed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
-    """Start episodes in lanes, (n,), and run them in as far as drawn; as of ``Task.reset``."""
+    """Start episodes in lanes, (n,), and make their run-in; see ``Task.reset``."""
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
     droppers, supports = len(plant.model.droppers), len(plant.model.supports)
@@ -58,17 +58,17 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
 
 
 def _begin(task: Task, lanes: Any, end: Array) -> None:
-    """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
+    """Begin episodes in lanes at their present positions; end: plant steps from the line's start."""
     start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
-    if not nominal[low] > 0:  # the reward is told in shares of it
+    if not nominal[low] > 0:  # the reward is relative to it
         raise InputError(
             f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
-            f"against the wire, its lift is {nominal[low]:g} N; give it a static_force or an "
-            "aerodynamic_coefficient, or ask for a mean_force."
+            f"against the wire: its lift is {nominal[low]:g} N. Give it a static_force or an "
+            "aerodynamic_coefficient, or set a mean_force."
         )
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
@@ -81,7 +81,7 @@ def _begin(task: Task, lanes: Any, end: Array) -> None:
 
 
 def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
-    """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
+    """Run lanes, just reset, for ``steps`` control steps each without control, and begin episodes there."""
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
@@ -89,13 +89,13 @@ def _run_in(task: Task, lanes: Any, steps: Any, results: Results) -> None:
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(task.ending(lane))
     _begin(task, lanes, rows[:, TaskRow.END])
-    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards are not of the episode
+    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards of the run-in do not count
     if task.layout.history:
         _forget(task, lanes, rows, results)
 
 
 def _forget(task: Task, lanes: Any, rows: Array, results: Results) -> None:
-    """Let the history of lanes that have run in have been as what they read at the end of that.
+    """Fill the history of lanes after a run-in with their last readings.
 
     rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
     """

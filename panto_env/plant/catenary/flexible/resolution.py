@@ -207,7 +207,8 @@ def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Res
     warnings.warn(
         f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
         f"line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
-        f"{1e3 * required.time_step:.3g} ms): the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
+        f"{1e3 * required.time_step:.3g} ms): "
+        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
         AccuracyWarning,
         stacklevel=2,
     )
