@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..catalog import load_pantograph
 from ..control.arguments import table
-from ..control.entries import CENTRED, Asked
+from ..control.entries import CENTRED, EntryOptions
 from ..control.observation import layout
 from ..control.settings import default
 from ..plant.actuators import actuator_settings
@@ -25,7 +25,7 @@ def described(text: str) -> str:
 def _observation_table(kind: str) -> str:
     """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, Asked(actuator, pantograph)).entries
+    entries = layout(kind, EntryOptions(actuator, pantograph)).entries
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
         for k, each in enumerate(entries)

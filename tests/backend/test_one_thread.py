@@ -190,7 +190,7 @@ def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
 def test_a_plant_runs_neither_beyond_its_line_nor_without_rows():
     plant = Plant(load_catenary("en50318-2002"), Train.of(load_pantograph("en50318-2002")), spans=10)
     plant.start(0, 80.0)
-    with pytest.raises(InputError, match="rows for 99 steps, not for 100; ask for more"):
+    with pytest.raises(InputError, match="rows for 99 steps, not for 100; make more rows"):
         plant.advance_passively(100, plant.samples(100))
     plant.advance_passively(99, plant.samples(100))
     with pytest.raises(InputError, match="beyond the line's end at"):
