@@ -1,8 +1,8 @@
-"""Controls of a benchmark: what a policy is worth without its senses, and a record of its actions without it.
+"""Controls of a benchmark: a policy without its observations, and a record of its actions without the policy.
 
-"blind of pd" is the policy that is shown its first observation for ever; "tape of pd" plays the actions that
-it made on another line, drawn under another seed. Where a control scores as well as the policy itself, the
-benchmark has not asked for feedback.
+"blind of pd" is the policy given its first observation at every step; "tape of pd" plays back the actions
+that it took on another line, drawn under another seed. If a control scores as well as the policy itself, the
+benchmark does not need feedback.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ Array = NDArray[np.float64]
 
 BLIND, TAPE = "blind of ", "tape of "
 OTHER_SEED = 1_000_003
-"""Added to a pass's seed: the tape's line is another one."""
+"""Added to the seed of a pass, so that a tape is recorded on a different line."""
 
 
 def control_of(name: Any) -> str:
-    """Which control a policy's name asks for, BLIND or TAPE; "" for a policy itself."""
+    """Kind of control that a policy's name stands for, BLIND or TAPE; "" for a policy itself."""
     return next((kind for kind in (BLIND, TAPE) if isinstance(name, str) and name.startswith(kind)), "")
 
 
 def policy_of(name: Any) -> Any:
-    """Name of the policy that a control is of; any other policy as it is."""
+    """Name of the policy behind a control; the name itself if it is not a control's."""
     return name[len(control_of(name)) :] if control_of(name) else name
 
 
 class Blind:
-    """A policy that sees nothing but how its episode begins."""
+    """A policy that only ever sees the first observation of its episode."""
 
     def __init__(self, policy: Policy) -> None:
-        """policy: that is shown it."""
+        """policy: the policy that gets the first observation at every step."""
         self._policy = policy
         vars(self).update(wishes(policy))
 
@@ -46,14 +46,14 @@ class Blind:
         self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
-        """Action, (actions,), as for the first observation of the episode."""
+        """Action of the policy, (actions,), for the first observation of the episode."""
         if self._first is None:
             self._first = observation.copy()
         return self._policy.act(self._first.copy())
 
 
 class Tape:
-    """Plays actions, (control steps, actions); nothing once they have ended."""
+    """Plays back recorded actions, (control steps, actions); zeros after the last one."""
 
     def __init__(self, actions: Array) -> None:
         """actions: in the order of the control steps, each in -1..1."""

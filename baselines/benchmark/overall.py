@@ -1,4 +1,4 @@
-"""A whole track in one row per policy: over all lines, speeds and seeds of a benchmark."""
+"""Each policy's overall result on a track: over all lines, speeds and seeds of a benchmark."""
 
 from __future__ import annotations
 
@@ -21,25 +21,28 @@ from .statistics import (
 
 @dataclass(frozen=True)
 class Standing:
-    """One policy over a whole track."""
+    """Overall result of one policy on a track."""
 
     policy: str
-    change: float  # of sigma against the pressed passive pantograph, interquartile mean of all passes (%)
-    interval: tuple[float, float] | None  # 95 %, seeds drawn anew within each cell
-    worst: float  # largest change of any cell (%)
-    worst_at: str  # which cell that is
-    improved: float  # share of passes with a smaller sigma than the pressed passive pantograph's
+    change: float  # of sigma from the passive one at the same mean force, interquartile mean of passes (%)
+    interval: tuple[float, float] | None  # 95 % interval of ``change``, seeds resampled within each cell
+    worst: float  # maximum change of any cell (%)
+    worst_at: str  # line and speed of that cell
+    improved: float  # share of passes with a smaller sigma than the passive one at the same mean force
     effort: float  # rms actuator force, mean over cells (N)
     power: float  # mechanical power, mean over cells (W)
     saturation: float  # share of control steps at the actuator's limit, mean over cells
-    oracle_share: float | None  # of what stored oracles gain, mean over cells; None: one has none
-    better_than: Mapping[str, float]  # by other policy: share of passes with a smaller change than it
-    disqualified: str  # the reason, or "" if it qualifies in every cell
+    oracle_share: float | None  # share of the stored oracles' gain, mean over cells; None if one is missing
+    better_than: Mapping[str, float]  # by other policy: share of passes with a smaller change than that one
+    disqualified: str  # the reason, or "" if the policy qualifies in every cell
     rank: int | None  # by ``change``, from 1
 
 
 def standings(rows: Sequence[Row], cells: Sequence[Cell]) -> tuple[Standing, ...]:
-    """Policies that run in every cell, in the order of the rows; ranked where they qualify in every cell."""
+    """Overall results of the policies that run in every cell, in the order of the rows.
+
+    Policies that qualify in every cell are ranked.
+    """
     changes: dict[str, dict[LineAtSpeed, Array]] = {}
     for cell in cells:
         own = [row for row in rows if _place(row) == _place(cell) and row.policy == cell.policy]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def plot(outcome: Benchmark) -> Figure:
     """Contact force along two spans of every line; below it σ over speed, and its change with intervals.
 
-    The force, low-passed without delay, is that at a line's highest speed with the first seed, over the
+    The force, low-passed without delay, is shown at a line's highest speed under the first seed, over the
     last two evaluated spans; this runs one more pass per policy and line.
     ``panto_env.analysis.plots.save`` writes the figure.
     """
@@ -81,7 +81,7 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
 
 
 def _sigmas(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
-    """σ over speed, and the largest that EN 50367 allows at the passive pantograph's mean force."""
+    """σ over speed, and the maximum that EN 50367 allows at the passive pantograph's mean force."""
     for policy, colour in colours.items():
         by_speed = _by_speed(cells, policy)
         speeds = [cell.speed_kmh for cell in by_speed]
@@ -121,7 +121,7 @@ def _by_speed(cells: list[Cell], policy: str) -> list[Cell]:
 
 
 def _legend(axes: Axes, cells: list[Cell]) -> tuple[list[Artist], list[str]]:
-    """Entries for all panels of a line."""
+    """Handles and labels of the legend that all panels of a line share."""
     from matplotlib.lines import Line2D
 
     handles, labels = axes.get_legend_handles_labels()

@@ -1,4 +1,4 @@
-"""Tables of a benchmark for people."""
+"""Tables of a benchmark's outcome for the terminal."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from .settings import REFERENCE
 from .statistics import Cell
 
 WIDTH = 150
-"""Columns that a table needs; in a narrower terminal the policies' names are folded."""
-FIGURES = {  # and their decimals
+"""Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
+FIGURES = {  # with the decimals shown
     "std": 2,
     "mean": 1,
     "contact_loss": 2,
@@ -37,15 +37,15 @@ OWN_LABELS = {
     "saturation": Label("share of commands at the limit", "at limit", "-"),
 }
 LEGEND = (
-    "Interquartile means over the seeds. Δσ and ΔCF, pass by pass, against a passive pantograph pressed to "
-    "the same mean force, with a 95 % bootstrap interval; ΔF_m against the passive one as it is. σ, max and "
-    "min of the force low-passed at 20 Hz. Ranked by Δσ, but only policies that move the mean force by 1.5 % "
-    "at most."
+    "Interquartile means over the seeds. Δσ and ΔCF are relative to a passive pantograph at the same mean "
+    "force, pass by pass, with a 95 % bootstrap interval; ΔF_m is relative to the unchanged passive one. σ, "
+    "max and min are those of the force low-passed at 20 Hz. Policies are ranked by Δσ; one that moves the "
+    "mean force by more than 1.5 % is not ranked."
 )
 
 ORACLE = (
-    "oracle: the smallest σ that was found for the same actuator, knowing the line, over the same spans "
-    "(`panto oracle --stored`), under seeds of its own. A local optimum: a share above 100 % is possible."
+    "oracle: the smallest σ found for the same actuator when the line is known, over the same spans "
+    "(`panto oracle --stored`), under other seeds. It is a local optimum: a share above 100 % is possible."
 )
 
 
@@ -61,7 +61,7 @@ def tables(outcome: Benchmark) -> RenderableType:
 
 
 def _overall(outcome: Benchmark) -> Table:
-    """One row per policy, over all lines and speeds."""
+    """Table of the overall results, one row per policy."""
     title = f"{outcome.settings.title}: all lines, speeds and seeds"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("policy", overflow="fold")
@@ -92,7 +92,7 @@ def _share(value: float) -> str:
 
 
 def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
-    """The table, and a sentence for each policy that is disqualified."""
+    """Table of the cells of one line, and a sentence for each policy that is disqualified."""
     title += f", {cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
     spreads = [cell.spread for cell in cells if cell.policy == REFERENCE and not isnan(cell.spread)]
     if spreads:
@@ -133,7 +133,7 @@ def _label(name: str) -> Label:
 
 
 def _change(cell: Cell) -> str:
-    """Change of sigma against the pressed passive pantograph, with its interval where there is one."""
+    """Change of sigma from the passive pantograph at the same mean, with its interval if there is one."""
     if cell.interval is None:
         return number(cell.change, 1)
     low, high = cell.interval

@@ -29,7 +29,7 @@ from .statistics import Cell, LineAtSpeed, compare
 from .trace import Trace
 
 SUFFIXES = (".json", *TABLES)
-"""Of the file that an outcome is saved to."""
+"""Suffixes of the files that an outcome can be saved to."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Benchmark:
     rows: tuple[Row, ...]  # one per pass, in the order of lines, speeds, policies and seeds
     cells: tuple[Cell, ...]  # one per policy, line and speed
     standings: tuple[Standing, ...]  # one per policy that runs on every line
-    traces: tuple[Trace, ...]  # of the first seed's passes, but for those that ended early
+    traces: tuple[Trace, ...]  # of the passes under the first seed that did not end early
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, ready for JSON: nan becomes None."""
+        """The whole outcome as plain data for JSON: nan becomes None."""
         table: dict[str, Any] = finite(
             {
                 "version": __version__,
@@ -77,8 +77,8 @@ def run(
 
     workers: number of processes, by default one per core; the outcome does not depend on it. With more
     than one, a script must call this under ``if __name__ == "__main__":``. progress: called with the
-    number of passes done and the number of all. ray: address of a Ray cluster that runs the passes instead.
-    Raises InputError for settings that are not valid and, naming it, for a policy that fails.
+    number of passes done and the total number. ray: address of a Ray cluster that runs the passes instead.
+    Raises InputError for invalid settings, and for a policy that fails, which it names.
     """
     if ray is None and workers is None:
         workers = cores()
@@ -107,7 +107,7 @@ def run(
 
 
 def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:
-    """Change of sigma (%) of the stored oracles of exactly these cells, as far as there are any."""
+    """Change of sigma (%) by line and speed, for the cells that have a stored oracle."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
@@ -127,7 +127,7 @@ def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     if not 1 <= first <= last:
         raise InputError(
             f"There are no spans {first} to {last} to evaluate {where}; "
-            "give a longer distance, or spans of your own."
+            "give a longer distance or other spans."
         )
     if task.plant.alignment.support(last) > task.length.distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")

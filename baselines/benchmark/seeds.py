@@ -1,4 +1,4 @@
-"""Seeds by purpose: nothing is judged on a line that it was trained, tuned or selected on."""
+"""Seeds by purpose: no policy is judged on a line that it was trained, tuned or selected on."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from panto_env.base.errors import InputError
 TEST = range(1000)
 SELECTION = range(1000, 2000)
 TRAINING = range(2000, 1_000_000)
-# Above those that tapes of the benchmark are made under (``controls.OTHER_SEED``).
+# Above the seeds under which the benchmark records its tapes (``controls.OTHER_SEED``).
 DATA = range(2_000_000, 3_000_000)
 Purpose = Literal["test", "selection", "training", "data"]
 SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING, "data": DATA}
-"""Disjoint: a seed draws a line, its pantograph and all noise."""
+"""Ranges of seeds by purpose, disjoint: a seed draws a line, its pantograph and all noise."""
 
 
 def check_seeds(seeds: Iterable[int], purpose: Purpose) -> None:
-    """Raise InputError for a seed that is kept for another purpose."""
+    """Raise InputError for a seed that is reserved for another purpose."""
     own = SEEDS[purpose]
     wrong = next((seed for seed in seeds if seed not in own), None)
     if wrong is not None:
         raise InputError(
-            f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {wrong}: what a policy learns from, is "
-            "chosen by and is judged on must differ."
+            f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {wrong}: a policy must be trained, "
+            "selected and judged on different seeds."
         )

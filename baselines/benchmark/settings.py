@@ -1,4 +1,4 @@
-"""What a benchmark runs, from keywords or a TOML file."""
+"""Settings of a benchmark, from keywords or a TOML file."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ REFERENCE = "passive"
 
 
 def _clause(read: Callable[[Any], S]) -> Callable[[Any], S]:
-    """A reader of a field whose errors are clauses: pydantic adds the key and the value."""
+    """``read`` for a field: its errors become clauses, to which pydantic adds the key and the value."""
 
     def read_field(value: Any) -> S:
         try:
@@ -83,7 +83,7 @@ class BenchmarkSettings(Settings):
     title: str = Field("benchmark", description="what tables and pages call it")
     policies: tuple[str, ...] = Field(
         ("passive", "p", "pd", "fb+ff"),
-        description="names, with parameters (p:gain=0.5) or without, or model files, or controls of such: "
+        description="names, with parameters (p:gain=0.5) or without, or model files, or controls of these: "
         "'blind of pd' sees nothing, 'tape of pd' plays its actions from another line; the passive "
         "pantograph always runs",
     )

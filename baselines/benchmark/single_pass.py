@@ -17,14 +17,14 @@ from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, find_policy, wishes
 
 from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
-from .pressed import NONE, Pressed, power, pressed_passive
+from .same_mean import NONE, PassiveFigures, passive_at_mean_of, power
 from .settings import REFERENCE, BenchmarkSettings, Line
 from .trace import Trace, trace
 
 Array = NDArray[np.float64]
 
 FULL = 0.999
-"""Share of the largest force from which on a command counts as the largest."""
+"""Share of the actuator's maximum force above which a command counts as saturated."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Row:
     terminated: bool
     figures: Figures
     action_rate: float  # rms change of the commanded force between control steps, per second (N/s)
-    saturation: float  # share of control steps that command the actuator's largest force
+    saturation: float  # share of control steps that command the actuator's maximum force
     power: float  # mean magnitude of the actuators' mechanical power (W)
-    pressed_std: float  # sigma of the passive pantograph pressed to the same mean (N)
-    pressed_cost_function: float  # its CF (N m)
+    pressed_std: float  # sigma of the passive pantograph at the same mean force (N)
+    pressed_cost_function: float  # CF of that passive pantograph (N m)
 
     def as_dict(self) -> dict[str, Any]:
-        """Names and values in the order above, with the figures in one table with the rest."""
+        """Names and values in the order above; the figures stand in the same table as the rest."""
         names = [f.name for f in fields(self)]
         before, after = names[: names.index("figures")], names[names.index("figures") + 1 :]
         first, last = ({name: getattr(self, name) for name in part} for part in (before, after))
@@ -54,10 +54,10 @@ class Row:
 
 
 class Pass(NamedTuple):
-    """What is kept of one pass."""
+    """Figures of one pass, and what a page draws of it."""
 
     row: Row
-    trace: Trace | None  # None where none was asked for, or the pass ended early
+    trace: Trace | None  # None if not requested, or if the pass ended early
 
 
 def run_pass(
@@ -72,27 +72,27 @@ def run_pass(
 ) -> Pass:
     """Run one pass; its figures cover ``spans``, first and last, counted from 1.
 
-    traced: whether what a page draws of it is kept too.
+    traced: whether to keep what a page draws of the pass.
 
     Raises InputError, naming the policy, if the policy fails.
     """
     run, force = drive(settings, line, policy, speed_kmh, seed)
-    figures, pressed = Figures.none(), NONE
+    figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        # A command counts where the first time step under it does, as the figures of the run count steps.
+        # A command counts if its first time step lies within the spans, as for the figures of the run.
         steps = round(settings.control_interval / run.time_step)
-        asked = force[run.inside(spans)[::steps]]
-        changes = np.diff(asked, axis=0) / settings.control_interval
+        commands = force[run.inside(spans)[::steps]]
+        changes = np.diff(commands, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
-        saturation = float(np.mean(np.abs(asked) >= FULL * settings.actuator.force_limit))
+        saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
         watts = power(run, spans)
         if policy != REFERENCE:
             arguments = _arguments(settings, line, speed_kmh, seed)
-            pressed = pressed_passive(run, spans, arguments)
+            at_same_mean = passive_at_mean_of(run, spans, arguments)
         else:
-            pressed = Pressed(figures.std, figures.cost_function)
+            at_same_mean = PassiveFigures(figures.std, figures.cost_function)
     row = Row(
         policy=policy,
         catenary=line.catenary,
@@ -105,8 +105,8 @@ def run_pass(
         action_rate=action_rate,
         saturation=saturation,
         power=watts,
-        pressed_std=pressed.std,
-        pressed_cost_function=pressed.cost_function,
+        pressed_std=at_same_mean.std,
+        pressed_cost_function=at_same_mean.cost_function,
     )
     kept = traced and not run.terminated
     return Pass(row, trace(run, spans, policy, line) if kept else None)
@@ -115,7 +115,7 @@ def run_pass(
 def drive(
     settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
 ) -> tuple[Trajectory, Array]:
-    """The record of a pass, and the commanded forces (N), (control steps, actions)."""
+    """Run one pass: its record, and the commanded forces (N), (control steps, actions)."""
     run, recorder = _record(settings, line, policy, speed_kmh, seed)
     return run, recorder.forces()
 
@@ -130,7 +130,7 @@ def _record(
 
 
 def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
-    """Settings of the runs along a line, by name, but for the speed."""
+    """Settings of the runs along a line, by name, except the speed."""
     return {
         "catenary": line.catenary,
         "pantograph": line.pantograph,
@@ -145,12 +145,12 @@ def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
 
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
-    """Arguments of ``simulate`` for a pass, but for its policy."""
+    """Arguments of ``simulate`` for a pass, except its policy."""
     return along(settings, line) | {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
 
 
 def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:
-    """The policy of a pass, which may be a control of another one."""
+    """The policy that runs in a pass: itself, or a control of it."""
     control = control_of(policy)
     if control == TAPE:
         _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
@@ -160,7 +160,7 @@ def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: flo
 
 
 class _CommandRecorder:
-    """A policy around another one, whose name it has: it records what that one returns."""
+    """A wrapper that records the actions of a policy, under that policy's name."""
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self.name = policy, name
@@ -177,7 +177,7 @@ class _CommandRecorder:
         return action
 
     def actions(self) -> Array:
-        """What was asked for, (control steps, actions), each in -1..1."""
+        """Recorded actions, (control steps, actions), clipped to -1..1."""
         return np.clip(np.array(self._actions), -1, 1)
 
     def forces(self) -> Array:
@@ -187,7 +187,7 @@ class _CommandRecorder:
 
 @contextmanager
 def _torch_on_one_thread() -> Iterator[None]:
-    """The cores are needed for other passes, and results must not depend on how many of them are free."""
+    """Other passes need the cores, and results must not depend on how many of them are free."""
     torch = sys.modules.get("torch")  # None unless a policy has imported it
     threads = torch.get_num_threads() if torch else 0
     try:

@@ -1,4 +1,4 @@
-"""From passes to figures that can be compared: interquartile means, paired intervals, ranks."""
+"""Statistics over passes: interquartile means, paired bootstrap intervals, ranks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .single_pass import Row
 Array = NDArray[np.float64]
 
 IDENTITY = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
-"""What a row is, not how good."""
+"""Columns that identify a row; all others are figures."""
 
 TRIM = 0.25
 """Share of the values that the interquartile mean leaves out at each end."""
@@ -38,7 +38,7 @@ class LineAtSpeed(NamedTuple):
 class Cell:
     """One policy on one line at one speed, over all seeds; changes are relative, pass by pass.
 
-    The pressed passive pantograph has the mean force of the policy's own pass, on the same line.
+    "At the same mean": a passive pantograph on the same line with the mean force of the policy's own pass.
     """
 
     policy: str
@@ -48,21 +48,19 @@ class Cell:
     seeds: int
     nominal_force: float  # N
     figures: dict[str, float]  # interquartile means; nan if a pass ended early
-    change: float  # of sigma against the pressed passive pantograph (%)
+    change: float  # of sigma from the passive pantograph at the same mean (%)
     interval: tuple[float, float] | None  # 95 % interval of ``change``; None: see bootstrap_interval
-    cost_change: float  # of CF against the pressed passive pantograph (%)
-    mean_change: float  # of the mean force against the passive pantograph (%)
-    improved: float  # share of passes with a smaller sigma than the pressed passive pantograph's
-    spread: float  # standard deviation of sigma over the seeds, over its mean (%)
-    oracle: (
-        float | None
-    )  # change of sigma that a stored oracle reaches in this cell (%); None: none is stored
+    cost_change: float  # of CF from the passive pantograph at the same mean (%)
+    mean_change: float  # of the mean force from the unchanged passive pantograph (%)
+    improved: float  # share of passes with a smaller sigma than the passive pantograph at the same mean
+    spread: float  # standard deviation of sigma over the seeds, relative to its mean (%)
+    oracle: float | None  # change of sigma that the stored oracle of this cell reaches (%); None without one
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
 
     @property
     def oracle_share(self) -> float | None:
-        """Share of what a stored oracle gains; None where none is stored."""
+        """Share of the stored oracle's gain; None if no oracle is stored."""
         return None if self.oracle is None else self.change / self.oracle + 0.0  # no minus zero
 
 
@@ -74,11 +72,10 @@ def interquartile_mean(values: Array) -> float:
 
 
 def bootstrap_interval(*groups: Array) -> tuple[float, float] | None:
-    """95 % percentile-bootstrap interval of the interquartile mean of all values; each group, (n,), is drawn
-    anew by itself.
+    """95 % percentile-bootstrap interval of the interquartile mean of all values.
 
-    None where the values say nothing about the spread: one of them is nan, or every group has fewer than two
-    or all equal ones.
+    Each group, (n,), is resampled separately. None if the values don't show a spread: one of them is nan, or
+    every group has fewer than two values or only equal ones.
     """
     from scipy.stats import trim_mean
 
@@ -94,7 +91,7 @@ def bootstrap_interval(*groups: Array) -> tuple[float, float] | None:
 
 
 def mean_range(passive: float) -> tuple[float, float]:
-    """Range (N) of mean forces that qualify, from the passive mean."""
+    """Minimum and maximum mean force (N) that qualify, for a passive mean (N)."""
     return passive * (1 - MOVED), passive * (1 + MOVED)
 
 
@@ -103,7 +100,7 @@ def compare(
 ) -> tuple[Cell, ...]:
     """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference.
 
-    oracles: change of sigma (%) of stored oracles, where there are any.
+    oracles: change of sigma (%) of the stored oracles, by line and speed.
     """
     groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
@@ -127,7 +124,7 @@ def _ranked_cells(rows_of_policies: dict[str, list[Row]], oracle: float | None) 
 
 
 def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cell:
-    """Cell of one policy on one line at one speed; its rank is still missing."""
+    """Cell of one policy on one line at one speed, without its rank."""
     first = rows[0]
     tables = [row.as_dict() for row in rows]
     names = [name for name in tables[0] if name not in IDENTITY]
@@ -162,7 +159,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cel
 
 
 def relative_changes(rows: Sequence[Row]) -> Array:
-    """Of sigma against the passive pantograph pressed to the same mean, (rows,); nan where there is none."""
+    """Relative changes of sigma from the passive pantograph at the same mean, (rows,); nan if it has none."""
     return _relative([row.figures.std for row in rows], [row.pressed_std for row in rows])
 
 
@@ -173,7 +170,7 @@ def _relative(values: Sequence[float], to: Sequence[float]) -> Array:
 
 
 def _disqualification(rows: list[Row], passive_rows: list[Row], mean_change: float) -> str:
-    """Why a policy is not ranked; empty if it is."""
+    """Reason why a policy is not ranked; empty if it is."""
     ended_early = sum(row.terminated for row in rows)
     if ended_early:
         return f"{ended_early} of {len(rows)} runs ended early, outside the plant's range"
@@ -182,5 +179,5 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], mean_change: flo
     if abs(mean_change) > MOVED:
         return f"it moves the mean force by {100 * mean_change:+.1f} %, more than {100 * MOVED:g} %"
     if any(np.isnan(row.pressed_std) for row in rows):
-        return "no passive pantograph can be pressed to its mean force"
+        return "no passive pantograph can reach its mean force"
     return ""

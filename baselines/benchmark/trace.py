@@ -1,4 +1,4 @@
-"""What a page draws of one pass: the contact force along two spans, and its spectrum."""
+"""Trace of one pass for the page: the contact force along two spans, and its spectrum."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from panto_env.plant.alignment import Spans
 from .settings import Line
 
 STRIDE = 0.5
-"""Distance (m) between points of a trace, unless the train is so slow that they would miss a peak."""
+"""Distance (m) between points of a trace, unless the train is so slow that a peak would be missed."""
 PER_PERIOD = 4
-"""Points of a trace per period of the fastest force that the low-pass lets through."""
+"""Points of a trace per period of the low-pass's cut-off frequency."""
 
 
 @dataclass(frozen=True)
@@ -29,16 +29,16 @@ class Trace:
     pantograph: str
     speed_kmh: float
     seed: int
-    position: tuple[float, ...]  # (n,): evenly along the last two evaluated spans (m)
-    force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz and not delayed (N)
-    frequency: tuple[float, ...]  # (m,): to 20 Hz (Hz)
-    amplitude: tuple[float, ...]  # (m,): of the raw contact force over all evaluated spans (N)
+    position: tuple[float, ...]  # (n,): equally spaced along the last two evaluated spans (m)
+    force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
+    frequency: tuple[float, ...]  # (m,): up to 20 Hz (Hz)
+    amplitude: tuple[float, ...]  # (m,): of the unfiltered contact force over all evaluated spans (N)
 
 
 def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
-    """What is drawn of a run that covers ``spans``, first and last, counted from 1.
+    """Trace of a run that is evaluated over ``spans``, first and last, counted from 1.
 
-    policy, line: as the benchmark calls them; a run has the names of the entries themselves.
+    policy, line: with the benchmark's names for them; a run holds the names of the catalogue entries.
     """
     first, last = spans
     begin, end = run.alignment.limits((max(first, last - 1), last))

@@ -1,1 +1,1 @@
-"""Data to learn from: recorded episodes as Minari data sets, and a table of simulated designs."""
+"""Data for learning: recorded episodes as Minari data sets, and a table of simulated designs."""

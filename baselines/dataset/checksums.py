@@ -1,4 +1,4 @@
-"""SHA-256 of each file of a data set, in a list beside them that `sha256sum --check` reads, too."""
+"""SHA-256 of each file of a data set, in a list that `sha256sum --check` can read."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ LIST = "SHA256SUMS"
 
 
 def write_checksums(folder: Path) -> None:
-    """Write the list of all files of a folder but hidden ones."""
+    """Write the checksums of all files of a folder except hidden ones."""
     lines = [f"{sha256_of(folder / name)}  {name}\n" for name in _files(folder)]
     with write_whole(folder / LIST) as temporary:
         temporary.write_text("".join(lines), encoding="utf-8", newline="")
 
 
 def verify(path: Path) -> list[tuple[Path, int]]:
-    """Folders with a list in or below ``path``, each with the number of its files, all of them as listed.
+    """Verify all data sets in or below ``path``: their folders, each with its number of files.
 
-    Raises InputError, naming the file, where one is missing, differs or is not listed, where there is no
-    list, and for a path that nothing can have.
+    Raises InputError, naming the file, if one is missing, differs or is not listed, if there is no list, and
+    for an impossible path.
     """
     check_path(path)
     lists = sorted(path.rglob(LIST))
@@ -49,17 +49,17 @@ def _verify(folder: Path) -> int:
             raise InputError(f"{folder / name} is missing; make or download the data set anew.")
         if sha256_of(folder / name) != checksum:
             raise InputError(
-                f"{folder / name} is not what {LIST} says: it was damaged or changed; make or download the "
+                f"{folder / name} does not match {LIST}: it was damaged or changed; make or download the "
                 "data set anew."
             )
     extra = next((name for name in found if name not in listed), None)
     if extra is not None:
-        raise InputError(f"{folder / extra} is not in {LIST}; move it elsewhere, it is not of the data set.")
+        raise InputError(f"{folder / extra} is not in {LIST}; move it elsewhere, it is not part of the data.")
     return len(listed)
 
 
 def _files(folder: Path) -> list[str]:
-    """Relative paths, in order."""
+    """Relative paths of a folder's files, sorted."""
     paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     return sorted(
         path.as_posix()

@@ -22,22 +22,22 @@ Workers = Annotated[int | None, typer.Option(help="Processes; one per core by de
 def episodes(
     config: Annotated[Path, typer.Argument(help="TOML file, or a name such as dataset-known-line.")],
     output: Annotated[
-        Path, typer.Option(help="Folder to make them in, which MINARI_DATASETS_PATH may name.")
+        Path, typer.Option(help="Folder for the data sets; MINARI_DATASETS_PATH may point to it.")
     ] = Path("data"),
     only: Annotated[
         list[str] | None, typer.Option(help="One of the file's sets, instead of all; repeatable.")
     ] = None,
     episodes: Annotated[
         int | None,
-        typer.Option(help="For each policy, noise and place of every set, instead of the file's.", min=1),
+        typer.Option(help="Episodes per policy, noise and place of every set, instead of the file's.", min=1),
     ] = None,
     workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:
-    """Record episodes of policies as data sets of Minari.
+    """Record episodes of policies as Minari data sets.
 
-    What is there already is kept: the same command goes on after whatever ended it.
+    Finished work is kept: the same command continues after an interruption.
     """
     from .make_episodes import make_episodes
     from .settings import chosen, load_episodes
@@ -66,17 +66,18 @@ def designs(
     config: Annotated[Path, typer.Argument(help="TOML file, or a name such as dataset-designs.")] = Path(
         "dataset-designs"
     ),
-    output: Annotated[Path, typer.Option(help="Folder to make the table in.")] = Path("data"),
+    output: Annotated[Path, typer.Option(help="Folder for the table.")] = Path("data"),
     count: Annotated[
-        int | None, typer.Option(help="Designs, instead of the file's; powers of two fill evenly.", min=1)
+        int | None,
+        typer.Option(help="Number of designs, instead of the file's; powers of two fill evenly.", min=1),
     ] = None,
     workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:
-    """Simulate many designs of line and pantograph, as a table.
+    """Simulate many designs of line and pantograph, and write a table of their figures.
 
-    What is there already is kept: the same command goes on after whatever ended it.
+    Finished work is kept: the same command continues after an interruption.
     """
     from .designs_settings import load_designs
     from .make_designs import make_designs
@@ -101,7 +102,7 @@ def verify(
     path: Annotated[Path, typer.Argument(help="Folder of a data set, or of several.")],
     json: Json = False,
 ) -> None:
-    """Check that the files of data sets are those that were made, by their SHA-256."""
+    """Check by SHA-256 that the files of data sets are undamaged."""
     from .checksums import verify as verify_folder
 
     found = verify_folder(path)

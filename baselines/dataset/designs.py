@@ -1,4 +1,4 @@
-"""Designs: drawn from ranges, each simulated once, and each with a row, whatever came of it."""
+"""Designs: drawn from ranges and simulated once; each gets a row, also if it was refused or ended early."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ DROPPERS = "catenary.droppers.positions"
 FIGURES = tuple(name for name in Figures.__dataclass_fields__ if not name.startswith("effort"))
 """Figures of a run; a passive pantograph has no effort."""
 OUTCOME = ("nominal_force", "wave_speed", "time_step", "spacing", *FIGURES)
-"""Columns that are null where a design was refused, figures also where its run ended early."""
+"""Columns that are null if a design was refused; figures are null also if its run ended early."""
 
 
 def draw(settings: DesignsSettings, first: int, last: int) -> Array:
-    """Values of the designs first to last - 1, (designs, ranges): a scrambled Sobol sequence."""
+    """Values of the designs first to last - 1, (designs, ranges), from a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
-    with warnings.catch_warnings():  # of a count that is no power of two: that is told on the card
+    with warnings.catch_warnings():  # SciPy's about a count that is no power of two; the card says it
         warnings.simplefilter("ignore", UserWarning)
         sequence = qmc.Sobol(len(settings.ranges), seed=settings.seed)
         if first:  # SciPy takes no 0
@@ -43,7 +43,7 @@ def draw(settings: DesignsSettings, first: int, last: int) -> Array:
 
 
 def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Path) -> None:
-    """Rows of the designs first to last - 1, into a JSON file, whole or not at all."""
+    """Simulate the designs first to last - 1 and write their rows to a JSON file, whole or not at all."""
     values = draw(settings, first, last).tolist()
     rows = [
         design(settings, first + k, dict(zip(settings.ranges, each, strict=True)))
@@ -63,28 +63,28 @@ def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> 
             run = simulate(line, pantograph, values[SPEED], record_droppers=False)
         except InputError as error:
             return row | {"refused": str(error)}
-    told = dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, AccuracyWarning))
+    found = dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, AccuracyWarning))
     figures = {} if run.terminated else run.summary().as_dict()
-    found = {
+    outcome = {
         "ending": run.ending,
-        "accuracy_warning": " ".join(told),
+        "accuracy_warning": " ".join(found),
         "nominal_force": run.nominal_force,
         "wave_speed": run.line.wave_speed,
         "time_step": run.time_step,
         "spacing": run.settings["spacing"],
     }
-    return row | found | {name: _number(figures[name]) for name in FIGURES if name in figures}
+    return row | outcome | {name: _number(figures[name]) for name in FIGURES if name in figures}
 
 
 def _number(value: float) -> float | None:
-    """A figure; None where the run has not that one, as uplift on a line without supports."""
+    """A figure; None if the run does not have it, such as uplift on a line without supports."""
     return None if np.isnan(value) else value
 
 
 def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:
-    """The line and the pantograph of a design. Raises InputError for values that their schemas refuse.
+    """Line and pantograph of a design. Raises InputError for values that their schemas refuse.
 
-    Where spans have another length, droppers keep their places as shares of the span.
+    If the span length differs, droppers keep their positions relative to the span.
     """
     entries = settings.entries()
     line, pantograph = (

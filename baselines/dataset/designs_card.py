@@ -1,4 +1,4 @@
-"""What stands beside a table of designs: its columns with units and ranges, and what it can be used for."""
+"""Card of a table of designs: its columns with units and ranges, and what it can be used for."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .designs import FIGURES
 from .designs_settings import DesignsSettings
 
 SI = {"mm": "m"}
-"""Units of figures in the table, where people read others."""
+"""Units in the table by the unit shown elsewhere: the table uses SI units."""
 
 
 class Column(NamedTuple):
     """A column of the table."""
 
     name: str
-    kind: str  # type of Arrow
-    description: str  # with the unit, and the range of what is drawn
+    kind: str  # Arrow type
+    description: str  # with the unit, and the range of a drawn parameter
 
 
 def columns(settings: DesignsSettings) -> list[Column]:
@@ -40,9 +40,9 @@ def columns(settings: DesignsSettings) -> list[Column]:
         Column("ending", "string", "where and why the run ended early; empty if it did not"),
         Column("accuracy_warning", "string", "why figures are less accurate; empty if they are not"),
         Column("nominal_force", "float64", "static and aerodynamic uplift force (N)"),
-        Column("wave_speed", "float64", "of the contact wire (m/s)"),
-        Column("time_step", "float64", "of the computation (s)"),
-        Column("spacing", "float64", "of the computation's grid (m)"),
+        Column("wave_speed", "float64", "wave speed of the contact wire (m/s)"),
+        Column("time_step", "float64", "time step of the computation (s)"),
+        Column("spacing", "float64", "spacing of the computation's grid (m)"),
         *(Column(name, "float64", _figure(name)) for name in FIGURES),
     ]
 
@@ -52,8 +52,8 @@ def _figure(name: str) -> str:
     return f"{label.name} ({SI.get(label.unit, label.unit)})"
 
 
-def card(settings: DesignsSettings, told: Sequence[Column], table: Any, made_of: Mapping[str, Any]) -> str:
-    """The card as Markdown. table: of Arrow."""
+def card(settings: DesignsSettings, shown: Sequence[Column], table: Any, made_of: Mapping[str, Any]) -> str:
+    """Text of the card, as Markdown. shown: columns to describe. table: Arrow table."""
     kinds = {name: _reasons(table[name].to_pylist()) for name in ("refused", "ending", "accuracy_warning")}
     lines = [
         f"# {settings.title}",
@@ -63,16 +63,16 @@ def card(settings: DesignsSettings, told: Sequence[Column], table: Any, made_of:
         "without irregularity, sensors or control. Figures are those of EN 50317 over the spans after the "
         "start has died out.",
         "",
-        f"Drawn by a scrambled Sobol sequence (seed {settings.seed}), evenly over the ranges. Where spans "
-        "are longer or shorter, droppers keep their places as shares of the span. What no range names is as "
-        "in the catalogue.",
+        f"Drawn by a scrambled Sobol sequence (seed {settings.seed}), evenly over the ranges. If a span "
+        "is longer or shorter, droppers keep their positions relative to it. Parameters without a range are "
+        "as in the catalogue.",
         "",
         f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
         f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
         "",
-        "| column | what | least | median | largest |",
+        "| column | description | minimum | median | maximum |",
         "|---|---|---:|---:|---:|",
-        *(f"| `{each.name}` | {each.description} | {_spread(table, each)} |" for each in told),
+        *(f"| `{each.name}` | {each.description} | {_spread(table, each)} |" for each in shown),
         "",
         "No design is left out: one that was refused, or whose run ended early, has a row that says so.",
         "",
@@ -99,7 +99,7 @@ def _spread(table: Any, column: Column) -> str:
 
 
 def _reasons(texts: Sequence[str]) -> list[tuple[str, int]]:
-    """Reasons with their numbers, those that differ in numbers alone taken together."""
+    """Reasons with their counts; texts that differ only in numbers count as one reason."""
     same: dict[str, list[str]] = {}
     for text in texts:
         if text:

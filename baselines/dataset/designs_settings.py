@@ -1,4 +1,4 @@
-"""What a table of designs holds: a line, a pantograph, and the ranges of their parameters."""
+"""Settings of a table of designs: a line, a pantograph, and the ranges of their parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from panto_env.control.settings import default, description
 
 SPAN_LENGTH = "catenary.span_length"
 MOST = 2**20
-"""Designs that a table may have: some hours on many cores."""
+"""Maximum number of designs of a table: some hours on many cores."""
 
 
 class DesignsSettings(Settings):
@@ -29,14 +29,14 @@ class DesignsSettings(Settings):
     catenary: str = Field(default("catenary"), description=description("catenary"))
     pantograph: str = Field(default("pantograph"), description=description("pantograph"))
     count: Annotated[int, Field(gt=0, le=MOST)] = Field(
-        2**14, description="designs; powers of two fill the ranges evenly"
+        2**14, description="number of designs; powers of two fill the ranges evenly"
     )
     seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="of the scrambled Sobol sequence: a longer table begins as a shorter one"
+        0, description="seed of the scrambled Sobol sequence; a longer table begins like a shorter one"
     )
     ranges: dict[str, tuple[float, float]] = Field(
         min_length=1,
-        description="lowest and highest value by dotted name, as `panto sweep` takes it, or speed_kmh",
+        description="minimum and maximum by dotted name, as in `panto sweep`, or speed_kmh",
     )
 
     @model_validator(mode="after")
@@ -60,11 +60,11 @@ class DesignsSettings(Settings):
         return self
 
     def entries(self) -> Mapping[str, Any]:
-        """The line and the pantograph that designs are around, by family."""
+        """Line and pantograph of the catalogue that the designs vary, by family."""
         return {"catenary": load_catenary(self.catenary), "pantograph": load_pantograph(self.pantograph)}
 
     def labels(self) -> dict[str, str]:
-        """What each parameter is, with its unit."""
+        """Description of each parameter, with its unit."""
         entries = self.entries()
         return {
             name: "speed of the train (km/h)"
@@ -75,7 +75,7 @@ class DesignsSettings(Settings):
 
 
 def _label(name: str, entry: Settings) -> str:
-    """What a parameter of an entry is, with its unit, in the words of its schema."""
+    """Description of a parameter of an entry, with its unit, from its schema."""
     words = []
     for key in name.split(".")[1:]:
         if isinstance(entry, Settings):
@@ -89,6 +89,6 @@ def _label(name: str, entry: Settings) -> str:
 def load_designs(path: str | Path) -> DesignsSettings:
     """Read a TOML file of ``DesignsSettings``, given by its path or by a name of ``configs/``.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
     return parse(DesignsSettings, read_toml(find(path, "designs")), str(path))

@@ -1,4 +1,4 @@
-"""Episodes as they are recorded: what a policy did, and what the environment answered."""
+"""Recording of episodes: a policy's actions, and the environment's responses."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from ..benchmark.seeds import DATA
 from .settings import ENVIRONMENT, EpisodesSettings, Plan
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
-"""Infos of the environment that are kept, beside the terms of the reward."""
+"""Entries of the environment's info that are recorded, in addition to the terms of the reward."""
 NOISE_STREAM = 1
-"""Beside an episode's seed, it seeds the noise on its actions: other numbers than those of its line."""
+"""Second seed of the noise on actions, after the episode's: other numbers than those of its line."""
 
 
 class Episode(NamedTuple):
-    """One recorded episode of n steps; the first row of infos is the start's, which has no action."""
+    """One recorded episode of n steps; the first row of infos belongs to the start, before any action."""
 
-    observations: NDArray[np.float32]  # (n + 1, entries): as the environment shows it
-    actions: NDArray[np.float32]  # (n, actions): what was done, in -1..1
+    observations: NDArray[np.float32]  # (n + 1, entries): as the environment returns them
+    actions: NDArray[np.float32]  # (n, actions): actions taken, in -1..1
     rewards: NDArray[np.float64]  # (n,)
     terminations: NDArray[np.bool_]  # (n,)
     truncations: NDArray[np.bool_]  # (n,)
     infos: dict[
         str, NDArray[np.float64]
     ]  # (n + 1,): INFOS, "reward_terms/...", "policy_action" (n + 1, actions)
-    figures: dict[str, float]  # of the whole episode, as the environment's info has them
+    figures: dict[str, float]  # of the whole episode, from the environment's info
 
 
 class Beginning(NamedTuple):
@@ -45,16 +45,16 @@ class Beginning(NamedTuple):
     policy: Policy
     twin: (
         gymnasium.Env[Any, Any] | None
-    )  # that shows the policy what it asks for; None: it sees what is recorded
-    observation: NDArray[np.float32]  # that is recorded
-    seen: NDArray[np.float32]  # by the policy
+    )  # gives the policy the observation that it requests; None: it sees the recorded one
+    observation: NDArray[np.float32]  # recorded observation
+    seen: NDArray[np.float32]  # observation that the policy sees
     info: dict[str, Any]
 
 
 def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
-    """The environment that is recorded, made so that others can make it again; with other arguments, if any.
+    """Make the environment to record, by id and plain arguments, so that others can make it again.
 
-    Raises InputError where its arguments are not valid.
+    changes: arguments that differ from the settings'. Raises InputError if the arguments are not valid.
     """
     try:
         return gymnasium.make(f"panto_env:{ENVIRONMENT}", **settings.arguments() | changes)
@@ -63,7 +63,7 @@ def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
 
 
 def check_places(settings: EpisodesSettings) -> None:
-    """Raise InputError unless each policy can begin at each place, at both ends of its speeds."""
+    """Raise InputError unless each policy can begin at each place, at its minimum and maximum speed."""
     stage = Stage(settings)
     for policy in dict.fromkeys(policy for each in settings.sets for policy in each.policies):
         for place in settings.places:
@@ -72,7 +72,7 @@ def check_places(settings: EpisodesSettings) -> None:
 
 
 def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> None:
-    """Record episodes one after another into a file that ``read_episodes`` reads, whole or not at all."""
+    """Record episodes one after another and write a file for ``read_episodes``, whole or not at all."""
     arrays: dict[str, NDArray[Any]] = {}
     stage = Stage(settings)
     for plan in plans:
@@ -85,7 +85,7 @@ def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> Non
 
 
 def read_part(path: Path) -> dict[str, NDArray[Any]]:
-    """Arrays that ``record`` wrote. Raises InputError where the file is missing or damaged."""
+    """Read the arrays that ``record`` wrote. Raises InputError if the file is missing or damaged."""
     try:
         return read_arrays(path)[1]
     except (OSError, ValueError) as error:
@@ -93,7 +93,10 @@ def read_part(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def read_episodes(path: Path, plans: Sequence[Plan]) -> list[Episode]:
-    """Episodes that ``record`` wrote, in the order of the plans. Raises InputError as ``read_part`` does."""
+    """Read the episodes that ``record`` wrote, in the order of the plans.
+
+    Raises InputError if the file is missing or damaged.
+    """
     tables: dict[int, dict[str, Any]] = {plan.number: {"infos": {}, "figures": {}} for plan in plans}
     for key, value in read_part(path).items():
         number, name, part = key.split("|")
@@ -105,10 +108,11 @@ def read_episodes(path: Path, plans: Sequence[Plan]) -> list[Episode]:
 
 
 class Stage:
-    """Where episodes are recorded: the environment, and a twin for each other observation that is asked for.
+    """Records episodes in an environment, with a twin of it for each other observation that is requested.
 
-    A policy that asks for another observation than what is recorded is shown it by a twin, which has the same
-    seed and gets the same actions. It moves alike bit for bit: the observation decides only what is seen.
+    A policy that requests an observation other than the recorded one gets it from a twin, which has the same
+    seed and gets the same actions. The twin's motion is the same bit for bit: the observation does not affect
+    it.
     """
 
     def __init__(self, settings: EpisodesSettings) -> None:
@@ -116,7 +120,7 @@ class Stage:
         self._twins: dict[str, gymnasium.Env[Any, Any]] = {}
 
     def play(self, plan: Plan) -> Episode:
-        """One episode. Raises InputError where the policy fails, or its twin does not move alike."""
+        """Record one episode. Raises InputError if the policy fails, or if its twin's motion differs."""
         env, options = self._env, self._settings.options(plan)
         policy, twin, observation, seen, info = self.begin(plan.policy, plan.seed, options)
         random = np.random.default_rng([plan.seed, NOISE_STREAM])
@@ -125,15 +129,15 @@ class Stage:
         steps: list[tuple[Any, ...]] = []
         ended = False
         while not ended:
-            wanted = _action(policy, plan.policy, seen, shape)
-            noisy = wanted + plan.noise * random.standard_normal(shape)
+            policy_action = _action(policy, plan.policy, seen, shape)
+            noisy = policy_action + plan.noise * random.standard_normal(shape)
             action = np.clip(noisy, -1.0, 1.0).astype(np.float32)
             observation, reward, terminated, truncated, info = env.step(action)
             seen = observation if twin is None else _seen(twin, action, info, plan.policy)
             ended = terminated or truncated
             steps.append((action, reward, terminated, truncated))
             observations.append(observation)
-            infos.append(_kept(info, wanted))
+            infos.append(_kept(info, policy_action))
         actions, rewards, terminations, truncations = (np.array(each) for each in zip(*steps, strict=True))
         return Episode(
             np.array(observations),
@@ -146,7 +150,7 @@ class Stage:
         )
 
     def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
-        """The start of an episode. Raises InputError where the policy cannot begin it."""
+        """Begin an episode. Raises InputError if the policy cannot begin it."""
         policy = find_policy(name)
         twin = self._twin(policy)
         observation, info = self._env.reset(seed=seed, options=options)
@@ -156,33 +160,33 @@ class Stage:
         return Beginning(policy, twin, observation, seen, info)
 
     def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
-        """The environment that a policy asks for; None where that is the one that is recorded."""
+        """Environment with the observation that a policy requests; None if that is the recorded one."""
         offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
-        asked = {key: value for key, value in wishes(policy).items() if value != getattr(offered, key)}
-        key = repr(sorted(asked.items()))
-        if asked and key not in self._twins:
-            self._twins[key] = make(self._settings, **asked)
+        changes = {key: value for key, value in wishes(policy).items() if value != getattr(offered, key)}
+        key = repr(sorted(changes.items()))
+        if changes and key not in self._twins:
+            self._twins[key] = make(self._settings, **changes)
         return self._twins.get(key)
 
 
 def _seen(
     twin: gymnasium.Env[Any, Any], action: NDArray[np.float32], info: dict[str, Any], policy: str
 ) -> NDArray[np.float32]:
-    """What a policy sees next. Raises InputError where its twin does not move alike."""
+    """Step a twin: the policy's next observation. Raises InputError if the twin's motion differs."""
     seen: NDArray[np.float32]
     seen, _, _, _, other = twin.step(action)
     if other["contact_force"] != info["contact_force"]:
         raise InputError(
-            f"The policy '{policy}' asks for an observation under which the same seed gives another run, so "
-            "that it cannot be recorded beside others; leave it out."
+            f"The policy '{policy}' requests an observation under which the same seed gives a different run, "
+            "so that it cannot be recorded beside others; leave it out."
         )
     return seen
 
 
 def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[Any]:
-    """What a policy does, within -1..1."""
+    """A policy's action for an observation, clipped to -1..1. Raises InputError if it is not valid."""
     with errors_name(name, "act"):
-        returned = policy.act(seen.copy())  # a copy: it may keep what it was shown
+        returned = policy.act(seen.copy())  # a copy: the policy may keep it
         action = numbers(returned)
         if action is None or action.shape != shape or not np.isfinite(action).all():
             raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
@@ -190,7 +194,7 @@ def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[i
     return clipped
 
 
-def _kept(info: dict[str, Any], wanted: NDArray[Any]) -> dict[str, Any]:
-    """What is kept of an info, flat."""
+def _kept(info: dict[str, Any], policy_action: NDArray[Any]) -> dict[str, Any]:
+    """Recorded entries of an info, as a flat table."""
     terms = {f"reward_terms/{name}": value for name, value in info["reward_terms"].items()}
-    return {name: info[name] for name in INFOS} | terms | {"policy_action": wanted}
+    return {name: info[name] for name in INFOS} | terms | {"policy_action": policy_action}

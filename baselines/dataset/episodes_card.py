@@ -1,4 +1,4 @@
-"""What stands beside a data set of episodes: where it comes from, what is in it, and how to use it."""
+"""Card of a data set of episodes: where it comes from, what it holds, and how to use it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REWARD = (
 
 
 def description(settings: EpisodesSettings, policy_set: PolicySet) -> str:
-    """A paragraph on what a data set is."""
+    """One paragraph that describes a data set."""
     places = "; ".join(
         f"{each.pantograph} on {each.catenary}, {each.speed_kmh[0]:g} to {each.speed_kmh[1]:g} km/h"
         for each in settings.places
@@ -31,7 +31,7 @@ def description(settings: EpisodesSettings, policy_set: PolicySet) -> str:
     return (
         f"Episodes of {ENVIRONMENT}, simulated: {places}. Policies: {', '.join(policy_set.policies)}; rms of "
         f"the noise on the action: {', '.join(f'{noise:g}' for noise in policy_set.noise)}.{own} {REWARD} "
-        f"Seeds {plans[0].seed} to {plans[-1].seed}, which nothing was trained, chosen or judged on."
+        f"Seeds {plans[0].seed} to {plans[-1].seed}; no policy was trained, selected or judged on these."
     )
 
 
@@ -42,7 +42,7 @@ def card(
     layout: Layout,
     made_of: Mapping[str, Any],
 ) -> str:
-    """The card as Markdown. rows: each episode's plan and ``summary``."""
+    """Text of the card, as Markdown. rows: each episode's plan and its ``summary``."""
     lines = [
         f"# {settings.dataset_id(policy_set)}",
         "",
@@ -55,24 +55,24 @@ def card(
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
         *_table(settings, rows),
         "",
-        "Means over whole episodes, their start included. Each row has seeds, and so lines and speeds, of "
-        "its own: it says what is in the data and ranks no policy, as `panto benchmark` does.",
+        "Means over whole episodes, including their start. Each row has its own seeds, and so its own lines "
+        "and speeds: the table describes the data; to rank policies use `panto benchmark`.",
         "",
         "| | observed | value of 0 | value of 1 more |",
         "|---:|---|---:|---:|",
         *(f"| {k} | {e.name} | {e.centre:g} | {e.scale:g} {e.unit} |" for k, e in enumerate(layout.entries)),
         "",
-        "`actions`: what was done, share of the actuator's force limit. `infos`: row k + 1 is of step k, row "
-        "0 of the start; `policy_action` is what the policy wanted before noise was added. An episode's "
-        "metadata hold policy, noise, line, speed, figures, and seed and options: `env.reset(seed=seed, "
-        "options=options)` and the actions give it again, bit for bit.",
+        "`actions`: actions taken, as a share of the actuator's force limit. `infos`: row k + 1 belongs to "
+        "step k, row 0 to the start; `policy_action` is the policy's action before noise was added. An "
+        "episode's metadata hold policy, noise, line, speed, figures, seed and options: "
+        "`env.reset(seed=seed, options=options)` and the actions reproduce it bit for bit.",
         "",
     ]
     return "\n".join(lines)
 
 
 def summary(episode: Episode) -> dict[str, float]:
-    """What the card tells of an episode."""
+    """Figures of an episode that the card averages."""
     return {
         "steps": len(episode.rewards),
         "return": float(np.sum(episode.rewards)),
@@ -86,7 +86,7 @@ def _table(settings: EpisodesSettings, rows: Sequence[tuple[Plan, Mapping[str, A
     kinds = dict.fromkeys((plan.policy, plan.noise, plan.place) for plan, _ in rows)
     lines = []
     for kind in kinds:
-        own = [told for plan, told in rows if (plan.policy, plan.noise, plan.place) == kind]
+        own = [figures for plan, figures in rows if (plan.policy, plan.noise, plan.place) == kind]
         policy, noise, place = kind
         steps, early = (int(sum(each[name] for each in own)) for name in ("steps", "terminated"))
         means = [np.mean([each[name] for each in own]) for name in ("return", "std", "mean")]

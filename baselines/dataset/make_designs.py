@@ -31,23 +31,23 @@ from .designs_card import card, columns
 from .designs_settings import DesignsSettings
 
 PER_PART = 64
-"""Designs in a part: some seconds of work."""
+"""Designs per part: some seconds of work."""
 TABLE = "designs.parquet"
 KEY = b"panto_env"
-"""Under which the schema's metadata have what the table was made of; a column's have its unit and range."""
+"""Key of the table's identity in the schema's metadata; a column's metadata hold its description."""
 
 
 @dataclass(frozen=True)
 class MadeTable:
-    """A table that is there."""
+    """A finished table of designs."""
 
     folder: Path
     designs: int
     refused: int
     ended_early: int
-    warned: int  # of inaccurate figures
+    warned: int  # designs with a warning of inaccurate figures
     megabytes: float
-    kept: bool  # whether it was there before
+    kept: bool  # whether it existed before
 
 
 def make_designs(
@@ -58,12 +58,12 @@ def make_designs(
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> MadeTable:
-    """Make the table in a folder, with its card and checksums; one that is there is kept.
+    """Make the table in a folder, with its card and checksums; a table that exists is kept.
 
-    workers, ray: as ``spread`` takes them; the table does not depend on it. A script must call this under
-    ``if __name__ == "__main__":``. progress: called with the parts there, and of all.
+    workers, ray: see ``spread``; the table does not depend on them. A script must call this under
+    ``if __name__ == "__main__":``. progress: called with the number of parts done and of all.
 
-    Raises InputError where the folder holds a table that was made of something else.
+    Raises InputError if the folder holds a table made with other settings.
     """
     made_of = identity("designs", settings.model_dump(mode="json"))
     folder = output / "designs"
@@ -84,11 +84,11 @@ def make_designs(
             _assemble(settings, folder, list(jobs), made_of)
             remove_parts(parts)
             remove_if_empty(output / PARTS)
-    return _told(folder, kept=there)
+    return _made(folder, kept=there)
 
 
 def read_identity(path: Path) -> dict[str, Any]:
-    """What a table was made of. Raises InputError where the file is no such table."""
+    """Identity of a table: the settings and version it was made with. Raises InputError for another file."""
     from pyarrow import ArrowException
     from pyarrow.parquet import read_schema
 
@@ -96,35 +96,35 @@ def read_identity(path: Path) -> dict[str, Any]:
         table: dict[str, Any] = json.loads(read_schema(path).metadata[KEY])
         return table
     except (OSError, ArrowException, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is no table of designs that is whole; make it anew.") from error
+        raise InputError(f"{path} is not a complete table of designs; make it anew.") from error
 
 
 def _assemble(
     settings: DesignsSettings, folder: Path, parts: Sequence[Path], made_of: dict[str, Any]
 ) -> None:
-    """Write the table beside its place, and bring it there once it is whole."""
+    """Write the table to a hidden folder, and rename that once it is complete."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     unfinished = folder.with_name(f".{folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # of a process that was killed
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
     unfinished.mkdir()
-    told = columns(settings)
+    described = columns(settings)
     schema = pa.schema(
         [
             pa.field(each.name, getattr(pa, each.kind)(), metadata={"description": each.description})
-            for each in told
+            for each in described
         ],
         metadata={KEY: json.dumps(made_of)},
     )
     table = pa.Table.from_pylist([row for path in parts for row in read_checked(path)["rows"]], schema=schema)
     pq.write_table(table, unfinished / TABLE, compression="zstd")
-    (unfinished / "card.md").write_text(card(settings, told, table, made_of), encoding="utf-8")
+    (unfinished / "card.md").write_text(card(settings, described, table, made_of), encoding="utf-8")
     write_checksums(unfinished)
     unfinished.rename(folder)
 
 
-def _told(folder: Path, *, kept: bool) -> MadeTable:
+def _made(folder: Path, *, kept: bool) -> MadeTable:
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 

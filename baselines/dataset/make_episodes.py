@@ -1,4 +1,4 @@
-"""Data sets of episodes: recorded in parts on all cores, then written as Minari's, whole or not at all."""
+"""Data sets of episodes: recorded in parts on all cores, then written by Minari, whole or not at all."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ from .minari_set import KEY, check_minari, write_minari
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
 
 PER_PART = 10
-"""Episodes in a part: a second or two of work, so that little is lost where it ends."""
+"""Episodes per part: a second or two of work, so that little is lost by an interruption."""
 NAMESPACE_FILE = "namespace_metadata.json"
-"""By which Minari knows a folder of data sets."""
+"""File by which Minari recognises a folder of data sets."""
 
 
 @dataclass(frozen=True)
 class Made:
-    """One data set that is there."""
+    """A finished data set."""
 
     dataset_id: str
     folder: Path
     episodes: int
     steps: int
     megabytes: float
-    kept: bool  # whether it was there before
+    kept: bool  # whether it existed before
 
 
 def make_episodes(
@@ -57,36 +57,36 @@ def make_episodes(
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> list[Made]:
-    """Make all data sets in a folder that ``MINARI_DATASETS_PATH`` may name; those that are there are kept.
+    """Make all data sets in a folder; those that exist are kept. ``MINARI_DATASETS_PATH`` may point to it.
 
-    workers, ray: as ``spread`` takes them; the data do not depend on it. A script must call this under ``if
-    __name__ == "__main__":``. progress: called with the parts there, and of all.
+    workers, ray: see ``spread``; the data do not depend on them. A script must call this under ``if
+    __name__ == "__main__":``. progress: called with the number of parts done and of all.
 
-    Raises InputError for settings that are not valid, a policy that fails, and where the folder holds a data
-    set of the same id that was made of something else.
+    Raises InputError for invalid settings, for a policy that fails, and if the folder holds a data set of the
+    same id made with other settings.
     """
     check_minari()
     check_places(settings)
     with alone_in(output, "makes data in"):
-        wanted = [_Wanted.of(settings, policy_set, output) for policy_set in settings.sets]
-        kept = [each.kept() for each in wanted]
+        sets = [_Order.of(settings, policy_set, output) for policy_set in settings.sets]
+        kept = [each.kept() for each in sets]
         jobs: dict[Path, Job] = {}
-        for one, there in zip(wanted, kept, strict=True):
+        for one, there in zip(sets, kept, strict=True):
             if not there:
                 open_parts(one.parts, one.made_of)
                 jobs |= one.jobs(settings)
         make_parts(jobs, read_part, workers=workers, ray=ray, progress=progress)
-        for one, there in zip(wanted, kept, strict=True):
+        for one, there in zip(sets, kept, strict=True):
             if not there:
                 _assemble(settings, one)
                 remove_parts(one.parts)
         remove_if_empty(output / PARTS)
-    return [_told(one, kept=there) for one, there in zip(wanted, kept, strict=True)]
+    return [_made(one, kept=there) for one, there in zip(sets, kept, strict=True)]
 
 
 @dataclass(frozen=True)
-class _Wanted:
-    """One data set to make: its settings, its places on disk, and its episodes in groups of one part each."""
+class _Order:
+    """One data set to make: its settings, its paths, and its episodes in groups of one part each."""
 
     policy_set: PolicySet
     name: str
@@ -96,7 +96,7 @@ class _Wanted:
     made_of: dict[str, Any]
 
     @classmethod
-    def of(cls, settings: EpisodesSettings, policy_set: PolicySet, output: Path) -> _Wanted:
+    def of(cls, settings: EpisodesSettings, policy_set: PolicySet, output: Path) -> _Order:
         name = settings.dataset_id(policy_set)
         parts = output / PARTS / name.replace("/", "_")
         plans = list(settings.plans(policy_set))
@@ -111,7 +111,7 @@ class _Wanted:
         return {path: partial(record, settings, group) for path, group in self.groups.items()}
 
     def kept(self) -> bool:
-        """Whether it is there. Raises InputError where another one is that has its id."""
+        """Whether the data set exists. Raises InputError if a different one with its id exists."""
         if not (self.folder / LIST).is_file():
             return False
         difference = first_difference(_metadata(self.folder).get(KEY, {}), self.made_of)
@@ -123,11 +123,11 @@ class _Wanted:
         return True
 
 
-def _assemble(settings: EpisodesSettings, one: _Wanted) -> None:
-    """Write a data set beside its place, and bring it there once it is whole."""
+def _assemble(settings: EpisodesSettings, one: _Order) -> None:
+    """Write a data set to a hidden folder, and rename that once it is complete."""
     _make_namespaces(one.folder)
     unfinished = one.folder.with_name(f".{one.folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # of a process that was killed
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
     rows: list[tuple[Plan, dict[str, float]]] = []
 
     def episodes() -> Iterator[tuple[Plan, Episode]]:
@@ -136,8 +136,8 @@ def _assemble(settings: EpisodesSettings, one: _Wanted) -> None:
                 rows.append((plan, summary(episode)))
                 yield plan, episode
 
-    told = description(settings, one.policy_set)
-    write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, told)
+    paragraph = description(settings, one.policy_set)
+    write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()
@@ -148,7 +148,7 @@ def _assemble(settings: EpisodesSettings, one: _Wanted) -> None:
 
 
 def _make_namespaces(folder: Path) -> None:
-    """Folders above a data set, as Minari makes them."""
+    """Make the folders above a data set in the way that Minari does."""
     make_folder(folder.parent)
     for above in (folder.parent, folder.parent.parent):
         if not (above / NAMESPACE_FILE).is_file():
@@ -157,7 +157,7 @@ def _make_namespaces(folder: Path) -> None:
             break
 
 
-def _told(one: _Wanted, *, kept: bool) -> Made:
+def _made(one: _Order, *, kept: bool) -> Made:
     metadata = _metadata(one.folder)
     size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file())
     steps, episodes = metadata["total_steps"], metadata["total_episodes"]

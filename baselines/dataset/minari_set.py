@@ -1,4 +1,4 @@
-"""Recorded episodes as a data set of Minari. Minari, of the extra 'data', is imported late."""
+"""Writes recorded episodes as a Minari data set. Minari, part of the extra 'data', is imported late."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .episodes import Episode, make
 from .settings import EpisodesSettings, Plan, PolicySet
 
 KEY = "panto_env"
-"""Under which the metadata of a data set have what it was made of."""
+"""Key of a data set's identity in its metadata."""
 
 
 def check_minari() -> None:
-    """Raise InputError where Minari, or what it writes with, is not installed."""
+    """Raise InputError if Minari, or h5py, which it writes with, is not installed."""
     try:
         import h5py  # noqa: F401
         import minari  # noqa: F401
@@ -38,10 +38,10 @@ def write_minari(
     made_of: Mapping[str, Any],
     description: str,
 ) -> None:
-    """Write a data set into a new folder, as ``minari.load_dataset`` reads it.
+    """Write a data set to a new folder, for ``minari.load_dataset``.
 
     Each episode's metadata hold its seed and options, with which ``reset`` begins it again, its policy, the
-    noise on that, and its figures.
+    noise on the action, and its figures.
     """
     import minari
     from minari.data_collector import EpisodeBuffer
@@ -86,7 +86,7 @@ def write_minari(
 
 
 def _facts(settings: EpisodesSettings, plan: Plan, episode: Episode) -> dict[str, Any]:
-    """What is told of an episode beside its arrays; figures that it has not are infinite, as in infos."""
+    """Metadata of an episode; figures that it does not have are infinite, as in infos."""
     place = settings.places[plan.place]
     facts = {
         "policy": plan.policy,
@@ -106,7 +106,7 @@ def _algorithm(policy_set: PolicySet) -> str:
 
 
 def _nested(infos: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys "a/b" as tables in tables."""
+    """Nested tables from keys such as "a/b"."""
     nested: dict[str, Any] = {}
     for key, value in infos.items():
         *above, last = key.split("/")

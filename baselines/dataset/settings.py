@@ -1,4 +1,4 @@
-"""What data sets of episodes hold: policies, places and how many, from a TOML file."""
+"""Settings of data sets of episodes: policies, places and counts, from a TOML file."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _Speed = Annotated[float, Between(1, 600, "km/h")]
 
 
 class EpisodePlace(Settings):
-    """A pantograph on a line, and the speeds that episodes draw from."""
+    """A pantograph on a line, and the range that episodes draw their speed from."""
 
     catenary: str = Field(description=description("catenary"))
     pantograph: str = Field(description=description("pantograph"))
-    speed_kmh: tuple[_Speed, _Speed] = Field(description="lowest and highest speed (km/h)")
+    speed_kmh: tuple[_Speed, _Speed] = Field(description="minimum and maximum speed (km/h)")
 
     def options(self) -> dict[str, Any]:
-        """Options of ``reset`` that bring an episode here."""
+        """Options of ``reset`` for an episode at this place."""
         return {
             "catenary": self.catenary,
             "pantograph": self.pantograph,
@@ -50,12 +50,12 @@ class PolicySet(Settings):
     name: _Name = Field(description="last part of its id, before the version: small letters, digits and '-'")
     policies: tuple[str, ...] = Field(min_length=1, description="names, or model files, as the benchmark's")
     noise: tuple[NonNegative, ...] = Field(
-        (0.0,), min_length=1, description="rms of what is added to each action, drawn anew at each step (-)"
+        (0.0,), min_length=1, description="rms of the noise added to each action, drawn at each step (-)"
     )
     episodes: Annotated[int, Field(gt=0)] = Field(
-        description="number of them for each policy, noise and place"
+        description="number of episodes for each policy, noise and place"
     )
-    description: str = Field("", description="what it is for, a sentence or two")
+    description: str = Field("", description="purpose of the set, in a sentence or two")
 
     @field_validator("policies", "noise")
     @classmethod
@@ -68,22 +68,22 @@ class Plan(NamedTuple):
 
     number: int  # within its data set, from 0
     policy: str
-    noise: float  # rms of what is added to actions (-)
-    place: int  # which of the places
+    noise: float  # rms of the noise added to actions (-)
+    place: int  # index of the place
     seed: int
 
 
 class EpisodesSettings(Settings):
-    """Data sets of one group of places."""
+    """Data sets recorded at the same places."""
 
     title: _Name = Field(description="middle part of the ids: small letters, digits and '-'")
     version: Annotated[int, Field(ge=0)] = Field(0, description="last part of the ids")
-    author: str = Field("The panto-env authors", description="of the data sets")
+    author: str = Field("The panto-env authors", description="author of the data sets")
     seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="where each set's seeds begin within those that are for data"
+        0, description="first seed of each set, counted within the range of seeds for data"
     )
     environment: dict[str, Any] = Field(
-        default_factory=dict, description=f"arguments of {ENVIRONMENT} that differ from its own"
+        default_factory=dict, description=f"arguments of {ENVIRONMENT} that differ from its defaults"
     )
     places: tuple[EpisodePlace, ...] = Field(min_length=1, description="lines, with pantograph and speeds")
     sets: tuple[PolicySet, ...] = Field(min_length=1, description="data sets")
@@ -103,7 +103,7 @@ class EpisodesSettings(Settings):
         return self
 
     def dataset_id(self, policy_set: PolicySet) -> str:
-        """Minari's name of a data set."""
+        """Minari's id of a data set."""
         return f"{NAMESPACE}/{self.title}/{policy_set.name}-v{self.version}"
 
     def count(self, policy_set: PolicySet) -> int:
@@ -112,8 +112,8 @@ class EpisodesSettings(Settings):
         return kinds * policy_set.episodes
 
     def plans(self, policy_set: PolicySet) -> Iterator[Plan]:
-        """Episodes of a data set in order: places, policies and noises take turns, each under a seed of its
-        own; sets of as many episodes have the same seeds.
+        """Episodes of a data set in order: places, policies and noises alternate, each episode with its own
+        seed; sets of the same number of episodes have the same seeds.
         """
         kinds = list(product(range(len(self.places)), policy_set.policies, policy_set.noise))
         for number in range(self.count(policy_set)):
@@ -121,7 +121,7 @@ class EpisodesSettings(Settings):
             yield Plan(number, policy, noise, place, DATA[self.seed + number])
 
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the environment: its place is the first one, the others are options of ``reset``."""
+        """Arguments of the environment at the first place; the other places are options of ``reset``."""
         return self.environment | self.places[0].options()
 
     def options(self, plan: Plan) -> dict[str, Any]:
@@ -139,15 +139,15 @@ def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
 def load_episodes(path: str | Path) -> EpisodesSettings:
     """Read a TOML file of ``EpisodesSettings``, given by its path or by a name of ``configs/``.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
     return parse(EpisodesSettings, read_toml(find(path, "dataset")), str(path))
 
 
 def chosen(settings: EpisodesSettings, names: tuple[str, ...]) -> EpisodesSettings:
-    """The settings with these of their sets alone. Raises InputError for a name that none of them has."""
+    """Settings with only the named sets. Raises InputError for a name that no set has."""
     known = {each.name: each for each in settings.sets}
     wrong = next((name for name in names if name not in known), None)
     if wrong is not None:
-        raise InputError(f"There is no set '{wrong}' in this file: it has {', '.join(known)}.")
+        raise InputError(f"There is no set '{wrong}' in this file; its sets are {', '.join(known)}.")
     return settings.model_copy(update={"sets": tuple(known[name] for name in dict.fromkeys(names))})

@@ -1,1 +1,1 @@
-"""The bound: the steadiest contact force that an actuator reaches on a line that it knows beforehand."""
+"""The oracle, a bound on control: the steadiest contact force that an actuator reaches on a known line."""

@@ -48,7 +48,7 @@ def oracle(
         list[str] | None, typer.Option(help="Where a search starts: zero, periodic or random; repeatable.")
     ] = None,
     hops: Annotated[
-        int | None, typer.Option(min=0, help="Searches that follow from the best one so far, shaken.")
+        int | None, typer.Option(min=0, help="Further searches, each from the best result plus noise.")
     ] = None,
     output: Annotated[
         str | None,
@@ -66,10 +66,11 @@ def oracle(
     """Find the steadiest contact force that an actuator can reach on a line that it knows ahead of time.
 
     The minimum σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
-    what control can reach. It is a local optimum that is reached, not a proof that nothing is better.
-    Seeds after the first start where the one before ended. The picture shows the first pass that was searched
-    for. Cells that are in the output already, with the same settings, are kept: a list that was interrupted
-    is gone on with. An output with other cells, which would be lost, is refused without --force.
+    what control can reach. It is a local optimum, reached by the plant, not a proof that nothing is better.
+    The search for each further seed starts from the result of the one before. The picture shows the first
+    pass that was searched for. Cells that are in the output already, with the same settings, are kept, so
+    that an interrupted list continues. An output with other cells, which would be lost, is refused without
+    --force.
     """
     from panto_env.analysis.plots import save as save_plot
 
@@ -77,7 +78,7 @@ def oracle(
     from .problem import Problem
     from .search import find
     from .settings import oracle_settings
-    from .stored import as_data, asked, cell, load, read, save
+    from .stored import as_data, cell, load, read, requests, save
 
     if known:
         print_table(report.stored_table(load()))
@@ -94,16 +95,18 @@ def oracle(
     only = given | ({"speeds_kmh": speed} if speed else {})
     settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
     command = this_command()
-    wanted = asked(settings)
+    requested = requests(settings)
     before = read(output)["cells"] if output is not None and os.path.exists(output) else []
     done: list[dict[str, Any] | None] = [
-        next((each for each in before if each["asked"] == one), None) for one in wanted
+        next((each for each in before if each["asked"] == one), None) for one in requested
     ]
     kept = len(done) - done.count(None)
     if output is not None and len(before) > kept:
         refuse_overwriting(output, force)
     if plot is not None and kept == len(done):
-        raise InputError(f"{output} holds all of this already: no search is left to plot; leave it out.")
+        raise InputError(
+            f"{output} holds all these cells already, so there is no search to plot; omit --plot."
+        )
     found: list[Oracle] = []
     for k, values in enumerate(settings.runs()):
         if done[k] is not None:
@@ -112,12 +115,12 @@ def oracle(
         for number in settings.seeds:
             neighbour = passes[-1] if passes else None
             problem = Problem(values, number, settings.spans)
-            passes.append(find(problem, settings.starts, _tell, neighbour, settings.hops))
+            passes.append(find(problem, settings.starts, _print_progress, neighbour, settings.hops))
             if not json:
                 print_table(report.convergence(passes[-1]))
-        done[k] = cell(wanted[k], passes)
+        done[k] = cell(requested[k], passes)
         found += passes
-        if output is not None:  # at once: a long list may be broken off, and is then gone on with
+        if output is not None:  # at once: a long list may be interrupted and continued
             save([each for each in done if each is not None], output, command)
     with written_last() as later:
         if plot is not None:
@@ -126,14 +129,14 @@ def oracle(
             print_json(as_data([each for each in done if each is not None], command))
             return
         if kept:
-            console.print(f"{kept} of {len(done)} cells are those that were in {output} already.")
+            console.print(f"{kept} of {len(done)} cells were in {output} already and are kept.")
         if found:
             print_table(report.summary(found))
         console.print(report.LEGEND, style="dim")
 
 
-def _tell(start: str, iteration: Iteration) -> None:
-    """One line of progress, where someone is looking."""
+def _print_progress(start: str, iteration: Iteration) -> None:
+    """Print one line of progress, if stderr is a terminal."""
     if progress_console.is_terminal:
         progress_console.print(
             f"{start} {iteration.number}: σ {iteration.std:.3f} N, mean {iteration.mean:.2f} N"

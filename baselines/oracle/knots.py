@@ -1,8 +1,8 @@
-"""Forces that an actuator can have, interval by interval, and the commands that give them.
+"""Forces that an actuator can apply, interval by interval, and the commands that produce them.
 
 The unknowns of the oracle are not commands but knots: the forces at the ends of the control intervals. A
-command beyond what a limit of rate lets through changes nothing, so that an optimiser of commands stands
-still there; of knots the same limits are linear inequalities.
+command beyond the limit of rate has no further effect, so its gradient is zero there and an optimiser of
+commands would stop; for knots the same limits are linear inequalities.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from panto_env.plant.actuators import ActuatorSettings
 from panto_env.plant.actuators.lagged import LaggedActuator
 
 HALVINGS = 50
-"""Of the range in which the command for a knot is looked for."""
+"""Number of halvings of the range in which the command for a knot is searched for."""
 NEAR = 0.01
-"""Share of a limit within which a force counts as at it."""
+"""A force counts as at a limit if it differs by less than this share of the limit."""
 
 
 class Limits(NamedTuple):
@@ -34,8 +34,8 @@ class Limits(NamedTuple):
 class Knots:
     """Knots of one actuator, which is at rest before the first one.
 
-    Of an actuator of another kind than "lagged" a knot is the command itself, and the plant alone knows what
-    becomes of it.
+    For an actuator of a kind other than "lagged", a knot is the command itself; only the plant knows the
+    force that follows.
     """
 
     def __init__(self, actuator: ActuatorSettings, time_step: float, steps: int) -> None:
@@ -46,14 +46,14 @@ class Knots:
         self._share = 1.0 if lagged.lag == 0 else -math.expm1(-time_step / lagged.lag)
         self._rate = math.inf if lagged.rate_limit is None else lagged.rate_limit * time_step
         self.reached = 1.0 - (1.0 - self._share) ** steps
-        """Share of the way to its command that the force goes in an interval, where no rate limits it."""
+        """Share of the way to its command that the force covers in an interval, without a rate limit."""
         self.maximum_change = steps * self._rate
-        """From one knot to the next (N)."""
+        """Maximum change from one knot to the next (N)."""
         self.late = math.ceil(lagged.delay / time_step - 1e-6)
         """Plant steps from a command to its first effect."""
 
     def limits(self, count: int) -> Limits:
-        """Limits of ``count`` knots of one place.
+        """Limits of ``count`` knots of one actuator.
 
         A force is within its limit, changes no faster than its limit of rate, and no faster than under the
         maximum command: w[k] - w[k-1] <= reached (limit - w[k-1]), and the same downwards.
@@ -69,31 +69,31 @@ class Knots:
         return Limits(csc_matrix(vstack(parts)), -high, high)
 
     def within(self, knots: Array) -> Array:
-        """Knots, (count, places), made smaller by one factor where that takes to keep the limits."""
+        """Knots, (count, places), scaled down by one factor if they exceed the limits."""
         limits = self.limits(len(knots))
         excess = np.abs(limits.matrix @ knots) / limits.high[:, None]
         return np.asarray(knots / max(1.0, float(excess.max())))
 
     def at_limits(self, knots: Array) -> float:
-        """Share of the limits of force and rate, knot by knot, that (count, places) are at."""
+        """Share of knots, (count, places), that are at a limit of force or rate."""
         limits = self.limits(len(knots))
         near = np.abs(limits.matrix @ knots) >= (1.0 - NEAR) * limits.high[:, None]
         return float(near.reshape(-1, *knots.shape).any(axis=0).mean())
 
     def commands(self, knots: Array) -> Array:
-        """Commands (N), (..., count, places), within the limit, that lead from knot to knot."""
+        """Commands (N), (..., count, places), within the limit, that take the force from knot to knot."""
         before = np.zeros_like(knots)
         before[..., 1:, :] = knots[..., :-1, :]
         return np.clip(before + self._lead(knots - before), -self.limit, self.limit)
 
     def free_commands(self, knots: Array) -> Array:
-        """Commands (N) as of ``commands``, for an actuator without limits (``without_limits``)."""
+        """Like ``commands``, for an actuator without limits of force and rate (``without_limits``)."""
         before = np.zeros_like(knots)
         before[..., 1:, :] = knots[..., :-1, :]
         return np.asarray(before + (knots - before) / self.reached)
 
     def _lead(self, change: Array) -> Array:
-        """How far commands are ahead of the force (N) for it to change so much in an interval."""
+        """Difference of command and force (N) with which the force makes this change in an interval."""
         if math.isinf(self._rate):
             return np.asarray(change / self.reached)
         size = np.abs(change)
@@ -109,9 +109,9 @@ class Knots:
 
 
 def without_limits(actuator: ActuatorSettings) -> ActuatorSettings:
-    """The actuator without limits of force and rate: the plant's response to a change of one knot alone.
+    """The actuator without limits of force and rate, so that a change of one knot affects no other knot.
 
-    One of another kind than "lagged" is left as it is.
+    An actuator of a kind other than "lagged" is returned unchanged.
     """
     if isinstance(actuator, LaggedActuator):
         return actuator.model_copy(update={"rate_limit": None, "force_limit": 1e5})

@@ -1,4 +1,4 @@
-"""Lanes of the true plant that run the same stretch of the same line again and again, under commands."""
+"""Lanes of the true plant that repeat the same stretch of the same line under different commands."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from panto_env.control.settings import RunSettings
 from panto_env.plant.state import SAMPLE_ROWS, Place, Row, Samples
 
 PUSHED = 48
-"""Lanes of a group that take pushes."""
+"""Number of lanes of a group that compute responses to test forces."""
 
 
 class Stretch:
-    """A stretch of one line, begun in the state in which a passive train comes to it."""
+    """A stretch of one line; each run begins in the state in which a passive train reaches it."""
 
     def __init__(
         self, settings: RunSettings, trim: Trim | None, seed: int, begin: int, control_steps: int
     ) -> None:
-        """begin: control steps before it; control_steps: of the stretch. seed: of what is drawn."""
+        """begin: control steps before the stretch; control_steps: within it; seed: of line and noise."""
         self._settings, self._trim, self._seed = settings, trim, seed
         self._begin, self._control_steps = begin, control_steps
         self._groups: dict[int, list[_Group]] = {}  # by the lanes of each
 
     def forces(self, commands: Array) -> Array:
-        """Contact force (N), not filtered, (runs, samples), under commands (N), (runs, steps, places)."""
+        """Unfiltered contact force (N), (runs, samples), under commands (N), (runs, steps, places)."""
         jobs = workers_for(len(commands), None)
         lanes = -(-len(commands) // jobs)
         padded = np.zeros((jobs * lanes, *commands.shape[1:]))
@@ -41,10 +41,10 @@ class Stretch:
         return np.concatenate(runs)[: len(commands)]
 
     def changes(self, commands: Array, push: Array, steps: int) -> Array:
-        """Change of that force (N), (steps, places, samples), by pushes that begin at one step, at one place.
+        """Responses of the contact force (N), (steps, places, samples), to test forces.
 
-        commands: (steps, places) (N), of the run about which they are made. push: (length,): added to the
-        commands from that step on (N). steps: control steps after which a push is no longer followed.
+        commands: (steps, places) (N), of the run that is varied. Each step and place gets a test of its own.
+        push: (length,): added to the commands from that step on (N). steps: control steps followed.
         """
         pushes = [(step, place) for step in range(len(commands)) for place in range(commands.shape[1])]
         jobs = workers_for(len(pushes), None)
@@ -61,7 +61,7 @@ class Stretch:
         return changes.reshape(*commands.shape, -1)
 
     def _of(self, lanes: int, jobs: int) -> list[_Group]:
-        """So many groups of so many lanes each."""
+        """Groups of lanes, made when first needed: ``jobs`` groups of ``lanes`` lanes."""
         groups = self._groups.setdefault(lanes, [])
         while len(groups) < jobs:
             groups.append(
@@ -71,7 +71,7 @@ class Stretch:
 
 
 class _Group:
-    """Lanes that one thread drives."""
+    """Lanes that one thread runs."""
 
     def __init__(
         self, settings: RunSettings, trim: Trim | None, seed: int, lanes: int, begin: int, control_steps: int
@@ -84,7 +84,7 @@ class _Group:
         rows = self._first + control_steps * task.length.control_steps + 1
         shape = (lanes, rows, 1, SAMPLE_ROWS)
         check_record(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
-        # Rows before the stretch are never touched, and so take no memory.
+        # Rows before the stretch are never written, so they take no memory.
         self._samples = Samples(
             rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))
         )
@@ -96,21 +96,22 @@ class _Group:
         self._start = [(array, array.copy()) for array in self._moving]
 
     def run(self, commands: Array) -> Array:
-        """Contact force (N), (lanes, samples), from the start of the stretch under (lanes, steps, places)."""
+        """Contact force (N), (lanes, samples), under commands (N), (lanes, steps, places)."""
         _restore(self._start)
         self._advance(commands)
         return self._force.copy()
 
     def changes(self, commands: Array, push: Array, steps: int, pushes: list[tuple[int, int]]) -> Array:
-        """Change of the force (N), (pushes, samples), by pushes, each a step and a place, in order of steps.
+        """Responses of the force (N), (pushes, samples), to test forces, each at a step and place, by step.
 
-        As of ``Stretch.changes``. All lanes go along under the plain commands; from step to step some of
-        them, all in the same state, are let run ahead, each with its own push, and are then put back.
+        Other arguments: see ``Stretch.changes``. All lanes advance under the unchanged commands. At the steps
+        of the next tests they all have the same state; each lane then runs ahead with its own test force, and
+        its state is restored.
         """
         _restore(self._start)
         lanes, end, now = len(self._force), len(commands), 0
         forces = np.zeros((len(pushes), self._force.shape[1]))
-        reach = []  # of each push, samples that it is followed over
+        reach = []  # for each test force, the range of samples over which its response is followed
         for first in range(0, len(pushes), lanes):
             block = pushes[first : first + lanes]
             self._advance(
@@ -118,11 +119,11 @@ class _Group:
             )
             now, last = block[0][0], min(end, block[-1][0] + steps)
             here = [(array, array.copy()) for array in self._moving]
-            pushed = np.repeat(commands[None, now:last], lanes, axis=0)
+            changed = np.repeat(commands[None, now:last], lanes, axis=0)
             for lane, (step, place) in enumerate(block):
-                begun = pushed[lane, step - now : step - now + len(push), place]
-                begun += push[: len(begun)]
-            self._advance(pushed)
+                tested = changed[lane, step - now : step - now + len(push), place]
+                tested += push[: len(tested)]
+            self._advance(changed)
             forces[first : first + len(block)] = self._force[: len(block)]
             reach += [(step * self._steps, min(last, step + steps) * self._steps) for step, _ in block]
             _restore(here)
@@ -135,7 +136,7 @@ class _Group:
 
     @property
     def _force(self) -> Array:
-        """(lanes, samples): of the stretch, as last recorded (N), a view."""
+        """Contact force recorded last along the stretch (N), (lanes, samples), a view."""
         return self._samples.rows[:, self._first + 1 :, 0, Row.CONTACT_FORCE]
 
     def _advance(self, commands: Array) -> None:
@@ -147,7 +148,7 @@ class _Group:
 
 
 Saved = list[tuple[Any, Any]]
-"""Arrays of a state, each with a copy of what was in it."""
+"""Arrays of a state, each with a copy of its saved content."""
 
 
 def _restore(saved: Saved) -> None:

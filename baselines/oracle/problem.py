@@ -21,22 +21,22 @@ from .knots import Knots, without_limits
 from .lanes import Stretch
 
 LEAD = 2.0
-"""Time (s) before the evaluated spans from which on the actuator may push: their start has to be met."""
+"""Time (s) before the evaluated spans from which the actuator may act."""
 MEMORY = 3.0
-"""Time (s) after which the contact force has forgotten a push, as far as the search needs to know."""
+"""Time (s) after which a change of a knot hardly affects the contact force any more."""
 PUSH = 5.0
-"""Change of a knot (N) from which the response is taken: smaller ones see droppers go slack one by one."""
+"""Change of a knot (N) by which responses are measured: with less, each slackening dropper shows singly."""
 RESOLUTION = 0.01
-"""Of the filtered force in the least squares (s): it has little above 20 Hz."""
+"""Time (s) between samples of the filtered force in the least squares: it has little content above 20 Hz."""
 
 
 class Problem:
-    """One pass along one line, and what the contact force over its evaluated spans does under knots."""
+    """One pass along one line, and how the contact force over its evaluated spans depends on the knots."""
 
     def __init__(self, given: Mapping[str, Any], seed: int = 0, spans: SpanChoice = None) -> None:
-        """given: settings of a run, by name; a line's last spans give the end where none is given.
+        """given: settings of a run, by name; by default it goes on until its start has died out.
 
-        Raises InputError for what is not valid, or where the passive run ends early.
+        Raises InputError for settings that are not valid, or if the passive run ends early.
         """
         settings = far_enough(run_settings(given))
         if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
@@ -44,7 +44,7 @@ class Problem:
         self.given, self.seed, self.settings = dict(given), seed, settings
         self.passive = passive = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
         if passive.terminated:
-            raise InputError(f"There is no oracle where the passive run has no figures. {passive.ending}")
+            raise InputError(f"There is no oracle, because the passive run has no figures. {passive.ending}")
         covered = passive.spans(spans)
         inside = np.flatnonzero(passive.inside(spans))
         self.spans = covered
@@ -56,14 +56,14 @@ class Problem:
         start = 0.0 if covered is None else passive.time_at(passive.alignment.limits(covered)[0])
         self.begin = max(0, int((start - LEAD) / self.interval + 1e-9))
         self.count = int(inside[-1]) // self.steps + 1 - self.begin
-        """Knots of one place."""
+        """Number of knots of one actuator."""
         self._inside = inside - self.begin * self.steps  # samples evaluated, counted from the first knot's
         before = passive.contact_force[: self.begin * self.steps]
         self.every = max(1, round(RESOLUTION / passive.time_step))
         """Evaluated samples from one row of the least squares to the next."""
         settled = settled_at(passive.contact_force[0], passive.time_step)
         self._filter_state = low_pass_from(settled, before, passive.time_step)[1] if len(before) else settled
-        """Of EN 50317's filter, (sections, 2), where the first knot begins."""
+        """State of EN 50317's filter, (sections, 2), at the first knot."""
         trim = trim_of_pass(settings, seed, spans, passive_mean)
         self.knots = Knots(settings.actuator, passive.time_step, self.steps)
         self._true = Stretch(settings, trim, seed, self.begin, self.count)
@@ -78,8 +78,8 @@ class Problem:
     def response(self, knots: Array) -> Array:
         """Change of the filtered force per change of each knot (N/N), (rows, count * places).
 
-        Rows are evaluated samples ``RESOLUTION`` apart. By a push of ``PUSH`` on each knot of (count, places)
-        in the true plant, followed for ``MEMORY``, of an actuator without limits of force and rate.
+        Rows are evaluated samples ``RESOLUTION`` apart. Each knot, (count, places), is changed by ``PUSH`` in
+        the true plant, with an actuator without limits of force and rate, and followed for ``MEMORY``.
         """
         push = self.knots.free_commands(np.array([[PUSH], [0.0]]))[:, 0]
         followed = max(1, round(MEMORY / self.interval))
@@ -91,8 +91,8 @@ class Problem:
     def response_along(self, knots: Array, basis: Array) -> Array:
         """Change of the filtered force per combination of knots (N/N), (rows, directions).
 
-        basis: (knots of all places, directions). By one whole run for each, pushed by ``PUSH`` (rms)
-        along it: for a few directions that is far cheaper.
+        basis: (knots of all places, directions). One whole run per direction, with the knots changed by
+        ``PUSH`` (rms) along it: far cheaper for few directions.
         """
         sizes = PUSH / np.sqrt(np.mean(basis**2, axis=0))
         pushed = knots + (sizes * basis).T.reshape(-1, *knots.shape)

@@ -1,4 +1,4 @@
-"""Tables of oracles for people, and a picture of one. Matplotlib is imported late: it is slow to import."""
+"""Tables of oracles, and a picture of one. Matplotlib is imported late: it is slow to import."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LEGEND = (
 
 
 def title(oracle: Oracle) -> str:
-    """Which pass it is."""
+    """Title of a pass: pantograph, line, speed, spans and seed."""
     problem = oracle.problem
     return (
         f"{problem.passive.pantograph} on {problem.passive.catenary} at {problem.passive.speed_kmh:g} km/h, "
@@ -37,7 +37,7 @@ def title(oracle: Oracle) -> str:
 
 
 def convergence(oracle: Oracle) -> Table:
-    """Every iteration of every search of one pass."""
+    """Table of every iteration of every search of one pass."""
     rows, ends, passive = [], [], oracle.problem.figures
     for search in oracle.searches:
         rows += [(search.start, *_numbers(each, passive.std)) for each in search.iterations]
@@ -58,7 +58,7 @@ def _numbers(iteration: Iteration, passive_std: float) -> tuple[str, ...]:
 
 
 def summary(oracles: Sequence[Oracle]) -> Table:
-    """One row for each pass; of several starts the spread of what they reach."""
+    """Table with a row per pass; for several starts, with the spread of the σ that they reach."""
     rows = []
     for each in oracles:
         passive, figures = each.problem.figures, each.figures
@@ -89,7 +89,7 @@ def summary(oracles: Sequence[Oracle]) -> Table:
 
 
 def stored_table(data: Mapping[str, Any]) -> Table:
-    """What a file of ``stored.save`` holds, one row for each cell."""
+    """Table of stored oracles, data of ``stored.load``, with a row per cell."""
     rows = []
     for cell in data["cells"]:
         passes, actuator = cell["passes"], actuator_settings(cell["actuator"])
@@ -123,7 +123,7 @@ def stored_table(data: Mapping[str, Any]) -> Table:
 
 
 def plot(oracle: Oracle) -> Figure:
-    """Contact force and actuator force along the evaluated spans, and σ by iteration."""
+    """Picture of contact force and actuator force along the evaluated spans, and of σ by iteration."""
     from matplotlib.figure import Figure
 
     problem, run = oracle.problem, oracle.run

@@ -1,4 +1,4 @@
-"""The oracle of one pass: searches from several starts, and the best one's commands, replayed."""
+"""Oracle of one pass: searches from several starts; the commands of the best one are replayed."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ from .problem import Problem
 from .solver import Descent, Progress, descend
 
 STARTS = ("zero", "periodic", "random")
-"""No force; the best of what repeats from span to span, itself searched for; noise."""
+"""Starts of a search: zero force; the best force that repeats from span to span; noise."""
 HARMONICS = 14
-"""Of the span in what repeats."""
+"""Number of harmonics of the span in a force that repeats."""
 PERIODIC_ITERATIONS = 15
 RANDOM_FORCE, RANDOM_TIME = 20.0, 0.05
 """Rms of the noise (N), and the time over which it is smoothed (s)."""
 HOP_FORCE = 5.0
-"""Rms of the noise (N) by which the best knots are shaken for a hop."""
+"""Rms of the noise (N) that is added to the best knots for a hop."""
 DECIMALS = 2
-"""Of the commands (N) that are replayed and kept."""
+"""Decimals of the commands (N) that are replayed and stored."""
 METHOD = 2
-"""Version of the search: one more wherever other commands come of it, so that nothing older is kept."""
+"""Version of the search; raised by changes that give other commands, so that older results are redone."""
 MEAN_TOLERANCE = 1e-3
 """Maximum difference of the mean force from the passive run's, as a share of it."""
 
 
 @dataclass(frozen=True)
 class Oracle:
-    """What was found for one pass."""
+    """Outcome of the searches for one pass."""
 
     problem: Problem
-    searches: tuple[Descent, ...]  # in the order of the starts; that for the periodic start stands before it
-    commands: Array  # (count, places): of the best, from step ``problem.begin`` on (N)
-    run: Trajectory  # the whole pass as ``simulate`` has it under these commands
-    figures: Figures  # of it over the evaluated spans
-    forces: tuple[Array, Array]  # passive and with the commands, filtered in place (N), of the whole pass
+    searches: tuple[Descent, ...]  # by start; before the periodic one stands the search for its start
+    commands: Array  # (count, places): of the best search, from step ``problem.begin`` on (N)
+    run: Trajectory  # the whole pass under these commands, from ``simulate``
+    figures: Figures  # of the run over the evaluated spans
+    forces: tuple[Array, Array]  # passive and controlled contact force of the whole pass, without delay (N)
 
     @property
     def best(self) -> Descent:
-        """The search whose commands these are."""
+        """The search that reached the minimum σ."""
         return min(self.searches, key=_std)
 
     @property
     def change(self) -> float:
-        """Of σ against the passive run, as a share of it."""
+        """Relative change of σ from the passive run."""
         return self.figures.std / self.problem.figures.std - 1.0
 
 
@@ -63,12 +63,12 @@ def find(
     neighbour: Oracle | None = None,
     hops: int = 0,
 ) -> Oracle:
-    """The best of searches from starts, each one of ``STARTS``. progress: as of ``descend``.
+    """Search from each of the starts (see ``STARTS``) and return the best. progress: see ``descend``.
 
-    hops: so often the best knots so far are shaken and searched from anew (basin hopping: Wales and Doye,
-    J. Phys. Chem. A 101 (1997) 5111): droppers that slacken and tighten leave many shallow optima.
-    neighbour: of the same cell under another seed, from whose knots the only search then starts: lines of one
-    condition differ little. Raises InputError where the pass that was found ends early or has another mean
+    hops: number of further searches, each from the best knots so far plus noise (basin hopping: Wales and
+    Doye, J. Phys. Chem. A 101 (1997) 5111): droppers that slacken and tighten leave many shallow optima.
+    neighbour: oracle of the same cell under another seed; the only search then starts from its knots, since
+    lines of one condition differ little. Raises InputError if the pass ends early or has a different mean
     force.
     """
     if neighbour is None:
@@ -87,8 +87,8 @@ def find(
     figures, mean = run.summary(problem.chosen), problem.figures.mean
     if abs(figures.mean - mean) > MEAN_TOLERANCE * mean:
         raise InputError(
-            f"The oracle's mean force is {figures.mean:.2f} N, not {mean:.2f} N as that of the passive run; "
-            "search from other starts."
+            f"The oracle's mean force is {figures.mean:.2f} N, but the passive run's is {mean:.2f} N; search "
+            "from other starts."
         )
     passive = problem.passive
     forces = (
@@ -103,7 +103,7 @@ def _std(search: Descent) -> float:
 
 
 def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterator[Descent]:
-    """The search from a start, and before it the one for that start."""
+    """The search from a start, preceded by the search for that start if it has one."""
     knots: Array = np.zeros((problem.count, problem.places))
     if start == "periodic":
         repeated = descend(
@@ -124,9 +124,9 @@ def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterat
 
 
 def span_periodic(problem: Problem) -> Array:
-    """Forces that repeat from span to span, and steady ones, (knots of all places, directions).
+    """Basis of forces that repeat from span to span, constants included, (knots of all places, directions).
 
-    Sines and cosines of ``HARMONICS`` of the span at the ends of the control intervals.
+    Sines and cosines of the span's first ``HARMONICS`` harmonics at the ends of the control intervals.
     """
     passive = problem.passive
     time = (problem.begin + 1.0 + np.arange(problem.count)) * problem.interval
@@ -138,7 +138,7 @@ def span_periodic(problem: Problem) -> Array:
 
 
 def noise(problem: Problem, force: float = RANDOM_FORCE, draw: int = 0) -> Array:
-    """Smooth noise of so much force (rms, N), (count, places) (N), the same for the same pass and draw."""
+    """Smooth noise (N), (count, places), with this rms force (N); the same for the same pass and draw."""
     length = max(1, round(RANDOM_TIME / problem.interval))
     white = np.random.default_rng([problem.seed, draw]).standard_normal(
         (problem.count + length, problem.places)

@@ -20,7 +20,7 @@ from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from .search import STARTS
 
 MOST_HOPS = 1000
-"""Each takes about as long as the first search."""
+"""Maximum number of hops; each takes about as long as the first search."""
 _Span = Annotated[int, Between(1, MOST_SPANS)]
 Start = Literal[STARTS]  # type: ignore[valid-type]
 _Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(actuator_settings)]]
@@ -42,7 +42,7 @@ class OracleCell(Settings):
 
 
 class OracleSettings(Settings):
-    """Cells, and what is the same in all of them."""
+    """Cells, and the settings common to all of them."""
 
     cells: tuple[OracleCell, ...] = Field(
         (OracleCell(),), min_length=1, description="lines, actuators and speeds"
@@ -56,7 +56,7 @@ class OracleSettings(Settings):
         0,
         ge=0,
         le=MOST_HOPS,
-        description="searches that follow from the best so far, shaken: more find steadier forces",
+        description="further searches, each from the best result plus noise; more find steadier forces",
     )
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
@@ -66,13 +66,13 @@ class OracleSettings(Settings):
     )
 
     def runs(self) -> Iterator[dict[str, Any]]:
-        """Settings of the run of each cell at each speed, by name."""
+        """Settings of a run, by name, for each cell at each speed."""
         for cell in self.cells:
             for speed in cell.speeds_kmh:
                 yield self.given(cell, speed)
 
     def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
-        """Settings of the run of a cell at a speed (km/h), by name."""
+        """Settings of a run, by name, for a cell at a speed (km/h)."""
         return {
             "catenary": cell.catenary,
             "pantograph": cell.pantograph,
@@ -86,9 +86,9 @@ class OracleSettings(Settings):
 def oracle_settings(
     source: str | Path | None, changes: Mapping[str, Any], cell: Mapping[str, Any]
 ) -> OracleSettings:
-    """Settings of a TOML file, its path or a name of ``configs/``, or the defaults, with changes.
+    """Settings from a TOML file, given by its path or a name of ``configs/``, or the defaults, with changes.
 
-    cell: where it has anything, the only cell. Raises InputError for what is not valid.
+    cell: if not empty, the only cell. Raises InputError for settings that are not valid.
     """
     table = {} if source is None else read_toml(find(source, "oracle"))
     if cell:

@@ -23,33 +23,33 @@ from .knots import Limits
 from .problem import Problem
 
 SHARES = (1.0, 0.6, 0.3, 0.1)
-"""Of a step that are tried, all at once."""
+"""Shares of a step that are tried, all at once."""
 DAMPING = 0.1
-"""Weight of the step's own size at first, over the mean square of the response to one knot."""
+"""Initial weight of the step's own size, relative to the mean square of the response to one knot."""
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
-"""Of the last one, that are tried in each iteration: what the model says of large steps is not so."""
+"""Factors on the last damping, tried in each iteration: for large steps the linear model is wrong."""
 MEAN_TOLERANCE = 5e-4
 """Maximum difference of the mean force from the passive run's at the end of a search, as a share of it."""
 MEAN_WEIGHT = 2.0
-"""Of a wrong mean force (N) in what may not grow; σ gains a few tenths of a newton by a newton of mean."""
+"""Weight of the mean's error (N) in the merit; a lower mean by 1 N lowers σ by a few tenths."""
 MEAN_STIFFNESS = 1e3
-"""Weight of the squared error of the mean against σ squared in a step: it leaves hundredths of a newton."""
+"""Weight of the mean's squared error, relative to σ squared; hundredths of a newton remain."""
 WORTH, ENOUGH = 2e-2, 5e-4
-"""Relative gains of an iteration: below the first the response is taken anew, with a new one and below the
-second the search ends."""
+"""Relative gains of an iteration: below the first the response is measured anew; if it was new, the search
+ends below the second."""
 MOST_ITERATIONS = 20
 OSQP = {"verbose": False, "eps_abs": 1e-4, "eps_rel": 1e-4, "max_iter": 10_000}
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """Where the search stands."""
+    """State of the search after an iteration."""
 
     number: int
     std: float  # σ of the filtered force (N)
     mean: float  # N
     at_limits: float  # share of the knots at a limit of force or rate
-    step: float  # share of the last step that was taken
+    step: float  # share taken of the last step
 
 
 @dataclass(frozen=True)
@@ -78,11 +78,11 @@ def descend(
     iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
 ) -> Descent:
-    """Search from knots, (count, places) (N), which keep the limits; start: their name.
+    """Search from knots, (count, places) (N), that keep the limits; start: name of these knots.
 
-    basis: (knots of all places, directions), where only some combinations are looked at. progress: called
-    with each iteration. The merit, σ and a weighted error of the mean, falls from iteration to iteration.
-    Where the mean is not met after so many iterations, up to as many more follow.
+    basis: (knots of all places, directions), to search only these combinations. progress: called with each
+    iteration. The merit, σ plus a weighted error of the mean, falls from iteration to iteration. If the mean
+    is not met after ``iterations``, up to as many more follow.
     """
     limits = of_all_places(problem.knots.limits(problem.count), problem.places)
     force, damping = problem.forces(knots[None])[0], DAMPING
@@ -125,7 +125,7 @@ def _response(problem: Problem, knots: Array, basis: Array | None) -> Array:
 
 
 def merit(problem: Problem, force: Array) -> float:
-    """What may not grow (N): σ of a filtered force, (samples,), and the weighted error of its mean."""
+    """Merit (N), to minimise: σ of a filtered force, (samples,), plus the weighted error of its mean."""
     return float(force.std() + MEAN_WEIGHT * abs(force.mean() - problem.figures.mean))
 
 
@@ -136,7 +136,7 @@ def _mean_met(problem: Problem, force: Array) -> bool:
 
 
 class Model(NamedTuple):
-    """Sum of squares of the filtered force about its mean, and of a wrong mean, as a quadratic of a step."""
+    """Quadratic model of a step: squares of the filtered force about its mean, and of the mean's error."""
 
     square: Array  # (directions, directions)
     slope: Array  # (directions,)
@@ -145,7 +145,7 @@ class Model(NamedTuple):
 
     @classmethod
     def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
-        """About the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
+        """Model about the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
         rest = force[:: problem.every]
         mean = response.mean(axis=0)
         stiffness = MEAN_STIFFNESS * len(rest)
@@ -158,10 +158,10 @@ class Model(NamedTuple):
         return cls(square, slope, size, basis)
 
     def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
-        """Step along each direction (N) that is best within the limits; damping: as of ``DAMPING``.
+        """Best step along each direction (N) within the limits; damping: see ``DAMPING``.
 
-        knots: the present ones, flat (N). Without a basis a direction is a knot.
-        Raises InputError where OSQP finds none.
+        knots: the present knots, flat (N). Without a basis each direction is a knot.
+        Raises InputError if OSQP finds no step.
         """
         now = limits.matrix @ knots
         matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
@@ -177,7 +177,7 @@ class Model(NamedTuple):
 
 
 def corrected(response: Array, step: Array, change: Array) -> Array:
-    """The response, changed as little as can be to give the change, (rows,), of a step, (directions,) (N).
+    """The response with the smallest correction that gives the change, (rows,), of a step, (directions,) (N).
 
     Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
     """
@@ -185,7 +185,7 @@ def corrected(response: Array, step: Array, change: Array) -> Array:
 
 
 def quadratic_solver() -> Any:
-    """A solver of OSQP's. Raises InputError where OSQP, an extra, is not installed."""
+    """A solver of OSQP. Raises InputError if OSQP, an extra, is not installed."""
     try:
         import osqp
     except ImportError as error:
@@ -197,7 +197,7 @@ def quadratic_solver() -> Any:
 
 
 def of_all_places(limits: Limits, places: int) -> Limits:
-    """Limits of knots, (count, places), taken row by row, from those of one place."""
+    """Limits of the knots of all actuators, (count, places), flattened row by row, from those of one."""
     matrix = csc_matrix(kron(limits.matrix, eye_array(places)))
     return limits._replace(
         matrix=matrix, low=np.repeat(limits.low, places), high=np.repeat(limits.high, places)

@@ -1,4 +1,4 @@
-"""Oracles that are kept in a file, and how they are found again."""
+"""Oracles stored in a file, and how they are looked up."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .search import METHOD, Oracle
 from .settings import OracleSettings
 
 RESULTS = Path(__file__).parent / "results.json"
-"""Those that come with the project; ``command`` in it says how they were made."""
+"""File of the project's own oracles; its key ``command`` says how they were made."""
 MATTER = (
     "catenary",
     "pantograph",
@@ -39,17 +39,17 @@ MATTER = (
     "window",
     "precision",
 )
-"""Settings that an oracle depends on, with all values of line and pantograph; nothing that is sensed."""
+"""Settings that an oracle depends on, with all values of line and pantograph; sensors are not among them."""
 
 
 def fingerprint(given: Mapping[str, Any]) -> str:
-    """Hash of all that an oracle depends on but spans and seed, of settings of a run by name.
+    """Hash of everything that an oracle depends on except spans and seed, from settings of a run by name.
 
-    Values at their defaults are left out, so that a setting that is new and off changes nothing. Raises
+    Values at their defaults are left out, so that a new setting that is off changes nothing. Raises
     InputError for a value that is not valid.
     """
     settings = run_settings(given)
-    # Without defaults: a setting that is new in a later version, and off, changes no oracle; a kind does.
+    # Without defaults: a setting added later changes no oracle while it is off; a different kind does.
     plain = settings.model_dump(
         mode="json", include=set(MATTER), serialize_as_any=True, exclude_defaults=True
     )
@@ -60,17 +60,17 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
-def asked(settings: OracleSettings) -> list[dict[str, Any]]:
-    """What tells the cells that are asked for from others, as plain data, in their order.
+def requests(settings: OracleSettings) -> list[dict[str, Any]]:
+    """Identities of the requested cells, in order, as plain data.
 
-    Equal is what would be searched for in the same way: settings, spans, seeds, starts, hops, ``METHOD``.
+    Cells with the same identity have the same settings, spans, seeds, starts, hops and ``METHOD``.
     """
     table = settings.model_dump(mode="json", include={"spans", "seeds", "starts", "hops"})
     return [{"method": METHOD, **table, "fingerprint": fingerprint(given)} for given in settings.runs()]
 
 
-def cell(asked: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
-    """A cell as plain data: its passes under all seeds; asked: its entry of ``asked``."""
+def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
+    """A cell as plain data, with its passes under all seeds; request: its entry of ``requests``."""
     first = passes[0].problem
     settings = first.settings
     table: dict[str, Any] = finite(
@@ -83,7 +83,7 @@ def cell(asked: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
             "control_interval": settings.control_interval,
             "spans": first.spans,
             "ratio": float(np.mean([each.figures.std / each.problem.figures.std for each in passes])),
-            "asked": dict(asked),
+            "asked": dict(request),
             "passes": [_pass(each) for each in passes],
         }
     )
@@ -91,12 +91,12 @@ def cell(asked: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
 
 
 def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
-    """Cells of ``cell`` with the command that found them (its text), as they stand in a file."""
+    """Content of a file: cells made by ``cell``, and the text of the command that found them."""
     return {"version": __version__, "command": command, "cells": list(cells)}
 
 
 def as_text(data: Mapping[str, Any]) -> str:
-    """What a file holds: data of ``as_data`` with its checksum, a line for each cell and each pass."""
+    """Text of a file: data of ``as_data`` with a checksum, one line per cell and per pass."""
     text = json.dumps(with_checksum(data), separators=(",", ":"))
     return text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
 
@@ -124,7 +124,7 @@ def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> 
 
 
 def read(path: str | Path) -> dict[str, Any]:
-    """What a file of ``save`` holds. Raises InputError for another file, or one that is damaged."""
+    """Read a file written by ``save``. Raises InputError for another file, or a damaged one."""
     data = read_checked(path)
     try:
         [one["fingerprint"] for one in (each["asked"] for each in data["cells"])]
@@ -137,18 +137,18 @@ def read(path: str | Path) -> dict[str, Any]:
 
 @cache
 def load(path: Path = RESULTS) -> dict[str, Any]:
-    """What a file of ``save`` holds, read once."""
+    """Read a file written by ``save``, once per process."""
     return read(path)
 
 
 def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int], path: Path = RESULTS) -> float | None:
     """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
 
-    None where there is none of exactly this line, pantograph, speed, actuator, condition of the line, control
-    interval and computation over exactly these spans; what is sensed does not matter.
+    None if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
+    control interval and computation over exactly these spans; sensors do not matter.
     """
-    wanted = fingerprint(given)
+    sought = fingerprint(given)
     for one in load(path)["cells"]:
-        if one["asked"]["fingerprint"] == wanted and tuple(one["spans"]) == spans:
+        if one["asked"]["fingerprint"] == sought and tuple(one["spans"]) == spans:
             return float(one["ratio"])
     return None

@@ -1,1 +1,1 @@
-"""Reference policies, one a file."""
+"""Reference policies, one per file."""

@@ -1,4 +1,4 @@
-"""Fitted linear feedback beside what is learnt on the run of what repeats with the span."""
+"""Fitted linear feedback with learning, on the run, of the disturbance that repeats with the span."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .span_learner import Pace
 from .span_place import PLACES
 
 OWN = COUNT + len(Pace._fields)
-"""Gains of feedback and learning, the last ones."""
+"""Number of gains of feedback and learning; they stand last."""
 
 
 class Adaptive(Repetitive):
     """``Repetitive`` with the linear feedback of ``FittedFeedback``, the gains of both fitted together.
 
-    The feedback changes how the contact force answers to what is learnt: G_k is that of the closed loop, by
-    the model. Feedback is against what differs from span to span, learning against what does not.
+    The feedback changes how the contact force responds to the learnt force: G_k is the response of the closed
+    loop, from the model. Feedback reduces what differs from span to span, learning what repeats.
 
     It needs to know what ``Repetitive`` needs, and gains for line, pantograph and speed; not the line's
-    stiffness along the span. ``place="counted"`` goes without a sensor of the place, as there, with
-    the same gains.
+    stiffness along the span. ``place="counted"`` needs no sensor of the place, as there, and uses the same
+    gains.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {**FEEDBACK_GAINS, **Repetitive.TUNED}
@@ -45,7 +45,7 @@ class Adaptive(Repetitive):
         super().__init__(gains, delay, lag, place)
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes."""
+        """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
         self._feedback = LinearFeedback(self._of_feedback, context.control_interval, lanes)
 
@@ -56,7 +56,7 @@ class Adaptive(Repetitive):
         return force
 
     def answers(self, model: LineModel, frequencies: Array) -> NDArray[np.complex128]:
-        """The contact force's answers to what is learnt (N/N), complex, (n,), at frequencies (Hz)."""
+        """Responses of the contact force to the learnt force (N/N), complex, (n,), at frequencies (Hz)."""
         interval = self.context.control_interval
         turns = np.exp(2j * np.pi * frequencies * interval)
         opened = model.sampled(interval).response(turns)
@@ -64,7 +64,7 @@ class Adaptive(Repetitive):
         return np.asarray(opened[0] / (1 - loop_gain(self._of_feedback, signals, turns)))
 
     def whole(self, observations: Observations, learnt: Array) -> Array:
-        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        """Force (N) of each lane, (lanes,), before the washout: the learnt force plus the feedback."""
         return self._feedback(np.stack([self.read(observations, name) for name in SIGNALS]), learnt)
 
     @property

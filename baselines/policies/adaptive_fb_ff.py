@@ -1,4 +1,4 @@
-"""Fitted feed-forward and feedback, and learning on the run that goes on from there."""
+"""Fitted feed-forward and feedback, with learning on the run."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .periodic import HARMONICS, LEAD, SERIES_GAINS, series
 
 
 class AdaptiveFeedforward(Adaptive):
-    """``Adaptive`` that begins with a fitted series of the span, as ``FittedFeedback`` has it.
+    """``Adaptive`` with the fitted Fourier series of the span of ``FittedFeedback``.
 
-    What it learns on the run is added to the series: it is for a line that is known as designed, and built,
-    worn or ridden otherwise. Gains are to be fitted on such lines; on lines that are as designed there is
-    nothing to learn, and learning costs.
+    What it learns on the run is added to the series: it is for a line whose design is known, but that was
+    built differently, is worn or is used differently. Fit its gains on such lines; on lines as designed there
+    is nothing to learn, and learning makes the force worse.
 
     It needs to know what ``FittedFeedback`` and ``Repetitive`` need; sensors must measure the place.
     """
@@ -31,6 +31,6 @@ class AdaptiveFeedforward(Adaptive):
         super().__init__(gains, delay, lag)
 
     def whole(self, observations: Observations, learnt: Array) -> Array:
-        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        """Force (N) of each lane, (lanes,), before the washout: series, learnt force and feedback."""
         feedforward = series(self.span_angle(observations, LEAD)) @ self.gains[: 2 * HARMONICS]
         return super().whole(observations, learnt + feedforward)

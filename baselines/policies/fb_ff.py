@@ -33,7 +33,7 @@ class FeedbackFeedforward(ForceLaw):
     is not in step with the spans, and depends on the unit of v, which the paper does not give.
 
     The paper calls the control force positive where the contact force is above F_N, and draws no axes.
-    We read A sin(...) as a lift; read as a push down it would be the same with theta + pi. With our
+    We read A sin(...) as a lift; read as a downward force it would be the same with theta + pi. With our
     reading, the minimum of CF lies between theta = -pi/6 and pi/6 under `en50318-2002`, and under
     `shinkansen-simple` at 350 and 400 km/h; at 250 and 300 km/h it lies near -pi/2 there, and pi/6 makes
     CF worse: `panto benchmark fb+ff:theta=-1.57 fb+ff:theta=0 fb+ff --config configs/benchmark.toml`.
@@ -107,7 +107,7 @@ class FeedbackFeedforward(ForceLaw):
         return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
-        """Distance (m) from the support behind the start of the run, were all spans of their mean length."""
+        """Distance (m) from the support behind the start of the run, as if all spans had the mean length."""
         sine = self.read(observation, "sine of span position")
         cosine = self.read(observation, "cosine of span position")
         if sine**2 + cosine**2 < 0.5:

@@ -23,7 +23,7 @@ class FittedFeedback(TunableLaw):
     spring from the frame to the ground would otherwise let it do.
 
     It needs to know what ``Periodic`` needs, and reads contact force, displacements and velocities of head
-    and frame. Its gains know delays of actuator and sensors that they were fitted with.
+    and frame. Its gains hold for the delays of actuator and sensors that they were fitted with.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {**SERIES_GAINS, **FEEDBACK_GAINS}
@@ -35,7 +35,7 @@ class FittedFeedback(TunableLaw):
         super().__init__(gains)
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes."""
+        """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
         self._feedback = LinearFeedback(self.gains[2 * HARMONICS :], context.control_interval, lanes)
 

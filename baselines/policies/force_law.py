@@ -1,4 +1,4 @@
-"""What force controllers have in common: they read entries by name and return a force in newtons."""
+"""Base of force controllers: they read entries of the observation by name and return a force in newtons."""
 
 from __future__ import annotations
 

@@ -23,11 +23,11 @@ from panto_env.plant.state import Place
 Source = str | Sequence[float]
 GAINS_FOLDER = FOLDER / "policies"
 REACH = 12.5
-"""How far (km/h) beyond the lowest and the highest tuned speed gains are still used: half a usual step."""
+"""Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
 
 
 class Tuning(Settings):
-    """Gains for one line and pantograph over speed, and what they came from."""
+    """Gains for one line and pantograph over speed, and how they were made."""
 
     catenary: str
     pantograph: str
@@ -42,8 +42,10 @@ class Tuning(Settings):
     line_condition: str
     seeds: tuple[int, ...] = Field(description="of the training's lines and noise")
     passes: int = Field(description="simulated passes that the tuning took")
-    std_change: tuple[float, ...] = Field(description="of sigma to passive on selection seeds, by speed (-)")
-    mean_change: tuple[float, ...] = Field(description="of the mean force, likewise (-)")
+    std_change: tuple[float, ...] = Field(
+        description="relative change of sigma from passive on selection seeds, by speed (-)"
+    )
+    mean_change: tuple[float, ...] = Field(description="relative change of the mean force, likewise (-)")
 
     @model_validator(mode="after")
     def _fit(self) -> Self:
@@ -62,7 +64,7 @@ class GainFile(Settings):
 
 
 def gain_file(source: str | Path) -> Path:
-    """The file of a path, or of a name among those that come with the project."""
+    """Path of a file of gains, given by its path or by the name of one that comes with the project."""
     path = Path(source)
     return path if path.suffix == ".toml" else GAINS_FOLDER / f"{source}.toml"
 
@@ -71,20 +73,20 @@ def load_gains(path: Path) -> GainFile:
     """Read a file of gains. Raises InputError, naming the file, where it cannot be read or is not valid."""
     if not os.path.isfile(path):
         raise InputError(
-            f"There are no gains in {path}: make them with `panto tune`, or give them by the parameter gains."
+            f"There is no file of gains {path}; make it with `panto tune`, or give the parameter gains."
         )
     return _load(path, path.stat().st_mtime_ns)
 
 
 def place_of(channels: Sequence[int]) -> str:
-    """Where an actuator acts, in a word."""
+    """Place where the actuators act: frame, head or both."""
     return "both" if len(channels) > 1 else Place(channels[0]).name.lower()
 
 
 def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
-    """Gains for an episode, (gains,): those given, or those stored, between two speeds linear.
+    """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
 
-    Raises InputError where there are none for line, pantograph, place of the actuator, and speed.
+    Raises InputError if none are stored for line, pantograph, place of the actuator and speed.
     """
     if not isinstance(source, str):
         if len(source) != len(names):

@@ -18,13 +18,13 @@ from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
 CORNER = 30.0
 """rad/s: up to this the height of the wire is expected to vary."""
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
-"""Of ``OUTPUTS``, the model's error included (N, m, m/s)."""
+"""Noise of the readings ``OUTPUTS``, including the model's error (N, m, m/s)."""
 HEIGHT = 1e-3
 """m: unit of the height of the wire."""
 WIDTH = 0.7
 """Damping of the weight on the contact force: a band of about its frequency to either side."""
 NEAR = 1.1
-"""The bound used, over the minimum one: a controller at the minimum bound is badly conditioned."""
+"""Ratio of the bound used to the minimum one: a controller at the minimum bound is badly conditioned."""
 AVERAGED = 2.0
 """Time constant (s) of the slow averages that readings are counted from."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
@@ -35,12 +35,12 @@ factor is then halved."""
 class HInfinity(TunableLaw):
     """Central H-infinity controller of the pantograph under the mean line.
 
-    What comes in is the height of the wire, low-passed, and noise on each reading; what is to be small is the
-    contact force through a band-pass weight, W_S = performance 2 zeta w s / (s^2 + 2 zeta w s + w^2), and the
-    command. The controller makes the maximum gain between them, over all frequencies, at most 1.1 times the
-    minimum possible (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The
-    band leaves the mean force out. The delay is a first-order Pade term, half a control interval for the hold
-    included; the controller is sampled by the bilinear rule.
+    Disturbances are the low-passed height of the wire and noise on each reading. The outputs to keep small
+    are the contact force, weighted by the band-pass performance 2 zeta w s / (s^2 + 2 zeta w s + w^2), and
+    the command. The maximum gain from disturbances to outputs over all frequencies is within 1.1 times its
+    minimum (Doyle, Glover, Khargonekar and Francis, IEEE Trans. Autom. Control 34:831, 1989). The band leaves
+    out the mean force. The delay, plus half a control interval for the hold, is a first-order Pade term; the
+    controller is sampled by the bilinear rule.
 
     It needs to know the pantograph, tension and mass of the wires, and the delays; not the place within the
     span.
@@ -60,7 +60,7 @@ class HInfinity(TunableLaw):
         self._delays = delay, lag
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes. Raises InputError where no controller keeps a bound."""
+        """Prepare for episodes in these lanes. Raises InputError if no controller keeps a bound."""
         from scipy.signal import cont2discrete
 
         super().begin(context, lanes)
@@ -87,9 +87,9 @@ class HInfinity(TunableLaw):
 
 
 class Weighted(NamedTuple):
-    """x' = a x + b1 w + b2 u; the first of what is to be small is c1 x, the second u; readings c2 x + noise.
+    """Weighted model: x' = a x + b1 w + b2 u with outputs c1 x and u to keep small, readings c2 x + noise.
 
-    Noise and command are counted in their weights, so that both have the weight 1.
+    Noise and command are scaled by their weights, so that both have the weight 1.
     """
 
     a: Array  # (states, states)
@@ -145,7 +145,7 @@ def minimum_bound(plant: Weighted) -> tuple[float, Controller]:
 
 
 def central(plant: Weighted, bound: float) -> Controller | None:
-    """The central controller that keeps a bound (-); None where there is none."""
+    """The central controller that keeps a bound (-); None if there is none."""
     a, b1, b2, c1, c2 = plant
     x = _stabilising(a, b1, b2, c1, bound)
     y = _stabilising(a.T, c1.T, c2.T, b1.T, bound)

@@ -1,4 +1,4 @@
-"""What controllers have in common that give the force of many lanes at once: a tuner runs them in batches."""
+"""Bases of controllers that return the forces of many lanes at once: a tuner runs them in batches."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LanesLaw(ABC):
     """
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes."""
+        """Prepare for episodes in this number of lanes."""
         self.context, self.lanes = context, lanes
         self._places = {entry.name: place for place, entry in enumerate(context.layout.entries)}
 
@@ -47,7 +47,7 @@ class LanesLaw(ABC):
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
 
     def read(self, observations: Observations, name: str) -> Array:
-        """Physical values of an entry, (lanes,). Raises InputError where there is none of this name."""
+        """Physical values of an entry, (lanes,). Raises InputError if no entry has this name."""
         layout = self.context.layout
         place = self._places.get(name)
         if place is None or layout.entries[place].slope:  # another kind, normalised, or an error
@@ -56,9 +56,9 @@ class LanesLaw(ABC):
         return entry.centre + observations[:, place].astype(float) * entry.scale
 
     def span_angle(self, observations: Observations, lead: float = 0.0) -> Array:
-        """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: that many seconds on.
+        """Angle of the place within the span, (lanes,), rad, 0 at a support; lead: time ahead (s).
 
-        Raises InputError where the observation does not hold it: both sine and cosine are 0.
+        Raises InputError if the observation does not hold it: both sine and cosine are 0.
         """
         sine = self.read(observations, "sine of span position")
         cosine = self.read(observations, "cosine of span position")
@@ -80,7 +80,7 @@ class Gain(NamedTuple):
 
 
 class TunableLaw(LanesLaw):
-    """A law with a vector of gains, which is given, or found for line, pantograph and speed in a file."""
+    """A law with a vector of gains, either given or read from a file for line, pantograph and speed."""
 
     TUNED: ClassVar[Mapping[str, Gain]]
     """The gains by name, in order."""
@@ -96,13 +96,13 @@ class TunableLaw(LanesLaw):
         self._source = gains
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes. Raises InputError where there are no gains for them."""
+        """Prepare for episodes in this number of lanes. Raises InputError if there are no gains for them."""
         super().begin(context, lanes)
         self.gains = find_gains(self._source, list(self.TUNED), context)
 
 
 class FromAverage:
-    """Readings counted from slow averages, which begin at the first ones: no constant part is left."""
+    """Deviations of readings from their slow averages, which start at the first readings."""
 
     def __init__(self, interval: float, averaged: float) -> None:
         """interval: between readings (s); averaged: time constant of the averages (s)."""
@@ -110,7 +110,7 @@ class FromAverage:
         self._average: Array | None = None
 
     def __call__(self, readings: Array) -> Array:
-        """Deviations of readings, (..., lanes), which move the averages."""
+        """Deviations of readings, (..., lanes); the averages are updated."""
         if self._average is None:
             self._average = readings.copy()
         self._average += self._share * (readings - self._average)

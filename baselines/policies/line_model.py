@@ -1,11 +1,11 @@
-"""A pantograph under a line as it is in the mean, with its actuator, as a linear system of low order.
+"""A pantograph with its actuator under the mean line, as a linear system of low order.
 
-Under a string of tension T and mass mu per metre that a point force travels along, the point yields with the
-velocity F / (2 sqrt(T mu)) whatever the speed: waves carry the energy off, as a dashpot would. (From the
-string's equation in the moving frame: waves ahead and behind have the wave numbers omega / (c - v) and
-omega / (c + v), and the jump of the slopes they leave carries the force.) Below a few hertz the supports hold
-the wires: a spring beside the dashpot, the mean over the span of the static stiffness of a string between two
-supports, 6 T / s. Both wires are taken for one string.
+A point force F that travels along a string of tension T and mass mu per metre moves its contact point with
+the velocity F / (2 sqrt(T mu)) at any speed: waves carry energy away, as a dashpot does. (From the string's
+equation in the moving frame: waves ahead and behind have the wave numbers omega / (c - v) and
+omega / (c + v), and the jump of slope at the point balances the force.) Below a few hertz the supports hold
+the wires: this is a spring in parallel with the dashpot, the mean over the span of the static stiffness of a
+string between two supports, 6 T / s. Both wires are modelled as one string.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from panto_env.plant.pantograph.build import STRIP_STIFFNESS, matrices
 
 Array = NDArray[np.float64]
 DELAY, LAG = 0.010, 0.015
-"""Of actuator and sensors together, and of the actuator (s): those of the presets "realistic"."""
+"""Delay of actuator and sensors together, and lag of the actuator (s), from the presets "realistic"."""
 RATE = 2500.0
-"""N/s: limit of the actuator's rate, likewise."""
+"""Limit of the actuator's rate (N/s), likewise."""
 SHORTEST_LAG = 1e-3
-"""A lag below this (s) is taken for this: it matters to nobody at 100 Hz."""
+"""Minimum lag (s); a smaller one is replaced by it, which makes no difference at 100 Hz."""
 OUTPUTS = ("contact force", "head displacement", "frame displacement", "head velocity", "frame velocity")
-"""Of the model, in order (N, m, m/s): entries of the observation."""
+"""Outputs of the model, in order (N, m, m/s), named as the entries of the observation."""
 
 
 @dataclass(frozen=True)
 class MeanLine:
-    """What a line is to the contact point in the mean."""
+    """Mean line as felt at the contact point: a damper and a spring."""
 
     damper: float  # N s/m
     spring: float  # N/m
 
 
 def mean_line(context: Context) -> MeanLine:
-    """The line of an episode as its closed form has it. Raises InputError for a line without wires."""
+    """Mean line of an episode, from the closed form. Raises InputError for a line without wires."""
     line = context.catenary
     if not isinstance(line, FlexibleCatenaryData):
         raise InputError(
-            f"The line '{line.name}' has no wires with mass and tension, from which this policy makes its "
-            "model; take one of kind 'flexible', or another policy."
+            f"The line '{line.name}' has no wires with mass and tension, which this policy needs for its "
+            "model; choose a line of kind 'flexible', or another policy."
         )
     wires = line.contact_wire, line.messenger_wire
     tension, mass = sum(wire.tension for wire in wires), sum(wire.mass for wire in wires)
@@ -55,10 +55,10 @@ def mean_line(context: Context) -> MeanLine:
 
 @dataclass(frozen=True)
 class LineModel:
-    """x' = a x + b [actuator's command (N), height of the wire (m)], outputs = c x + d [the same].
+    """Linear model x' = a x + b u, outputs = c x + d u, with u = [command (N), height of the wire (m)].
 
-    The state: displacements and velocities of the masses, head first (m, m/s), uplift of the wire where it
-    is touched (m), the actuator's force (N). The command acts ``delay`` late, which a and b leave out.
+    State: displacements and velocities of the masses, head first (m, m/s), uplift of the wire at the contact
+    point (m), the actuator's force (N). The command acts after ``delay``, which is not in a and b.
     """
 
     a: Array  # (states, states)
@@ -68,19 +68,19 @@ class LineModel:
     delay: float  # s
 
     def response(self, frequency: Array) -> NDArray[np.complex128]:
-        """Contact force for a command (N/N), complex, (n,), at frequencies (Hz), the delay included."""
+        """Response of the contact force to a command (N/N), complex, (n,), at frequencies (Hz)."""
         s = 2j * np.pi * np.asarray(frequency, dtype=float)
         eye = np.eye(len(self.a))
         force = [self.c[0] @ np.linalg.solve(each * eye - self.a, self.b[:, 0]) for each in s]
         return np.asarray(np.array(force) * np.exp(-s * self.delay))
 
     def sampled(self, interval: float) -> Sampled:
-        """The model at a controller's interval (s), commands and heights held in between."""
+        """The model sampled at a controller's interval (s), with commands and heights held in between."""
         return Sampled(self, interval)
 
 
 class Sampled:
-    """A model in discrete time; the state gets the commands that are still on their way, the newest last."""
+    """A model in discrete time; its state also holds the commands within the delay, the newest last."""
 
     def __init__(self, model: LineModel, interval: float) -> None:
         whole = int(model.delay / interval + 1e-9)
@@ -91,7 +91,7 @@ class Sampled:
         self.a = np.zeros((size + late, size + late))
         self.a[:size, :size] = transition @ before
         self.b = np.zeros(size + late)
-        # Within a step the command changes once, where the delay is no whole number of steps.
+        # The command changes once within a step, unless the delay is a whole number of steps.
         for ago, gain in ((whole, new), (whole + 1, transition @ old)):
             if ago == 0:
                 self.b[:size] += gain
@@ -105,14 +105,14 @@ class Sampled:
         self.d_height = model.d[:, 1]
 
     def response(self, turns: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Outputs for a periodic command of 1 N, complex, (5, n); turns: of an interval, e^(i w T), (n,)."""
+        """Outputs for a periodic command of 1 N, complex, (5, n); turns: e^(i w T) of an interval, (n,)."""
         eye = np.eye(self.size)
         columns = [self.c @ np.linalg.solve(each * eye - self.a, self.b) for each in turns]
         return np.array(columns).T
 
     @cached_property
     def size(self) -> int:
-        """States."""
+        """Number of states."""
         return len(self.a)
 
 
@@ -147,7 +147,7 @@ def line_model(context: Context, line: MeanLine, delay: float = DELAY, lag: floa
 
 
 def _held(model: LineModel, time: float) -> tuple[Array, Array, Array]:
-    """Transition over a time (s), and what a command and a height held over it add."""
+    """Transition matrix over a time (s), and the effects of a command and of a height held over it."""
     from scipy.linalg import expm
 
     size = len(model.a)

@@ -22,7 +22,7 @@ COMMANDS = 2
 COMMAND_UNIT = 10.0
 """N, likewise."""
 AVERAGED = 1.0
-"""Time constant (s) of the slow average that each signal is counted from, some span's passing."""
+"""Time constant (s) of the slow average that is subtracted from each signal; some spans pass in it."""
 COUNT = HISTORY * len(SIGNALS) + COMMANDS
 """Number of gains."""
 FEEDBACK_GAINS = {
@@ -33,10 +33,10 @@ FEEDBACK_GAINS = {
 
 
 class LinearFeedback:
-    """sum over signals and steps of gain (y - slow average of y) + sum of gain u_past, in each lane.
+    """Feedback in each lane: sum over signals and steps of gain (y - slow average of y) + sum of gain u_past.
 
-    Counted from their slow averages, signals have no constant part: feedback cannot move the mean force,
-    which a spring from the frame to the ground would otherwise let it do.
+    Without their slow averages, signals have no constant part: feedback cannot move the mean force, which is
+    otherwise possible because a spring connects the frame to the ground.
     """
 
     def __init__(self, gains: Array, interval: float, lanes: int) -> None:
@@ -56,7 +56,7 @@ class LinearFeedback:
         return np.asarray(beside + feedback + self._of_commands @ (self._commands / COMMAND_UNIT))
 
     def remember(self, force: Array) -> None:
-        """Take note of what was commanded, (lanes,), N."""
+        """Store the commanded force (N), (lanes,)."""
         self._commands = np.concatenate([force[None], self._commands[:-1]])
 
 

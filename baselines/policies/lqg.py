@@ -1,4 +1,4 @@
-"""Linear-quadratic-Gaussian control: a Kalman filter and the best linear feedback on what it estimates."""
+"""Linear-quadratic-Gaussian control: a Kalman filter and optimal linear feedback on its estimates."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class LinearQuadraticGaussian(TunableLaw):
     """Kalman filter and linear-quadratic regulator of the pantograph under the mean line.
 
     Model (``line_model``): the pantograph, the actuator with its lag and delay, the wire as a spring and a
-    dashpot. What disturbs it is the height of the wire at the contact point: lightly damped oscillators at
-    the span's harmonics, and a height that wanders. The regulator minimises the mean of F^2 + effort u^2, the
+    dashpot. The disturbance is the height of the wire at the contact point: lightly damped oscillators at
+    the span's harmonics, and a random walk. The regulator minimises the mean of F^2 + effort u^2, the
     filter estimates all states from five readings; both are discrete Riccati equations (Kwakernaak and Sivan,
     Linear Optimal Control Systems, 1972, ch. 6). Through the oscillators the regulator also acts ahead on
     what the span repeats. Readings are counted from slow averages, and the integral of the command
@@ -65,7 +65,7 @@ class LinearQuadraticGaussian(TunableLaw):
         self._delays = delay, lag
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes: solve both Riccati equations."""
+        """Prepare for episodes in this number of lanes: solve both Riccati equations."""
         super().begin(context, lanes)
         effort, harmonics, wandering, damper, spring, motion = 10.0**self.gains
         line = mean_line(context)

@@ -65,7 +65,7 @@ class PredictiveControl(TunableLaw):
         self._delays, self._rate = (delay, lag), rate
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes: run the line as designed, and make the programs."""
+        """Prepare for episodes in this number of lanes: run the line as designed, and make the programs."""
         super().begin(context, lanes)
         effort, fading = 10.0 ** self.gains[0], 10.0 ** self.gains[2]
         self._believed, self._learning = self.gains[1], self.gains[3]

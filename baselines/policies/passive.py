@@ -9,7 +9,7 @@ from panto_env.control.context import Context
 
 
 class Passive:
-    """Actuators that stay at zero: what every other policy is compared with."""
+    """Actuators that stay at zero; every other policy is compared with this one."""
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""

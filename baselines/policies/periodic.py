@@ -11,10 +11,10 @@ from .gains import Source
 from .lanes_law import Array, Gain, Observations, TunableLaw
 
 HARMONICS = 14
-"""Of the span: the highest passes 60 m at 350 km/h with 23 Hz, about where the figures' filter ends."""
+"""Number of harmonics: the highest is 23 Hz for spans of 60 m at 350 km/h, just above the figures' filter."""
 LEAD = 0.03
-"""Time (s) by which the series looks ahead: about what actuator and sensors cost, so that its coefficients
-turn little between two tuned speeds. It is part of the coefficients' meaning, not a gain."""
+"""Time (s) by which the series looks ahead, about the delay of actuator and sensors: its coefficients then
+change little from one tuned speed to the next. It is part of the coefficients' meaning, not a gain."""
 SERIES_GAINS = {f"{kind}{k}": Gain(3.0) for kind in ("cosine", "sine") for k in range(1, HARMONICS + 1)}
 """Coefficients of a series (N), whose steps are well below the limits of an actuator."""
 
@@ -23,12 +23,12 @@ class Periodic(TunableLaw):
     """Force that is a Fourier series of the place within the span, without feedback.
 
     u(x) = sum over k = 1..14 of a_k cos(2 pi k x / s) + b_k sin(2 pi k x / s), with x the place within the
-    span s, as measured, plus the way that the train makes in the lead time. There is no constant term: the
-    static force sets the mean. The contact force that repeats with the span is most of sigma under a line
-    that is as designed, and its answer to u is nearly linear, so that Gauss-Newton finds the coefficients.
+    span s, as measured, plus the distance run in the lead time. There is no constant term: the static force
+    sets the mean. On a line as designed, the part of the contact force that repeats with the span makes up
+    most of sigma, and its response to u is nearly linear, so that Gauss-Newton finds the coefficients.
 
-    It needs to know: line and pantograph (it is fitted to them), the place within the span, the speed. It
-    helps nothing against what differs from span to span, and on another line it is not to be used.
+    It needs to know line and pantograph (it is fitted to them), the place within the span, and the speed. It
+    does nothing against what differs from span to span; do not use it on another line.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = SERIES_GAINS

@@ -1,6 +1,6 @@
-"""What a line as designed does to a pantograph: its passive force over the span, and its answer to commands.
+"""Contact force on a line as designed: the passive force along the span, and the response to commands.
 
-A policy that knows the design may compute both beforehand; it sees nothing of the line that it runs on.
+A policy that knows the design may compute both beforehand; it sees nothing of the actual line.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from panto_env.plant.state import Place
 
 Array = NDArray[np.float64]
 SETTLED = 9
-"""Spans after which the force repeats with the span, nearly."""
+"""Spans after which the force nearly repeats with the span."""
 CLEAR = 8
-"""Spans of the line beyond those run, so that its end is not felt."""
+"""Spans of the line beyond those run, so that its end has no effect."""
 PULSE = 20.0
-"""N: small beside the contact force, large beside rounding."""
+"""Test force (N): small beside the contact force, large beside rounding."""
 
 
 class Preview(NamedTuple):
-    """Of steps through a span, one control interval apart; the first one is ``start`` behind a support."""
+    """Preview at steps through a span, one control interval apart; the first is ``start`` past a support."""
 
     start: float  # m
     stride: float  # of a step (m)
@@ -40,7 +40,7 @@ class Preview(NamedTuple):
     response: Array  # (steps, length): contact force 1, 2, ... steps after a command of one step there (N/N)
 
     def step(self, position: Array) -> NDArray[np.int64]:
-        """The step nearest to positions behind a support (m), (lanes,)."""
+        """Index of the step nearest to each distance past a support (m), (lanes,)."""
         return np.rint((position - self.start) / self.stride).astype(np.int64) % len(self.passive)
 
 

@@ -1,4 +1,4 @@
-"""Control that learns on the run what repeats with the span, and withdraws where that does not help."""
+"""Control that learns on the run what repeats with the span, and backs off if that does not help."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .span_place import PLACES, SpanPlace
 from .washout import Washout, WashoutSettings
 
 WASHED = WashoutSettings(time_constant=2.0)
-"""Of the force, whose mean the actuator's limits would let drift."""
+"""Washout of the force: without it the actuator's limits would let the mean force drift."""
 
 
 class Repetitive(TunableLaw):
@@ -27,7 +27,7 @@ class Repetitive(TunableLaw):
     Its learning, which backs off where it does not help, is that of ``SpanLearner``: s dc_k/dx =
     - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k for the
     force Re sum_k c_k e^(ik phi), phi the angle of the place within the span (Bodson and Douglas, Automatica
-    33:2213, 1997). G_k, the answer of the contact force to a command, is that of the pantograph under the
+    33:2213, 1997). G_k, the response of the contact force to a command, is that of the pantograph under the
     mean line, delays included (``line_model``).
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
@@ -52,7 +52,7 @@ class Repetitive(TunableLaw):
         self._delays, self._place = (delay, lag), SpanPlace(place)
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes."""
+        """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
         model = line_model(context, mean_line(context), *self._delays)
         span_rate, interval = context.speed / context.alignment.mean_length, context.control_interval
@@ -76,9 +76,9 @@ class Repetitive(TunableLaw):
         return force
 
     def answers(self, model: LineModel, frequencies: Array) -> NDArray[np.complex128]:
-        """The contact force's answers to what is learnt (N/N), complex, (n,), at frequencies (Hz)."""
+        """Responses of the contact force to the learnt force (N/N), complex, (n,), at frequencies (Hz)."""
         return model.response(frequencies)
 
     def whole(self, observations: Observations, learnt: Array) -> Array:
-        """Force (N) of each lane, (lanes,), before the washout: what is learnt, and what stands beside it."""
+        """Force (N) of each lane, (lanes,), before the washout: the learnt force plus any other control."""
         return learnt

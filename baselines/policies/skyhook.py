@@ -14,9 +14,9 @@ class Skyhook(TunableLaw):
 
     u = - frame dz_f/dt - head dz_h/dt (Karnopp, Crosby and Harwood, J. Eng. Ind. 96:619, 1974). A force at
     the frame that opposes the frame's velocity only takes energy out; one that follows the head's may put
-    some in, so that its gain may have either sign. It takes no part in the mean force.
+    some in, so that its gain may have either sign. It does not change the mean force.
 
-    It needs to know nothing of the line but its gains, and reads two velocities.
+    It needs no knowledge of the line except its gains, and reads two velocities.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {"frame": Gain(20.0), "head": Gain(20.0)}

@@ -1,4 +1,4 @@
-"""What repeats with the span, learnt on the run, and withdrawn where that does not help."""
+"""Learning, on the run, of the force that cancels what repeats with the span."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from numpy.typing import NDArray
 from .lanes_law import Array
 
 HIGHEST = 16.0
-"""Hz: harmonics of the span up to this are learnt. Sigma counts up to 20 Hz."""
+"""Maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz."""
 LISTENING = 3.0
 """Spans without control at the start, of which the last two say what the passive sigma is about."""
 TOLERATED = 1.05
-"""Sigma of a span over that, from which on the control backs off."""
+"""Ratio of a span's sigma to the passive one above which the control backs off."""
 BACK_OFF, RECOVERY = 0.5, 1.05
-"""What is left of the learnt force, and of learning, after each span in which it backs off; by how much
-learning grows after any other, up to what it was."""
+"""Factor on the learnt force and on the speed of learning after a span in which the control backs off; factor
+by which learning recovers after any other span, up to its full speed."""
 OVER = 1.5
-"""Times the actuator's limit that the learnt force may peak at: a little is gained by cutting it."""
+"""Maximum peak of the learnt force, relative to the actuator's limit: clipping it gains a little."""
 PEAKS = 128
-"""Places of a span at which the learnt force is looked at for its peak."""
+"""Number of places of a span at which the peak of the learnt force is searched for."""
 
 
 class Pace(NamedTuple):
-    """How fast it is learnt."""
+    """Speed of learning and forgetting."""
 
     learning: float  # per span (-)
     forgetting: float  # per span (-)
-    response: float  # answer of the contact force below which learning slows down (N/N)
+    response: float  # response of the contact force below which learning slows down (N/N)
 
 
 PACE = Pace(0.65, 0.01, 0.5)
-"""The best of some on training seeds of four lines."""
+"""Best of several values on training seeds of four lines."""
 
 
 def harmonics(span_rate: float) -> Array:
-    """Numbers of the harmonics that are learnt, where so many spans pass per second."""
+    """Numbers of the harmonics that are learnt; span_rate: spans per second."""
     return np.arange(1.0, max(1, int(HIGHEST / span_rate)) + 1)
 
 
@@ -47,7 +47,7 @@ class SpanLearner:
     The force is u = Re sum_k c_k e^(ik phi), phi the angle of the place within the span, and
     s dc_k/dx = - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi)
                 - forgetting c_k,
-    where G_k is the contact force's answer to u at the k-th harmonic's frequency. Averaged over a span, this
+    where G_k is the response of the contact force to u at the k-th harmonic. Averaged over a span, this
     is c_k - learning E_k / G_k for an error E_k: where the phase of G_k is right within 90 degrees, the error
     falls, span by span; forgetting bounds what is learnt where it is not. (Bodson and Douglas, Automatica
     33:2213, 1997, for adaptive feed-forward cancellation; the same as repetitive control with a model's
@@ -67,8 +67,8 @@ class SpanLearner:
         limit: float,
         lanes: int,
     ) -> None:
-        """numbers: of the harmonics, (k,); answers: G_k, (k,); share: of a span that passes in a control
-        step; limit: of the actuator's force (N).
+        """numbers: of the harmonics, (k,); answers: G_k, (k,); share: spans per control step; limit: of the
+        actuator's force (N).
         """
         learning, forgetting, response = np.abs(np.array(pace))
         self._towards = share * learning * 2 * np.conj(answers) / (np.abs(answers) ** 2 + response**2)
@@ -82,7 +82,7 @@ class SpanLearner:
     def __call__(self, error: Array, own: Array, angle: Array) -> Array:
         """Force (N) of each lane, (lanes,), at these angles (rad).
 
-        error: of the contact force to its slow average (N); own: what of that control has made, by the model.
+        error: contact force minus its slow average (N); own: its part due to control, from the model.
         """
         turns = np.exp(1j * np.multiply.outer(angle, self._numbers))
         worse = self._ledger.add(error, error - own, self._share)
@@ -97,7 +97,7 @@ class SpanLearner:
         return np.asarray((self._learnt * turns).real.sum(axis=1))
 
     def _hold_within_limit(self) -> None:
-        """Scale down what has a higher peak than the actuator: else it would be learnt without end."""
+        """Scale down forces whose peak exceeds the actuator's: otherwise learning would never end."""
         limit = self._limit
         if (np.abs(self._learnt).sum(axis=1) > limit).any():
             peaks = np.abs((self._learnt @ self._around).real).max(axis=1)
@@ -105,7 +105,7 @@ class SpanLearner:
 
 
 class _Ledger:
-    """Sigma of each span as measured, and as the model says it would be without control."""
+    """Sigma of each span, as measured and, from the model, as it would be without control."""
 
     def __init__(self, lanes: int) -> None:
         self.spans = 0.0  # run so far
@@ -114,7 +114,7 @@ class _Ledger:
         self._first: list[Array] = []
 
     def add(self, error: Array, free: Array, share: float) -> NDArray[np.bool_] | None:
-        """Enter a control step; at the end of a span: which lanes, (lanes,), are worse for the control."""
+        """Add a control step; at the end of a span, return which lanes, (lanes,), the control makes worse."""
         self._sums += np.stack([error, error**2, free, free**2])
         self._count += 1
         before, self.spans = self.spans, self.spans + share

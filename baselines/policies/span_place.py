@@ -22,7 +22,7 @@ class SpanPlace:
         self._counts = place == "counted"
 
     def begin(self, lanes: int) -> None:
-        """Begin the count of episodes in so many lanes."""
+        """Begin to count for new episodes in this number of lanes."""
         self._counted = np.zeros(lanes)
 
     def angle(self, law: LanesLaw, observations: Observations) -> Array:

@@ -35,7 +35,7 @@ class TunedProportionalDerivative(TunableLaw):
         super().__init__(gains)
 
     def begin(self, context: Context, lanes: int) -> None:
-        """Prepare for episodes in so many lanes."""
+        """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
         self._last_error: Array | None = None
 

@@ -1,4 +1,4 @@
-"""What keeps a controller from moving the mean contact force."""
+"""A high-pass that keeps a controller from moving the mean contact force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .line_model import LAG, RATE
 
 
 class WashoutSettings(Settings):
-    """How slow an average is taken off, and what the actuator is taken to be."""
+    """Time constant of the average that is subtracted, and the assumed actuator."""
 
     time_constant: Positive = Field(1.0, description="of the average (s)")
     lag: NonNegative = Field(LAG, description="of the actuator (s)")
@@ -24,8 +24,8 @@ class WashoutSettings(Settings):
 class Washout:
     """A high-pass for a controller's force: y = u - a, with a' = f / time constant and a = 0 at first.
 
-    f is what the actuator makes of y, by its lag and its limits of force and rate. An actuator force with an
-    average moves the mean contact force, and little else does: without it, a controller cannot buy a smaller
+    f is the actuator's force for y, with its lag and its limits of force and rate. An actuator force with an
+    average moves the mean contact force, and little else does; without it, a controller cannot get a smaller
     sigma by a smaller mean force. (Flight control calls such a filter a washout.) That f, not u, has no
     average matters: limits that cut one side more than the other leave a mean. Where a span passes within a
     second and the time constant is one, the span's harmonics go through with 1 to 2 % and up to 10 degrees of
@@ -46,7 +46,7 @@ class Washout:
         self._average[which] = self._force[which] = 0.0
 
     def __call__(self, requested: NDArray[np.floating]) -> NDArray[np.float64]:
-        """What is left of forces (N), within the limit; it moves the averages."""
+        """Requested forces (N) minus their slow averages, within the limit; the averages are updated."""
         left: NDArray[np.float64] = np.clip(requested - self._average, -self._limit, self._limit)
         self._force += self._change(left - self._force)
         self._average += self._share * self._force

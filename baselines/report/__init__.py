@@ -1,1 +1,1 @@
-"""Pages of HTML from results that have been written to files."""
+"""HTML pages from results stored in files."""

@@ -1,4 +1,4 @@
-"""Where everything in a chart lies. Templates write it as SVG, so that nothing here is markup."""
+"""Layout of charts: coordinates of all that is drawn. The templates write it as SVG; no markup here."""
 
 from __future__ import annotations
 
@@ -9,42 +9,42 @@ from typing import NamedTuple
 
 WIDTH, HEIGHT = 420.0, 230.0
 LEFT, RIGHT, TOP, BOTTOM = 44.0, 8.0, 10.0, 38.0
-"""Of a chart and the margins about its axes, in units of its view box."""
+"""Size of a chart and margins around its axes, in units of its view box."""
 TICKS = 5
 LETTER, LINE = 6.0, 12.0
-"""About the width and height of a label's letters."""
+"""Approximate width and height of a letter of a label."""
 RADIUS, GAP = 5.0, 7.0
-"""Of a dot, and from its middle to its label."""
+"""Radius of a dot, and distance from its centre to its label."""
 
 
 class Tick(NamedTuple):
-    """A mark of an axis."""
+    """A tick of an axis."""
 
     at: float
     text: str
 
 
 class Curve(NamedTuple):
-    """One policy's line, as the points of a polyline."""
+    """One policy's curve, as the points of an SVG polyline."""
 
     policy: str
     points: str
 
 
 class Dot(NamedTuple):
-    """One policy's point, with the label beside it, "" where there is no room."""
+    """One policy's point, with the label beside it, "" if there is no room."""
 
     policy: str
     x: float
     y: float
     label: str
-    before: bool  # whether the label stands before the point, not behind
+    before: bool  # whether the label stands to the left of the point, not to the right
     hollow: bool  # disqualified
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A chart in units of its view box."""
+    """A chart; positions are in units of its view box."""
 
     title: str
     x_label: str
@@ -58,7 +58,7 @@ class Chart:
 
 
 class Scale(NamedTuple):
-    """From a quantity to a place along an axis."""
+    """Linear map from a quantity to a position along an axis."""
 
     lowest: float
     highest: float
@@ -66,13 +66,13 @@ class Scale(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
-        """The place of a value, in units of the view box."""
+        """Position of a value, in units of the view box."""
         share = (value - self.lowest) / (self.highest - self.lowest)
         return round(self.begin + share * (self.end - self.begin), 1)
 
 
 class Line(NamedTuple):
-    """What a policy's curve is drawn from."""
+    """Values of a policy's curve."""
 
     policy: str
     x: Sequence[float]
@@ -80,7 +80,7 @@ class Line(NamedTuple):
 
 
 class Point(NamedTuple):
-    """What a policy's dot is drawn from."""
+    """Values of a policy's dot."""
 
     policy: str
     x: float
@@ -97,7 +97,7 @@ def curves(
     level: float | None = None,
     from_zero: bool = False,
 ) -> Chart:
-    """A chart of lines over the same range, of at least one; labels: of x and y, with units."""
+    """A chart of one or more lines over the same range; labels: those of x and y, with units."""
     x = Scale(min(min(line.x) for line in lines), max(max(line.x) for line in lines), LEFT, WIDTH - RIGHT)
     values = [value for line in lines for value in line.y]
     values += [0.0] * from_zero + ([] if level is None else [level])
@@ -121,7 +121,7 @@ def curves(
 
 
 def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart | None:
-    """A chart of one point per policy, labelled where there is room; None where no point is a number."""
+    """A chart of one point per policy, labelled where there is room; None if no point is finite."""
     known = [point for point in points if math.isfinite(point.x) and math.isfinite(point.y)]
     if not known:
         return None
@@ -140,13 +140,13 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
 
 
 def _is_free(begin: float, end: float, height: float, taken: Sequence[tuple[float, float, float]]) -> bool:
-    """Whether a label from begin to end lies in the chart, and over nothing that has been written there."""
+    """Whether a label from begin to end lies within the chart and doesn't cover a dot or another label."""
     clear = all(abs(height - at) >= LINE or begin >= right or end <= left for left, right, at in taken)
     return clear and begin >= LEFT and end <= WIDTH
 
 
 def _axis(lowest: float, highest: float, begin: float, end: float) -> tuple[list[Tick], Scale]:
-    """Ticks at round values that enclose a range, and the axis from the first of them to the last."""
+    """Ticks at round values that enclose a range, and the scale from the first tick to the last."""
     values = _nice(lowest, highest)
     scale = Scale(values[0], values[-1], begin, end)
     return [Tick(scale(value), f"{value:g}") for value in values], scale

@@ -29,9 +29,9 @@ def report(
         typer.Option("--markdown", help="Print each track's table for a document; write no page."),
     ] = False,
 ) -> None:
-    """Write a page of HTML: of runs a report for engineers, of a benchmark's results every policy.
+    """Write an HTML page: a report of runs for engineers, or a comparison of policies from benchmark results.
 
-    It holds all that it needs, opens in any browser without a network, and prints.
+    The page is self-contained, opens in any browser without a network, and can be printed.
     """
     from .page import save
     from .result import read_result
@@ -43,8 +43,8 @@ def report(
     if kinds != {".json"}:
         odd = next((file for file in files if file.suffix.lower() != ".json"), files[0])
         raise InputError(
-            f"{odd}: a report is of runs (.parquet) alone or of the benchmark's results (.json) alone"
-            f"{', and --markdown of the latter' if markdown else ''}."
+            f"{odd}: give either runs (.parquet) or results of the benchmark (.json), not both"
+            f"{'; --markdown takes results of the benchmark' if markdown else ''}."
         )
     if markdown:
         from .summary import summary

@@ -1,4 +1,4 @@
-"""What a policy is, in a sentence or two, from its name in a result; nothing of a user's own is run."""
+"""A sentence or two on what a policy is, from its name in a result; no code of a user's is run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from panto_env.policies import maker_of
 from ..benchmark.controls import BLIND, TAPE, control_of, policy_of
 
 CONTROLS = {
-    BLIND: "A control: {} without its senses, shown its first observation for ever.",
-    TAPE: "A control: the actions that {} made on another line, under another seed, played back.",
+    BLIND: "A control: {}, given its first observation at every step.",
+    TAPE: "A control: the actions that {} took on another line, under another seed, played back.",
 }
 
 
 def what_is(policy: str) -> str:
-    """First paragraph of an installed policy's docstring; of others what their name says of them."""
+    """First paragraph of an installed policy's docstring; for any other policy, what its name says."""
     control = control_of(policy)
     if control:
         return CONTROLS[control].format(policy_of(policy))

@@ -1,4 +1,4 @@
-"""One page of HTML that needs nothing beside itself, the same bytes for the same results."""
+"""A self-contained HTML page; the same results give the same bytes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from .track import track
 
 
 def page(results: Sequence[Result]) -> str:
-    """The page of one track or several.
+    """HTML of the page for one or several tracks.
 
-    Everything that comes from a result is escaped, a policy's name too: a result may be anyone's.
+    All text from a result is escaped, names of policies too: a result may come from anyone.
     """
     template = page_template("panto_baselines.report", signed=signed)
     return template.render(
@@ -38,7 +38,7 @@ def page(results: Sequence[Result]) -> str:
 
 
 def save(results: Sequence[Result], path: str | Path) -> None:
-    """Write the page, whole or not at all. Raises InputError for a name that is not a page's."""
+    """Write the page, whole or not at all. Raises InputError for a file name without a page's suffix."""
     check_output(path, PAGES)
     with write_whole(path) as temporary:
         temporary.write_text(page(results), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Results of `panto benchmark` as its JSON holds them, read back: whatever else a file says is refused."""
+"""Results of `panto benchmark`, read back from its JSON; a file that is not such a result is refused."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ Number = Annotated[
     BeforeValidator(lambda value: nan if value is None else value),
     AfterValidator(lambda value: value if isfinite(value) else nan),
 ]
-"""A figure; what is none, null in JSON, is nan."""
+"""A figure; nan if it is missing, which is null in JSON."""
 Series = Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
 Interval = tuple[FiniteFloat, FiniteFloat] | None
 
 
 class ResultTable(BaseModel):
-    """A table of the file, whose other keys a page has no use for."""
+    """A table of the file; keys that the page does not use are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
 class AtPlace(ResultTable):
-    """What belongs to one policy on one line at one speed."""
+    """Base of tables that belong to one policy on one line at one speed."""
 
     policy: str
     catenary: str
@@ -48,12 +48,12 @@ class AtPlace(ResultTable):
 
     @property
     def place(self) -> LineAtSpeed:
-        """Where it belongs."""
+        """Line, pantograph and speed."""
         return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
 
 
 class StoredCell(AtPlace):
-    """As ``benchmark.statistics.Cell``."""
+    """A cell read from a file; its fields are those of ``benchmark.statistics.Cell``."""
 
     seeds: int
     nominal_force: FiniteFloat
@@ -65,11 +65,11 @@ class StoredCell(AtPlace):
     improved: Number
     disqualified: str
     rank: int | None
-    oracle_share: float | None = None  # of what an oracle gains; None where no oracle was run
+    oracle_share: float | None = None  # share of the oracle's gain; None if no oracle was run
 
 
 class Trace(AtPlace):
-    """As ``benchmark.trace.Trace``."""
+    """A trace read from a file; its fields are those of ``benchmark.trace.Trace``."""
 
     seed: int
     position: Series
@@ -81,12 +81,12 @@ class Trace(AtPlace):
     def _pairs(self) -> Self:
         for along, values in ((self.position, self.force), (self.frequency, self.amplitude)):
             if len(along) != len(values) or not along[0] < along[-1]:
-                raise ValueError("must have as many values as places, which rise")
+                raise ValueError("must have one value for each position, and positions that rise")
         return self
 
 
 class StoredStanding(ResultTable):
-    """As ``benchmark.overall.Standing``."""
+    """A policy's overall result read from a file; its fields are those of ``benchmark.overall.Standing``."""
 
     policy: str
     change: Number
@@ -104,7 +104,7 @@ class StoredStanding(ResultTable):
 
 
 class Result(ResultTable):
-    """One track: everything that a page shows of it."""
+    """Result of one track, as far as the page shows it."""
 
     version: str
     settings: dict[str, Any]
@@ -115,12 +115,12 @@ class Result(ResultTable):
 
     @property
     def title(self) -> str:
-        """What the benchmark's settings call it."""
+        """Title from the benchmark's settings."""
         return str(self.settings.get("title", "benchmark"))
 
     @property
     def policies(self) -> list[str]:
-        """All that ran, in the order of the settings."""
+        """Names of all policies that ran, in the order of the settings."""
         return list(dict.fromkeys(cell.policy for cell in self.cells))
 
     @property
@@ -131,20 +131,20 @@ class Result(ResultTable):
     @model_validator(mode="after")
     def _whole(self) -> Self:
         if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
-            raise ValueError("must have cells, and spans of each of their lines")
+            raise ValueError("must have cells, and spans for each of their lines")
         named = {one.policy for one in self.standings} | {one.policy for one in self.traces}
         if not named <= set(self.policies):
-            raise ValueError("must have a cell of every policy")
+            raise ValueError("must have a cell for every policy")
         return self
 
 
 def read_result(path: str | Path) -> Result:
-    """The result in a JSON file. Raises InputError, in one sentence, where it holds none or is damaged."""
+    """Read the result in a JSON file. Raises InputError if it holds none or is damaged."""
     return parse_result(read_checked(path), str(path))
 
 
 def parse_result(table: Any, name: str) -> Result:
-    """The result in plain data, called ``name`` in the InputError that is raised where it holds none."""
+    """Result from plain data. Raises InputError, which calls the data ``name``, if it is no result."""
     try:
         return Result.model_validate(table)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""A track in one table of text: every policy's change of sigma on every line, at every speed."""
+"""One text table per track: every policy's change of sigma on every line, at every speed."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .result import Result, StoredCell
 
 
 def summary(result: Result) -> Table:
-    """Policies over lines and speeds, in the order of their ranks; the best of each place is marked with *.
+    """Table of policies, by rank, over lines and speeds; the best policy of each column is marked with *.
 
-    Cells are changes of sigma (%) against the passive pantograph pressed to the same mean; one that is not
-    ranked says by how much it moves the mean, or that it ended early.
+    Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
+    shows by how much the policy moves the mean, or that it ended early.
     """
     lines = {place[:2] for place in result.places}
     headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), "all")
@@ -52,7 +52,7 @@ def _text(cell: StoredCell) -> str:
 
 
 def _oracle(result: Result, place: LineAtSpeed) -> str:
-    """Change of sigma (%) of the oracle that is stored for a place, or ""."""
+    """Change of sigma (%) of the stored oracle for a line at a speed, or ""."""
     for cell in result.cells:
         if cell.place == place and cell.oracle_share:
             return f"{cell.change / cell.oracle_share:.1f}"

@@ -1,4 +1,4 @@
-"""Tables of a page: what their cells say and how they sort. The leaderboard, and one per line and speed."""
+"""Sortable tables of a page: the leaderboard, and one table per line and speed."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .result import Result, StoredCell, StoredStanding
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
 FAR_OFF = 25.0
-"""Change of σ (%) from which on a disqualified policy is left out of pictures' and colours' scales."""
+"""Change of σ (%) beyond which a disqualified policy is left out of the scales of pictures and colours."""
 R = TypeVar("R", StoredStanding, StoredCell)
 
 
 class Bar(NamedTuple):
-    """A change and its interval, as places along a picture ``BAR`` wide; no interval: low = high."""
+    """A change and its interval, as positions along a picture ``BAR`` wide; no interval: low = high."""
 
     zero: float
     low: float
@@ -34,13 +34,13 @@ class Entry(NamedTuple):
     """One cell of a table."""
 
     text: str
-    key: str = ""  # what it sorts by: a number, or a text; "" comes last
+    key: str = ""  # sort key: a number, or a text; "" comes last
     note: str = ""
     bar: Bar | None = None
 
 
 class Column(NamedTuple, Generic[R]):
-    """One column: its heading, and what it says of a row."""
+    """One column: its heading, and the function that makes its entry for a row."""
 
     heading: str
     entry: Callable[[R], Entry]
@@ -57,7 +57,7 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A table that sorts; its second column is the policy, the heading of a row."""
+    """A sortable table; its second column, the policy, is the heading of each row."""
 
     caption: str
     headings: list[str]
@@ -65,7 +65,7 @@ class Table:
 
 
 def leaderboard(result: Result) -> Table:
-    """All policies that ran everywhere, over all lines, speeds and seeds."""
+    """Table of the policies that ran on every line, over all lines, speeds and seeds."""
     moved = {
         policy: max(_of(result, policy), key=lambda cell: _size(cell.mean_change))
         for policy in result.policies
@@ -77,13 +77,13 @@ def leaderboard(result: Result) -> Table:
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
         Column("power (W)", lambda one: _figure(one.power, 1)),
         Column("at limit", lambda one: _share(one.saturation)),
-        Column("largest ΔF_m (%)", lambda one: _signed(moved[one.policy].mean_change, 1)),
+        Column("maximum ΔF_m (%)", lambda one: _signed(moved[one.policy].mean_change, 1)),
     ]
     return _table("All lines, speeds and seeds", columns, result.standings)
 
 
 def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
-    """All policies on one line at one speed."""
+    """Table of all policies on one line at one speed."""
     columns: list[Column[StoredCell]] = [
         *_first_columns(cells),
         Column("passes improved", lambda one: _share(one.improved)),
@@ -95,7 +95,7 @@ def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
 
 
 def _first_columns(rows: Sequence[R]) -> list[Column[R]]:
-    """Rank, policy, what is ranked, and the share of the oracle's gain where there was an oracle."""
+    """Columns of rank, policy and change of sigma, and of the oracle's gain if there is a stored oracle."""
     scale = _scale(rows)
     columns: list[Column[R]] = [
         Column("rank", lambda one: Entry("–") if one.rank is None else Entry(str(one.rank), str(one.rank))),
@@ -108,7 +108,7 @@ def _first_columns(rows: Sequence[R]) -> list[Column[R]]:
 
 
 def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Table:
-    """By rank, the best first; those disqualified at the end, in the order of the file."""
+    """Table with rows by rank, the best first; disqualified policies come last, in the order of the file."""
     ranked = sorted(rows, key=lambda one: (one.rank is None, one.rank or 0))
     return Table(
         caption=caption,
@@ -145,7 +145,7 @@ def _signed(value: float, decimals: int, note: str = "") -> Entry:
 
 
 def signed(value: float, decimals: int) -> str:
-    """A change with its sign, which one that is rounded to nothing has not; a dash where there is none."""
+    """A change with its sign, but no sign if it rounds to zero; a dash if it is not finite."""
     if not isfinite(value):
         return "–"
     text = f"{value:+.{decimals}f}"
@@ -173,7 +173,7 @@ def _change(one: StoredStanding | StoredCell, scale: Scale) -> Entry:
 
 
 def _scale(rows: Sequence[StoredStanding | StoredCell]) -> Scale:
-    """Of the pictures of intervals: no policy that is far off flattens those that qualify."""
+    """Scale of the pictures of intervals; a disqualified policy that is far off does not stretch it."""
     ends = [
         end
         for one in rows

@@ -1,4 +1,4 @@
-"""Settings of a result as TOML, which runs the same benchmark again."""
+"""Settings of a result as TOML, with which the same benchmark can be run again."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def as_toml(settings: Mapping[str, Any]) -> str:
-    """A file for `panto benchmark --config`, from plain data; null stands for what is not given."""
+    """Text of a file for `panto benchmark --config`, from plain data; settings that are null are left out."""
     plain = {key: value for key, value in settings.items() if not _is_tables(value)}
     tables = {key: value for key, value in settings.items() if _is_tables(value)}
     parts = ["\n".join(_lines(plain))]

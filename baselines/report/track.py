@@ -1,4 +1,4 @@
-"""What a page shows of one track: its tables, heat map, pairs, charts, and a section for each policy."""
+"""Contents of the page for one track: tables, heat map, pairs, charts, and a section for each policy."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .tables import FAR_OFF, Table, leaderboard, signed, table_of_cells
 from .toml import as_toml
 
 STRONGEST = 0.6
-"""Opacity of a heat map's strongest colour: text on it stays legible."""
+"""Opacity of a heat map's strongest colour, so that text on it stays legible."""
 
 
 @dataclass(frozen=True)
 class Shade:
-    """A coloured cell of a table: a text, and how strongly it is better (-1) or worse (1) than nothing."""
+    """A coloured cell of a table: its text, and its strength from -1 (better) through 0 to 1 (worse)."""
 
     text: str
     strength: float
@@ -29,18 +29,18 @@ class Shade:
 
     @property
     def kind(self) -> str:
-        """Its colour's name."""
+        """Name of its colour."""
         return "better" if self.strength < 0 else "worse"
 
     @property
     def opacity(self) -> float:
-        """That of its colour."""
+        """Opacity of its colour."""
         return round(STRONGEST * min(abs(self.strength), 1.0), 3)
 
 
 @dataclass(frozen=True)
 class Section:
-    """One line at one speed."""
+    """Table and charts of one line at one speed."""
 
     place: LineAtSpeed
     title: str
@@ -50,7 +50,7 @@ class Section:
 
 @dataclass(frozen=True)
 class About:
-    """One policy: what it is, how it stands, where it is worst."""
+    """One policy: its description, its rank, and the cell where it is worst."""
 
     name: str
     text: str
@@ -62,12 +62,12 @@ class About:
 
 @dataclass(frozen=True)
 class Track:
-    """All that is shown of one result."""
+    """Everything that the page shows of one result."""
 
     result: Result
     settings: str  # as TOML
     numbers: dict[str, int]  # of policies, for their colours
-    shown_first: set[str]  # policies whose traces are shown to begin with
+    shown_first: set[str]  # policies whose traces are shown when the page opens
     leaderboard: Table
     lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
     heat: dict[str, list[Shade | None]]  # by policy, over all places
@@ -78,7 +78,7 @@ class Track:
 
 
 def track(result: Result) -> Track:
-    """What is shown of a result."""
+    """Contents of the page for a result."""
     ranked = sorted((one for one in result.standings if one.rank), key=lambda one: one.rank or 0)
     first = {REFERENCE, *(one.policy for one in ranked[:3])}
     return Track(
@@ -104,7 +104,7 @@ def track(result: Result) -> Track:
 
 
 def _heat(result: Result) -> dict[str, list[Shade | None]]:
-    """Changes of σ; the strongest colour is the largest change that is not far off."""
+    """Heat map of changes of σ; the strongest colour is the maximum change, up to ``FAR_OFF``."""
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
     largest = min(max([1.0, *sizes]), FAR_OFF)
@@ -122,7 +122,7 @@ def _shade(cell: StoredCell | None, largest: float) -> Shade | None:
 
 
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
-    """Share of passes in which the row's policy has the smaller change of σ than the column's."""
+    """Share of passes in which the row's policy has a smaller change of σ than the column's."""
     table: dict[str, list[Shade | None]] = {}
     for one in result.standings:
         shares = [one.better_than.get(other.policy, nan) for other in result.standings]
@@ -160,7 +160,7 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
 
 
 def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> list[Chart]:
-    """Force along the spans, and its spectrum."""
+    """Charts of the contact force along the spans, and of its spectrum."""
     first, last = spans
     begin, end = traces[0].position[0], traces[0].position[-1]
     span = (end - begin) / (last - first + 1)

@@ -1,4 +1,4 @@
-"""Passes of many policies at once: the lanes of one task, a policy and a seed each."""
+"""Passes of many policies at once: lanes of one task, each with a policy and a seed of its own."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from ..policies.lanes_law import LanesLaw, Observations
 
 Array = NDArray[np.float64]
 MOST_LANES = 256
-"""Of one task: their records are kept in memory, some 6 MB each."""
+"""Maximum number of lanes of one task: their records are kept in memory, some 6 MB per lane."""
 KEPT_RATE = 100.0
-"""Samples per second that are kept of the contact force, which is low-passed at 20 Hz."""
+"""Rate (1/s) of the samples kept of the contact force, which is low-passed at 20 Hz."""
 
 
 class Still(LanesLaw):
     """The passive pantograph in a batch."""
 
     def forces(self, observations: Observations) -> Array:
-        """No force, (lanes,)."""
+        """Zero force (N), (lanes,)."""
         return np.zeros(len(observations))
 
 
 class Forces(NamedTuple):
-    """Contact forces of passes over the evaluated spans, low-passed as EN 50317 says."""
+    """Contact forces of passes over the evaluated spans, low-passed according to EN 50317."""
 
     values: Array  # (laws, seeds, samples): N; nan where a pass ended early
     mean: Array  # (laws, seeds): N
@@ -42,9 +42,9 @@ class Forces(NamedTuple):
 
 
 def run_batch(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Forces:
-    """Run each law under each seed, at the settings' one speed.
+    """Run each law under each seed, at the settings' single speed.
 
-    Where some laws cannot begin, their passes are as if ended early; raises InputError where none can.
+    Passes of a law that cannot begin count as ended early. Raises InputError if no law can begin.
     """
     at_once = max(1, MOST_LANES // len(seeds))
     parts = [_run(settings, laws[first : first + at_once], seeds) for first in range(0, len(laws), at_once)]
@@ -79,7 +79,7 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
 
 
 def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
-    """Begin all laws; the places of those that cannot. Raises InputError where none can."""
+    """Begin all laws and return the indices of those that cannot. Raises InputError if none can."""
     unable: dict[int, InputError] = {}
     for k, law in enumerate(laws):
         try:
@@ -92,16 +92,16 @@ def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
 
 
 def _low_passed(task: Task) -> Array:
-    """Low-passed contact force over the evaluated spans, (lanes, samples), (N).
+    """Low-passed contact force over the evaluated spans, (lanes, samples), N.
 
-    Each lane's samples are those in which its own train is inside. Where speeds drift, trains stay there
-    for different times: of each as many samples are taken as the fastest has, evenly in time.
+    Each lane's samples are those in which its own train is inside the spans. If speeds drift, trains stay
+    there for different times; each lane then gets as many samples as the fastest one, equally spaced in time.
     """
     time_step, alignment = task.plant.time_step, task.plant.alignment
     force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
     middle = np.arange(force.shape[1]) + 0.5
     spans = chosen_spans(None, task.length.distance, alignment)
-    assert spans is not None  # of a choice that is not "all"
+    assert spans is not None  # None stands for the choice "all" only
     inside = [alignment.within(task.plant.position(lane, middle), spans) for lane in range(task.lanes)]
     count = min(int(own.sum()) for own in inside)
     chosen = [own[where] for own, where in zip(low_pass(force, time_step), inside, strict=True)]

@@ -34,25 +34,23 @@ def tune(
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Number of training seeds.")] = None,
     passes: Annotated[
-        int | None, typer.Option(min=1, max=1_000_000, help="Simulated passes at each speed, at most.")
+        int | None, typer.Option(min=1, max=1_000_000, help="Maximum simulated passes per speed.")
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     ray: RayAddress = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            help="TOML file to put the gains into; by default that in which the policy looks for them."
-        ),
+        typer.Option(help="TOML file to write the gains to; by default the one that the policy reads."),
     ] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Fit a policy's gains to a line, a pantograph, an actuator and sensors, speed by speed.
 
-    Least squares of the contact force at a mean force like the passive one's, on training seeds; the table
-    shows what the gains do on selection seeds. Actuator and sensors are "realistic", the line "fair", unless
-    told otherwise. Gains of the same line, pantograph and place in the file are replaced only with --force.
-    A tuning that was ended loses the speeds that were in work; the same command goes on with it.
+    The fit minimises the variance of the contact force on training seeds, near the passive mean force;
+    the table shows the result on selection seeds. By default actuator and sensors are "realistic" and
+    the line is "fair". Gains for the same line, pantograph and place in the file are replaced only with
+    --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
     """
     from panto_env.cluster.parts import remove_parts
     from panto_env.control.settings import run_settings

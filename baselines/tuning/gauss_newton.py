@@ -1,4 +1,4 @@
-"""Gauss-Newton with Levenberg's damping, for residuals that are cheap by the batch."""
+"""Gauss-Newton with Levenberg's damping, for residuals that are cheap to compute in batches."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from panto_env.base.errors import InputError
 
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]
-"""Residuals, (candidates, residuals), of candidates, (candidates, gains); nan or huge where one fails."""
+"""Function from candidates, (candidates, gains), to residuals, (candidates, residuals).
+
+Residuals of a candidate that fails are nan or huge."""
 DAMPINGS = (1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""Of the candidates of an iteration, in units of the squared residuals' curvature."""
+"""Dampings of an iteration's candidates, in units of the curvature of the sum of squares."""
 ENOUGH = 1e-3
-"""Relative gain of an iteration below which there is no further one."""
+"""Relative gain of an iteration below which the fit ends."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Where a fit has come to."""
+    """Outcome of a fit."""
 
     gains: Array  # (gains,)
     history: tuple[float, ...]  # sum of squares at the start and after each iteration
@@ -30,9 +32,9 @@ class Fit:
 def fit(residuals: Residuals, start: Array, steps: Array, iterations: int, ridge: float = 0.0) -> Fit:
     """Least squares from a start, (gains,): differences by ``steps``, then the best of several dampings.
 
-    Counted in ``steps`` all gains are alike: damping and ridge, the weight of (gain / step)^2 per gain, are
-    of such units. An iteration asks for 1 + gains, then for ``DAMPINGS`` candidates; of those it takes the
-    one with the least sum of squares, and ends where that is no better than before. Raises InputError where
+    Gains are scaled by ``steps``, also for the damping and for ``ridge``, the weight of (gain / step)^2 per
+    gain. An iteration evaluates 1 + gains candidates for the differences, then one per damping, and takes the
+    one with the minimum sum of squares; the fit ends when that is no better than before. Raises InputError if
     the start has no finite residuals.
     """
     gains, history, size = np.asarray(start, dtype=float), list[float](), len(start)
@@ -40,7 +42,7 @@ def fit(residuals: Residuals, start: Array, steps: Array, iterations: int, ridge
         values = residuals(gains + np.concatenate([np.zeros((1, size)), np.diag(steps)]))
         base = values[0]
         if not np.isfinite(base).all():
-            raise InputError("The tuning cannot start: with the gains that it starts from a pass ends early.")
+            raise InputError("The tuning cannot start: a pass with its initial gains ends early.")
         cost = float(base @ base + ridge * np.sum((gains / steps) ** 2))
         history = history or [cost]
         usable = np.asarray(np.isfinite(values[1:]).all(axis=1))

@@ -1,4 +1,4 @@
-"""A tuning kept speed by speed beside its file of gains: one that was ended goes on with what is missing."""
+"""A tuning stored speed by speed beside its file of gains, so that an interrupted one can continue."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .tune import PASSES, SEEDS, SPEEDS_KMH, Tuned, tunable, tune_at
 
 
 def parts_of(gains: Path) -> Path:
-    """The folder of what is tuned for a file of gains, until it is stored there; hidden."""
+    """Hidden folder that holds the tuned speeds until they are stored in the file of gains."""
     return gains.with_name(f".{gains.stem}-parts")
 
 
@@ -35,17 +35,17 @@ def tune(
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> list[Tuned]:
-    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at each speed.
+    """Tune a policy for the settings' line, pantograph, actuator and sensors, at each speed.
 
-    Each speed is written into the folder once it is done, and one that is there is taken. seeds, passes: as
-    of ``tune_at``. workers, ray: as ``spread`` takes them; the gains depend on neither. Raises InputError for
-    a policy without gains, where the folder holds parts of another tuning, or one that is damaged, and where
-    another process tunes into it.
+    Each speed is written to the folder once it is done; speeds that are there already are not tuned again.
+    seeds, passes: see ``tune_at``. workers, ray: see ``spread``; the gains do not depend on them. Raises
+    InputError for a policy without gains, if the folder holds parts of another tuning or a damaged one, and
+    if another process is tuning into it.
     """
     tunable(policy)
-    asked = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
+    made_of = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
     with alone_in(folder, "tunes into"):
-        open_parts(folder, identity("tuning", asked))
+        open_parts(folder, identity("tuning", made_of))
         parts = {speed: folder / f"{speed!r}.json" for speed in speeds_kmh}
         missing = [speed for speed, path in parts.items() if not path.is_file()]
         kept = len(parts) - len(missing)

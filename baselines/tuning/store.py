@@ -1,4 +1,4 @@
-"""Gains written as TOML beside those of other lines."""
+"""Writes gains to a TOML file, which may hold gains for several lines."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..policies.gains import GainFile, Tuning, load_gains
 from .tune import Tuned
 
 DIGITS = 5
-"""Significant ones of a gain: far beyond what a tuning can tell."""
+"""Significant digits of a gain: far more than a tuning can resolve."""
 
 
 def make_tuning(
     settings: RunSettings, names: Sequence[str], tuned: Sequence[Tuned], seeds: Sequence[int], command: str
 ) -> Tuning:
-    """What a tuning has found, as it is stored; line_condition: JSON of the conditions drawn from."""
+    """The outcome of a tuning in its stored form; ``line_condition`` holds the drawn conditions as JSON."""
     conditions = [
         condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
     ]
@@ -47,9 +47,9 @@ def make_tuning(
 
 
 def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool) -> None:
-    """Raise InputError unless a policy's gains can be put into a file: asked before any work begins.
+    """Raise InputError unless a policy's gains can be stored in a file; called before any work begins.
 
-    force: also where the file has gains for the same line, pantograph and place, which are then replaced.
+    force: gains in the file for the same line, pantograph and place may be replaced.
     """
     check_output(path, (".toml",))
     if not os.path.isfile(path):
@@ -60,13 +60,13 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     case = settings.catenary.name, settings.pantograph.name, settings.actuator.place
     if not force and case in map(_case, file.tunings):
         raise InputError(
-            f"{path} holds gains for {settings.pantograph.name} on {settings.catenary.name}, actuator on "
-            f"'{settings.actuator.place}', already; give another --output, or --force to replace them."
+            f"{path} already holds gains for {settings.pantograph.name} on {settings.catenary.name}, "
+            f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
         )
 
 
 def store(path: Path, policy: str, tuning: Tuning) -> None:
-    """Put a tuning into a file of gains, in the place of one for the same line, pantograph and place."""
+    """Store a tuning in a file of gains; it replaces one for the same line, pantograph and place."""
     old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
     with write_whole(path) as temporary:
@@ -74,7 +74,7 @@ def store(path: Path, policy: str, tuning: Tuning) -> None:
 
 
 def as_toml(file: GainFile) -> str:
-    """The text of a file of gains."""
+    """Text of a file of gains, as TOML."""
     lines = ["# Gains of a policy, written by `panto tune`.", f"policy = {_value(file.policy)}"]
     for tuning in file.tunings:
         lines += ["", "[[tunings]]"]
@@ -88,7 +88,7 @@ def _case(tuning: Tuning) -> tuple[str, str, str]:
 
 
 def _value(value: Any) -> str:
-    """A value as TOML; a row of gains on a line of its own. JSON's texts and numbers are TOML's."""
+    """A value as TOML, each row of gains on its own line. Strings and numbers are written as in JSON."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(each)}" for key, each in value.items()) + " }"
     if isinstance(value, tuple | list) and value and isinstance(value[0], tuple | list):

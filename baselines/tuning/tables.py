@@ -1,4 +1,4 @@
-"""What a tuning has reached, as a table."""
+"""Table of a tuning's outcome."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .tune import Tuned
 
 
 def table(policy: str, tuned: Sequence[Tuned]) -> Table:
-    """One row per speed: the objective before and after, and sigma and mean force beside the passive ones."""
+    """Table with a row per speed: objective before and after, sigma and mean force relative to passive."""
     headings = (
         "speed (km/h)",
         "passes",

@@ -1,4 +1,4 @@
-"""Gains of a policy for a line: fitted speed by speed on training seeds, reported on selection seeds."""
+"""Tuning of a policy for a line: gains fitted speed by speed on training seeds, judged on selection seeds."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from .gauss_newton import DAMPINGS, fit
 Array = NDArray[np.float64]
 SPEEDS_KMH = (200.0, 225.0, 250.0, 275.0, 300.0, 325.0, 350.0)
 SEEDS = 4
-"""Training seeds of a fit: more make it slower, and lines of one condition differ little."""
+"""Default number of training seeds: more make a fit slower, and lines of one condition differ little."""
 SELECTION_SEEDS = 5
 PASSES = 4000
-"""Budget of one speed, the same for every policy. A fit that gets no better ends before."""
+"""Maximum number of passes per speed, the same for every policy. A fit that stops improving ends earlier."""
 MEAN_TOLERANCE, MEAN_WEIGHT = 0.015, 0.04
-"""A mean force this far (-) from the passive one adds this much to (sigma / passive sigma)^2."""
+"""A mean force this far (-) from the passive one adds this weight to (sigma / passive sigma)^2."""
 RIDGE = 1e-5
-"""What a gain of one step adds to it: keeps gains from growing that do next to nothing."""
+"""Penalty on a gain of one step: without it, gains that have hardly any effect would grow."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """Gains at one speed, and what they do."""
+    """Gains at one speed, and their effect."""
 
     speed_kmh: float
     gains: tuple[float, ...]
     history: tuple[float, ...]  # objective at the start and after each iteration
-    passes: int  # simulated
-    std_change: float  # of sigma to passive, mean over selection seeds (-)
-    mean_change: float  # of the mean force (-)
+    passes: int  # number of passes simulated
+    std_change: float  # relative change of sigma from passive, mean over selection seeds (-)
+    mean_change: float  # relative change of the mean force from passive, likewise (-)
 
 
 def tunable(name: str) -> type[TunableLaw]:
-    """The policy of a name, if it can be tuned. Raises InputError where it can't."""
+    """Class of the policy with this name. Raises InputError if it can't be tuned."""
     makers = {each: maker_of(each) for each in policy_names()}
     able = {
         each: maker
@@ -50,15 +50,15 @@ def tunable(name: str) -> type[TunableLaw]:
         if isinstance(maker, type) and issubclass(maker, TunableLaw)
     }
     if name not in able:
-        raise InputError(f"'{name}' has no gains to tune; policies that have are {', '.join(able)}.")
+        raise InputError(f"'{name}' has no gains to tune; policies with gains are {', '.join(able)}.")
     return able[name]
 
 
 def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:
-    """Gains of a policy for the settings' line, pantograph, actuator and sensors, at one speed (km/h).
+    """Tune a policy for the settings' line, pantograph, actuator and sensors, at one speed (km/h).
 
-    seeds: how many training seeds. passes: budget. Training runs with ``accuracy="fast"``, the selection
-    seeds run as the settings say.
+    seeds: number of training seeds. passes: maximum number of passes. Training runs with ``accuracy="fast"``,
+    the selection seeds run with the accuracy of the settings.
     """
     kind, training = tunable(policy), TRAINING[:seeds]
     at_speed = settings.model_copy(update={"speed_kmh": (speed_kmh, speed_kmh)})
@@ -86,7 +86,7 @@ def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, pa
 def residuals_of(forces: Forces, passive: Forces) -> Array:
     """Residuals of laws, (laws, residuals), whose squares sum to the mean over seeds of the objective.
 
-    That is (sigma / passive sigma)^2, and a charge for a mean force off the passive one.
+    The objective is (sigma / passive sigma)^2 plus a penalty for a mean force other than the passive one.
     """
     laws, seeds, samples = forces.values.shape
     deviation = (forces.values - forces.mean[..., None]) / passive.std[..., None] / np.sqrt(seeds * samples)

@@ -306,7 +306,7 @@ class TestChecksums:
         content = bytearray(file.read_bytes())
         content[len(content) // 2] ^= 1
         file.write_bytes(content)
-        with pytest.raises(InputError, match=r"main_data.hdf5 is not what SHA256SUMS says"):
+        with pytest.raises(InputError, match=r"main_data.hdf5 does not match SHA256SUMS"):
             verify(copied)
         file.unlink()
         with pytest.raises(InputError, match=r"main_data.hdf5 is missing"):

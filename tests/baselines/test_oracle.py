@@ -297,7 +297,7 @@ def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
     settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
     (line,) = settings.lines
     oracles = oracle_settings("oracle", {}, {})
-    known = {each["fingerprint"] for each in stored.asked(oracles)}
+    known = {each["fingerprint"] for each in stored.requests(oracles)}
     for speed in line.speeds_kmh:
         assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
     assert oracles.spans == evaluated_spans(settings, line)
@@ -387,7 +387,7 @@ def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
 
     second_time = output()
     assert second_time.count("searched") == 1
-    assert "1 of 2 cells are those that were in" in second_time
+    assert "1 of 2 cells were in" in second_time
     cells = stored.read(file)["cells"]
     assert cells[0] == first
     assert [each["speed_kmh"] for each in cells] == [250.0, 300.0]
@@ -398,8 +398,8 @@ def test_a_list_that_is_killed_loses_no_finished_cell(tmp_path: Any):
 
 def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.MonkeyPatch):
     settings = oracle_settings(None, {}, {})
-    (before,) = stored.asked(settings)
-    assert stored.asked(settings) == [before]
+    (before,) = stored.requests(settings)
+    assert stored.requests(settings) == [before]
     others: tuple[dict[str, Any], ...] = (
         {"seeds": [1]},
         {"spans": [2, 2]},
@@ -407,10 +407,10 @@ def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.Monkey
         {"hops": 1},
     )
     for changes in others:
-        assert stored.asked(oracle_settings(None, changes, {})) != [before]
-    assert stored.asked(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
+        assert stored.requests(oracle_settings(None, changes, {})) != [before]
+    assert stored.requests(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
     monkeypatch.setattr(stored, "METHOD", search.METHOD + 1)
-    assert stored.asked(settings) != [before]
+    assert stored.requests(settings) != [before]
 
 
 @pytest.mark.parametrize("text", ["", "[]", json.dumps(with_checksum({"cells": [{"fingerprint": "0"}]}))])

@@ -185,7 +185,7 @@ def test_the_settings_shown_run_the_same_benchmark(tmp_path, name):
 
 def test_policies_are_described_and_none_of_a_users_own_is_run(tmp_path):
     assert what_is("p:gain=0.3") == "Force proportional to the nominal force minus the contact force."
-    assert what_is("blind of pd").startswith("A control: pd without its senses")
+    assert what_is("blind of pd").startswith("A control: pd, given its first observation")
     mine = tmp_path / "mine.py"
     mine.write_text("raise SystemExit('it ran')")
     assert "Python file" in what_is(f"{mine}:Mine")

@@ -60,7 +60,7 @@ def test_it_stores_gains_that_the_policy_then_finds(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("pd",), "'pd' has no gains to tune; policies that have are"),
+        (("pd",), "'pd' has no gains to tune; policies with gains are"),
         (("skyhook", "--output", "gains.json"), ".toml"),
         (("skyhook", "--output", "{lqg}"), "holds gains of 'lqg'; give another --output"),
     ],

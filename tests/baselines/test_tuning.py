@@ -168,7 +168,7 @@ def test_gains_of_another_policy_or_number_are_refused(tmp_path: Path) -> None:
         Skyhook(gains=(1.0, 2.0, 3.0)).reset(CONTEXT)
     with pytest.raises(InputError, match="holds gains of 'skyhook'"):
         check_gain_file(path, "periodic", run_settings({}), force=False)
-    with pytest.raises(InputError, match="There are no gains in"):
+    with pytest.raises(InputError, match="There is no file of gains"):
         find_gains("nowhere", ["frame"], CONTEXT)
 
 
@@ -287,7 +287,7 @@ def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen() -> None:
     assert tuned.history[-1] < 0.8 < tuned.history[0]
     assert tuned.std_change < -0.1
     assert tuned.passes <= 60 + 11
-    with pytest.raises(InputError, match="'pd' has no gains to tune; policies that have are"):
+    with pytest.raises(InputError, match="'pd' has no gains to tune; policies with gains are"):
         tunable("pd")
 
 

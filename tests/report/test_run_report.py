@@ -206,7 +206,7 @@ def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
     odd = tmp_path / "odd.json"
     for files, words in (
         ([file, odd], "runs (.parquet) alone or of the benchmark's results (.json) alone"),
-        ([tmp_path / "run.txt"], "run.txt: a report is of runs"),
+        ([tmp_path / "run.txt"], "run.txt: give either runs"),
         ([tmp_path / "gone.parquet"], "does not exist"),
     ):
         with pytest.raises(InputError, match=re.escape(words)):
