@@ -76,7 +76,7 @@ def drive_cylinder(line, wire, commands, force, heights, cells, counts):
 
 
 def parts_of_run(data, commands, force):
-    model = Rig(data, lanes=1, spans=10, numerics=Numerics(time_step=2.5e-4), runs=Runs())
+    model = Rig(data, lanes=1, collectors=1, spans=10, numerics=Numerics(time_step=2.5e-4), runs=Runs())
     assert model.time_step == 2.5e-4
     model.line = model.line._replace(interval_steps=1 << 40)  # no sample is taken
     model.settle(0, DrawnLine(LineCondition()), 0.0)
