@@ -1,4 +1,4 @@
-"""What the environment's own description says of arguments, ids and observations: the tables in it."""
+"""Tables of arguments, ids and observations in the environment's docstring."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .settings import EnvironmentSettings
 
 
 def described(text: str) -> str:
-    """A description with its tables put in."""
+    """A description with its tables inserted."""
     return text.format(
         in_service=_indented(_id_table("Pantograph-v0")),
         centred=_indented(_observation_table(CENTRED)),
@@ -36,7 +36,7 @@ def _observation_table(kind: str) -> str:
 
 
 def _id_table(name: str) -> str:
-    """What an id sets, as a Markdown table."""
+    """Arguments that an id sets, as a Markdown table."""
     rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
     return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
 

@@ -74,7 +74,7 @@ def kept(tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"policy": "p"}, "with its settings and policy 'p' the run is another one today"),
+        ({"policy": "p"}, "with its settings and policy 'p' it comes out differently now"),
         ({"policy": "pd:gain=0.7"}, "differs by"),
         (
             {"policy": "runs/none/model.safetensors"},
@@ -89,7 +89,7 @@ def test_a_run_that_comes_out_another_is_refused(kept, change, words):
     with pytest.raises(InputError) as caught:
         check_made_anew(replace(run, **change), settings, path)
     assert words in str(caught.value)
-    assert str(caught.value).startswith(f"{path} cannot be made anew: ")
+    assert str(caught.value).startswith(f"The run of {path} cannot be repeated: ")
 
 
 @pytest.mark.parametrize(("factor", "same"), [(0.5, True), (2.0, False)])
@@ -201,7 +201,7 @@ def test_a_run_of_another_policy_today_is_not_filmed(kept, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
     changed = tmp_path / "changed.parquet"
     replace(kept[0], policy="p").save(changed)
-    assert "cannot be made anew" in film(changed, "--output", tmp_path / "film.mp4")
+    assert "cannot be repeated" in film(changed, "--output", tmp_path / "film.mp4")
     assert not (tmp_path / "film.mp4").exists()
 
 

@@ -63,7 +63,7 @@ def test_an_environment_is_one_thread_s_at_a_time(name):
     told, refused = used_by_four_threads(env, action)
     assert all(np.isfinite(seen).all() for seen in told)
     assert {text.split(";")[0] for text in refused} <= {
-        "Another thread is using this environment just now, or was when this process was forked",
+        "Another thread is using this environment, or was when this process was forked",
         "The episode has not begun or has ended",
     }
     assert any(map(in_the_way, refused))
