@@ -1,1 +1,1 @@
-"""Runs and what is made of them: single passes, sweeps, plots."""
+"""Single passes, sweeps, and plots of them."""

@@ -1,4 +1,4 @@
-"""The settings of a run as options of a command: names, defaults and help stand in the settings alone."""
+"""The settings of a run as options of a command: names, defaults and help are stated only in the settings."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ..control.settings import fields
 from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
-"""Options that are called otherwise: the unit stands in the help, and --spans are those evaluated."""
+"""Options with another name: the unit is in the help, and --spans are the evaluated ones."""
 OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
-"""Options in another unit than the setting: that unit, the option's unit, and the factor between."""
+"""Options in another unit than the setting: the setting's unit, the option's unit, and the factor."""
 SIMPLE = (bool, int, float, str)
 
 SPAN = re.compile("[0-9]{1,9}")
-"""Number of a span; to Python other alphabets' digits are some, too."""
+"""Number of a span; Python would also accept the digits of other alphabets."""
 
 Spans = Annotated[
     str | None,
     typer.Option(
-        help="Spans that the figures cover, first-last, as 5-6, or all; by default those after the start has "
-        f"died out, from {FIRST_SETTLED} on."
+        help="Spans that the figures cover: first-last, e.g. 5-6, or all; by default those after the start "
+        f"has died out, from {FIRST_SETTLED} on."
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
@@ -38,11 +38,11 @@ Command = Callable[..., None]
 def with_settings(
     only: Sequence[str] | None = None, left_out: Sequence[str] = (), defaults: bool = True
 ) -> Callable[[Command], Command]:
-    """Give a command an option for each setting of a run, or for some alone.
+    """Decorator that gives a command an option for each setting of a run, or only for some.
 
-    The command gets as its first argument, ``settings``, what was given on the command line, by the names
-    of the settings. Its other arguments become arguments and options as usual. defaults: whether what is
-    not given is at its default, which the help then shows.
+    The command's first argument, ``settings``, receives the values given on the command line, by the names
+    of the settings. Its other arguments become arguments and options as usual. defaults: whether options that
+    are not given have their default, which the help then shows.
     """
     names = [name for name in only or _names() if name not in left_out]
 
@@ -78,19 +78,19 @@ def parse_spans(text: str | None) -> SpanChoice:
         return "all"
     first, dash, last = (part.strip() for part in text.partition("-"))
     if not (dash and SPAN.fullmatch(first) and SPAN.fullmatch(last)):
-        raise InputError(f"--spans must read first-last, as 5-6, or all, not '{text}'.")
+        raise InputError(f"--spans must read first-last, e.g. 5-6, or all, not '{text}'.")
     spans = int(first), int(last)
     check_spans(spans)
     return spans
 
 
 def _names() -> list[str]:
-    """Settings that a word or a number can give."""
+    """Settings that can be given by a word or a number."""
     return [name for name in fields() if _type(name) is not None]
 
 
 def _type(name: str) -> type | None:
-    """Type of an option: that of the default, or what the setting may be beside None."""
+    """Type of an option: that of the default, or the setting's first simple type besides None."""
     field = fields()[name]
     if type(field.default) in SIMPLE:
         return type(field.default)

@@ -1,4 +1,4 @@
-"""Parameters by their dotted names, as in the TOML files: ``pantograph.masses.0``."""
+"""Parameters by dotted names, as in the TOML files, for example ``pantograph.masses.0``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def parameter_names(entry: Settings, family: str) -> list[str]:
-    """Dotted names, ``family`` first, of all values of an entry that are numbers or may be."""
+    """Dotted names, ``family`` first, of all values of an entry that are or can be numbers."""
     names = []
     for key, field in type(entry).model_fields.items():
         value = getattr(entry, key)
@@ -38,7 +38,7 @@ def check_name(name: str, entry: Settings) -> None:
     if name in known:
         return
     owner = getattr(entry, "name", None)
-    # Of a list its first place stands for all: droppers alone would fill the line.
+    # Only the first place of each list is shown: droppers alone would fill the line.
     shown = [name for name in known if not name[-1].isdigit() or name.endswith(".0")]
     raise InputError(
         f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint(name, known)}"
@@ -48,7 +48,7 @@ def check_name(name: str, entry: Settings) -> None:
 
 
 def parameter_label(name: str, entry: Settings) -> str:
-    """What a parameter of an entry is, with its unit: "pantograph: masses, head first, 1st (kg)"."""
+    """Label of a parameter with its unit, for example "pantograph: masses, head first, 1st (kg)"."""
     family, *path = name.split(".")
     words = [family.replace("_", " ")]
     while path:
@@ -76,13 +76,13 @@ def change(entry: S, name: str, value: float) -> S:
     except ValidationError as error:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found)
-        raise InputError(f"{name} can't be {value:g}: {'; '.join(words)}.") from error
+        raise InputError(f"{name} cannot be {value:g}: {'; '.join(words)}.") from error
     except InputError as error:
-        raise InputError(f"{name} can't be {value:g}: {error}") from error
+        raise InputError(f"{name} cannot be {value:g}: {error}") from error
 
 
 def change_together(entry: S, values: Mapping[str, float]) -> S:
-    """The entry with other values of several parameters, which its schema judges together.
+    """The entry with other values of several parameters, which its schema validates together.
 
     Raises InputError as ``change`` does.
     """

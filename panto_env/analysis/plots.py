@@ -28,7 +28,7 @@ SUPPORTS = "position (m); grey lines: supports"
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure, whole or not at all. Raises InputError for a name that is not a plot's."""
+    """Write a figure, whole or not at all. Raises InputError for a name without a picture's suffix."""
     check_output(path, PICTURES)
     _leave_odd_names(figure)
     picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
@@ -38,7 +38,7 @@ def save(figure: Figure, path: str | Path) -> None:
 
 
 def _leave_odd_names(figure: Figure) -> None:
-    """Let what stands between two "$" and is no mathematics, as in a user's name, be drawn as it is."""
+    """Draw texts as they are where "$" does not enclose mathematics, as in a user's names."""
     from matplotlib.mathtext import MathTextParser
     from matplotlib.text import Text
 
@@ -99,13 +99,13 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
 
 
 def mark_supports(axis: Axes, run: Trajectory) -> None:
-    """Thin lines where the supports stand."""
+    """Draw thin lines at the supports."""
     for number in range(run.alignment.span_of(run.position[-1]) + 1):
         axis.axvline(run.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
 
 
 def say_what_is_hidden(axis: Axes) -> None:
-    """Write into a panel of fixed limits how far its curves go beyond them."""
+    """Note in a panel with fixed limits how far its curves go beyond them."""
     (begin, end), (low, high) = axis.get_xlim(), axis.get_ylim()
     highest, lowest = high, low
     for line in axis.lines:
@@ -120,7 +120,7 @@ def say_what_is_hidden(axis: Axes) -> None:
 
 
 def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str) -> None:
-    """The contact force and its limits, where shown, (n,); raw: the colour of what is not filtered."""
+    """Draw the contact force and its limits; shown: samples, (n,); raw: colour of the unfiltered force."""
     position = run.position[shown]
     filtered = zero_phase_low_pass(run.contact_force, run.time_step)[shown]
     limit = en50367.maximum_limit(run.speed)
@@ -134,7 +134,7 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
 
 
 def _not_shown(run: Trajectory, shown: Spans | None) -> str:
-    """What of a run a plot of these spans leaves out, as a clause."""
+    """The part of a run that a plot of these spans leaves out, as a clause."""
     if shown is None:
         return f"all {run.distance:.0f} m of the run"
     return f"spans {in_words(shown)}; the rest of the run's {run.distance:.0f} m is not shown"

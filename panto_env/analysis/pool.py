@@ -1,4 +1,4 @@
-"""Many jobs on all cores: one call each for processes and for threads, results in the order of the jobs."""
+"""Many jobs on all cores, in processes or in threads, with results in the order of the jobs."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from .worker import end_with_parent
 
 T = TypeVar("T")
 Job = Callable[[], T]
-"""Work without arguments; ``functools.partial`` of a function of a module goes to another process."""
+"""Work without arguments; for another process, a ``functools.partial`` of a function of a module."""
 Progress = Callable[[int, int], None]
-"""Called with the number of jobs done and of all."""
+"""Called with the numbers of finished jobs and of all jobs."""
 Take = Callable[[int, T], None]
-"""Called with the place of a job among all and its result, as soon as it is there."""
+"""Called with the index and the result of each job as soon as it is finished."""
 
 MOST_PASSES = 100_000
-"""That a sweep or a benchmark may have: an hour and more, on two cores."""
+"""Maximum number of passes of a sweep or a benchmark: an hour and more, on two cores."""
 LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 def check_passes(count: int, what: str) -> None:
-    """Raise InputError where there are more passes than anyone would wait for."""
+    """Raise InputError for more than ``MOST_PASSES`` passes."""
     if count > MOST_PASSES:
-        raise InputError(f"{what} has {count:,} passes; {MOST_PASSES:,} at most can be run, take fewer.")
+        raise InputError(f"{what} has {count:,} passes; the maximum is {MOST_PASSES:,}, take fewer.")
 
 
 def in_processes(
@@ -42,9 +42,9 @@ def in_processes(
 ) -> list[T]:
     """Results of jobs that run in fresh processes, one per core by default.
 
-    A script must call this under ``if __name__ == "__main__":``, because each process imports it anew.
-    Raises what a job raises, after cancelling those that have not begun, and InputError where a process
-    dies. The processes end with this one, whatever ends it, and at once where it is interrupted.
+    A script must call this under ``if __name__ == "__main__":``, because each process imports it again.
+    Raises a job's error, after cancelling those that have not begun, and InputError where a process dies.
+    The processes end with this one in any case, and at once when it is interrupted.
     """
     with _one_thread_of_linear_algebra():
         # Spawned, not forked: threads of Numba and torch do not survive a fork.
@@ -64,7 +64,7 @@ def in_threads(
 ) -> list[T]:
     """Results of jobs that run in threads, one per core by default: for short jobs spent in kernels.
 
-    Kernels run without Python's lock. Raises what a job raises, after cancelling those not begun.
+    Kernels run without Python's lock. Raises a job's error, after cancelling those that have not begun.
     """
     return _through(
         ThreadPoolExecutor(workers_for(len(jobs), workers), thread_name_prefix="panto"), jobs, progress
@@ -82,9 +82,9 @@ def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> l
 
 
 def workers_for(jobs: int, workers: int | None) -> int:
-    """How many workers so many jobs get, one per core unless told otherwise.
+    """Number of workers for a number of jobs, by default one per core.
 
-    Raises InputError where they are fewer than one.
+    Raises InputError for less than one.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
@@ -92,7 +92,7 @@ def workers_for(jobs: int, workers: int | None) -> int:
 
 
 def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[T] | None = None) -> list[T]:
-    """Results of futures, in their order, with a report as each is done; raises the first error at once."""
+    """Results of futures, in the given order, reported as they finish; raises the first error at once."""
     places = {future: place for place, future in enumerate(futures)}
     for done, future in enumerate(as_completed(futures), start=1):
         result = future.result()

@@ -1,4 +1,4 @@
-"""A run's requirements, as commands print them."""
+"""Printing of a run's requirements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..terminal import console, print_table
 
 
 def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
-    """Print the table of what has limits, then how they are meant and what has none."""
+    """Print the table of criteria with limits, then notes and values without limits."""
     print_table(criteria_table(criteria, title))
     for line in remarks(criteria):
         console.print(line, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A saved run made anew, where more is wanted of it than its file holds, such as the shape of the wires."""
+"""Repetition of a saved run, for results that its file does not hold, such as the shape of the wires."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ..metrics.trajectory import SUFFIXES, Trajectory
 from .simulation import simulate
 
 TOLERANCE = 0.1
-"""Largest rms difference (N) of the low-passed force that is still the same run: the digit that figures are
-told to. Another processor's rounding makes some 0.0002 N."""
+"""Maximum rms difference (N) of the low-passed force for the same run: the last digit of printed figures.
+Rounding on another processor makes about 0.0002 N."""
 
 
 def is_saved_run(source: Any) -> bool:
-    """Whether this names the file of a saved run."""
+    """Whether a source is the file of a saved run, by its suffix."""
     return isinstance(source, str | Path) and Path(source).suffix.lower() in SUFFIXES
 
 
 def load_with_settings(path: str | Path) -> tuple[Trajectory, dict[str, Any]]:
-    """A saved run, and the settings that ``simulate`` makes it of, beside its policy and its seed.
+    """A saved run, and the settings with which ``simulate`` repeats it, besides its policy and seed.
 
-    Raises InputError where the file is no saved run, or of a version that did not save its line.
+    Raises InputError where the file is not a saved run, or its version did not save the line.
     """
     run = Trajectory.load(path)
     try:
@@ -36,15 +36,15 @@ def load_with_settings(path: str | Path) -> tuple[Trajectory, dict[str, Any]]:
     except (KeyError, ValueError) as error:
         raise InputError(
             f"{path} was written by another version, {run.settings.get('version', 'unknown')}, without its "
-            "line or with other settings, so it cannot be made anew; write it anew with "
+            "line or with other settings, so the run cannot be repeated; write it again with "
             "`panto simulate --output`."
         ) from error
 
 
 def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
-    """The settings without grid and time step, where the run would come to the same ones without.
+    """The settings without grid and time step, where the defaults give the same ones.
 
-    A policy's own passive runs, from which it counts its readings, are at other speeds, with other grids.
+    A policy's own passive runs, which normalise its readings, are at other speeds, with other grids.
     """
     without = {
         name: value for name, value in settings.items() if name not in ("time_step", "spacing", "window")
@@ -55,23 +55,23 @@ def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
 
 
 def check_made_anew(run: Trajectory, settings: dict[str, Any], path: str | Path) -> None:
-    """Simulate a saved run anew, and raise InputError unless its contact force is that of the file."""
+    """Repeat a saved run, and raise InputError unless its contact force is that of the file."""
     try:
-        anew = simulate(policy=run.policy, seed=run.seed, record_droppers=False, **settings)
+        repeated = simulate(policy=run.policy, seed=run.seed, record_droppers=False, **settings)
     except InputError as error:
-        raise InputError(f"{path} cannot be made anew: {error}") from error
-    if len(anew.time) != len(run.time):
-        raise _another(run, path, f"it ends at {anew.distance:.1f} m instead of {run.distance:.1f} m")
-    difference = low_pass(anew.contact_force - run.contact_force, run.time_step)
+        raise InputError(f"The run of {path} cannot be repeated: {error}") from error
+    if len(repeated.time) != len(run.time):
+        raise _different(run, path, f"it ends at {repeated.distance:.1f} m instead of {run.distance:.1f} m")
+    difference = low_pass(repeated.contact_force - run.contact_force, run.time_step)
     rms = float(np.sqrt(np.mean(difference**2)))
     if not rms <= TOLERANCE:
-        raise _another(run, path, f"its contact force differs by {rms:.2g} N rms")
+        raise _different(run, path, f"its contact force differs by {rms:.2g} N rms")
 
 
-def _another(run: Trajectory, path: str | Path, how: str) -> InputError:
+def _different(run: Trajectory, path: str | Path, how: str) -> InputError:
     return InputError(
-        f"{path} cannot be made anew: with its settings and policy '{run.policy}' the run is another one "
-        f"today, {how}. The policy or the version has changed, or its mean force was met over --spans, or "
-        "its policy saw another observation, which the file does not tell; write it anew with "
+        f"The run of {path} cannot be repeated: with its settings and policy '{run.policy}' it comes out "
+        f"differently now, {how}. The policy or the version has changed, or its mean force was met over "
+        "--spans, or its policy saw another observation, which the file does not record; write it again with "
         "`panto simulate --output`."
     )

@@ -38,19 +38,19 @@ def simulate(
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
 
-    policy: None, a name ("pd"), a model file, or an object with reset and act, which is called by its
-    ``name`` if it has one, else by its class; it is shown the observation that it asks for by an attribute
-    ``observation``, unless that is among the settings. seed: of all that is drawn and the sensors' noise.
-    progress: called with the share done. watch: called with the task that runs, whose lane 0 this is, after
-    each control step, without a policy after some together; it must change nothing. record_droppers: keep
-    the tension of every dropper. evaluated: spans over which a mean force is met, as ``Trajectory.summary``
-    takes them. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``; the full list is in
-    the signature and in ``help(panto_env.envs.PantographEnv)``.
+    policy: None, a name ("pd"), a model file, or an object with reset and act, which is named by its
+    attribute ``name`` if it has one, else by its class. It gets the observation of its attribute
+    ``observation``, unless that is among the settings. seed: of all random values and the sensors' noise.
+    progress: called with the finished share. watch: called with the running task, lane 0 of which is this
+    pass, after each control step, or after several without a policy; it must change nothing.
+    record_droppers: keep the tension of every dropper. evaluated: spans over which a required mean force is
+    met, as in ``Trajectory.summary``. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``;
+    the full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
-    A run that leaves the plant's valid range ends there, under a policy or none: it is ``terminated``, and
+    A run that leaves the plant's valid range ends there, with or without a policy: it is ``terminated``, and
     its ``ending`` says where and why.
 
-    Raises InputError for what is not valid, TypeError for an unknown argument.
+    Raises InputError for a value that is not valid, TypeError for an unknown argument.
     """
     check_arguments(settings, RunSettings, "simulate")
     if not (isinstance(seed, Integral) and seed >= 0):
@@ -81,7 +81,7 @@ def _ready(given: dict[str, Any], seed: int, evaluated: SpanChoice, record_dropp
 
 
 def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, Policy]:
-    """A task and its driver, ready for ``steps_of_policy``: the pass that ``simulate`` makes of the same.
+    """A task and its policy, ready for ``steps_of_policy``: the same pass as ``simulate`` makes.
 
     Raises InputError as ``simulate`` does.
     """
@@ -90,17 +90,17 @@ def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, 
 
 
 def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
-    """Drive lane 0, already reset, to the end of its run; yields the share done after each control step.
+    """Control lane 0, already reset, to the end of its run; yields the finished share after each step.
 
     name: of the policy, for errors. Raises InputError where the policy fails, or its action is not finite or
-    not of the right shape.
+    has the wrong shape.
     """
     with errors_name(name, "reset"):
         policy.reset(task.context(0))
     results, shape = task.results, (len(task.actuator.places),)
     while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
-            # A copy: a policy may keep what it was shown.
+            # A copy: a policy may keep its observation.
             returned = policy.act(results.observation[0].copy())
             action = numbers(returned)
             if action is None or action.shape != shape or not np.isfinite(action).all():

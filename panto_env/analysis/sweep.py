@@ -28,21 +28,21 @@ from .simulation import simulate
 
 SPEED = "speed_kmh"
 POLICY = "policy"
-"""First part of a policy's parameter, ``policy.gain``, which goes to every policy."""
+"""First part of a parameter of all policies, for example ``policy.gain``."""
 MOST_PARAMETERS = 2
 
 Row = dict[str, Any]
 DISCRETISATION = ("time_step", "spacing", "window")
-"""Settings that a value may change by itself, and a row therefore tells."""
+"""Settings that may depend on a swept value, and which a row therefore contains."""
 SEEN_BY_POLICIES = ("actuator", "sensors")
-"""Families that the passive pantograph does without."""
+"""Families without effect on the passive pantograph."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
-"""Settings whose own values can be swept, as ``pantograph.masses.0``."""
+"""Settings whose own values can be swept, for example ``pantograph.masses.0``."""
 
 
 @dataclass(frozen=True)
 class _Pass:
-    """One pass to run: the swept values, the policy by its own name, and what ``simulate`` takes."""
+    """One pass to run: the swept values, the policy's name, and the arguments of ``simulate``."""
 
     values: dict[str, float]
     policy: str
@@ -60,20 +60,20 @@ def sweep(
     progress: Progress | None = None,
     **settings: Any,
 ) -> list[Row]:
-    """Run every policy at every value of one parameter, or every pair of values of two.
+    """Run every policy at every value of one parameter, or at every pair of values of two.
 
     parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
-    of every policy. policies: names, model files, or None for the passive pantograph. spans: that the
-    figures cover, first and last from 1, or "all"; by default those after the start. line_spans: ``spans``
-    of ``simulate``, how many the line has. workers: threads, one per core by default; the outcome does not
-    depend on it. progress: called with the passes done and of all. seed, settings: as for ``simulate``
-    (catenary, pantograph, speed_kmh, distance (m), ...).
+    of every policy. policies: names, model files, or None for the passive pantograph. spans: spans of the
+    figures, first and last from 1, or "all"; by default those after the start. line_spans: ``spans`` of
+    ``simulate``, the number of the line's. workers: threads, one per core by default; the results do not
+    depend on it. progress: called with the numbers of finished and of all passes. seed, settings: as for
+    ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
 
-    Returns one row per pass, in the order of values, then policies: the swept values, what was run, and
-    every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
-    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and whatever else
-    ``simulate`` refuses; all values are checked before the first pass.
+    Returns one row per pass, in the order of values, then policies: the swept values, the run's settings,
+    and every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
+    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and as ``simulate``
+    does; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
@@ -98,7 +98,7 @@ def sweep(
 
 
 def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
-    """What each parameter is, with its unit, for the axes of a plot; settings: those of ``sweep``."""
+    """Label of each parameter, with its unit, for the axes of a plot; settings: those of ``sweep``."""
     entries = _entries(run_settings({name: settings[name] for name in FAMILIES if name in settings}))
     found = {SPEED: "speed of the train (km/h)"}
     for name in parameters:
@@ -111,7 +111,7 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
 
 
 def _entries(settings: RunSettings) -> dict[str, Settings]:
-    """What a sweep may change, by family."""
+    """Entries whose values a sweep can change, by family."""
     entries: dict[str, Settings] = {family: getattr(settings, family) for family in FAMILIES[:-1]}
     return entries | {"line_condition": settings.line_condition[0]}
 
@@ -142,9 +142,9 @@ def _check(
 
 
 def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
-    """Raise InputError where the records of as many passes as run at once don't fit into memory.
+    """Raise InputError where the records of the passes that run at once do not fit into memory.
 
-    The longest in time is built, not run: it takes the most.
+    The longest pass is built, not run: it needs the most memory.
     """
     longest = max(passes, key=_seconds)
     given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
@@ -155,7 +155,7 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
 
 
 def _seconds(one_pass: _Pass) -> float:
-    """About how long a train is under way (s)."""
+    """Approximate duration of a pass (s)."""
     line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
     length = distance or line.alignment().length
     return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
@@ -163,7 +163,7 @@ def _seconds(one_pass: _Pass) -> float:
 
 @contextmanager
 def _named(one_pass: _Pass) -> Iterator[None]:
-    """Within the body an InputError says at which values."""
+    """Within the body an InputError names the swept values."""
     try:
         yield
     except InputError as error:
@@ -183,7 +183,7 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     families = ", ".join(f"'{owner}.'" for owner in (*entries, POLICY))
     raise InputError(
         f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
-        "(as pantograph.masses.0)."
+        "(e.g. pantograph.masses.0)."
     )
 
 

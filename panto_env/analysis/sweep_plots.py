@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 Row = Mapping[str, Any]
 DASHES = (0, (5, 3))
-"""Of limits: longer than those of a maximum."""
+"""Line style of limits: longer dashes than those of a maximum."""
 LETTERS = 40
-"""Of a line of an axis's label."""
+"""Maximum length of a line of an axis's label (letters)."""
 FORCES: dict[str, tuple[str, Any]] = {
     "maximum": ("max", "--"),
     "mean": ("mean", "-"),
     "minimum": ("min", ":"),
 }
-"""Figures of the contact force over one parameter: as the legend names them, key and line style."""
+"""Figures of the contact force over one parameter, by their name in the legend: key and line style."""
 BELOW_FORCE = ("std", "contact_loss", "max_uplift")
 """Figures that a plot over one parameter shows below the contact force."""
 MAPPED = {"std": HIGH_IS_BAD, "max": HIGH_IS_BAD, "min": LOW_IS_BAD}
@@ -36,9 +36,9 @@ MAPPED = {"std": HIGH_IS_BAD, "max": HIGH_IS_BAD, "min": LOW_IS_BAD}
 def plot_sweep(
     rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str] | None = None
 ) -> Figure:
-    """Figures over one parameter, or σ, maximum and minimum as maps over two; one value varies nothing.
+    """Figures over one parameter, or σ, maximum and minimum as maps over two that have several values.
 
-    labels: of parameters, with their units, as ``sweep.labels`` gives them; else their dotted names.
+    labels: of parameters, with their units, from ``sweep.labels``; by default the dotted names.
     """
     named = dict(zip(parameters, parameters, strict=True)) | dict(labels or {})
     varied = [name for name in parameters if len({row[name] for row in rows}) > 1] or parameters[:1]
@@ -133,6 +133,6 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
 
 
 def _by_policy(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each policy, in the order in which policies were named."""
+    """Rows of each policy, in the order in which policies were given."""
     names = dict.fromkeys(row["policy"] for row in rows)
     return {name: [row for row in rows if row["policy"] == name] for name in names}

@@ -1,4 +1,4 @@
-"""A process that works for another one, and ends with it."""
+"""A worker process that ends with its parent."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ ORPHANED = 1
 
 
 def end_with_parent() -> None:
-    """Let this worker end as soon as its parent has, whatever ended it: SIGKILL leaves it no time to say so.
+    """End this worker as soon as its parent ends, for whatever reason: SIGKILL leaves no time for a message.
 
-    An interrupt from the keyboard, which every process of a command gets, is left to the parent, too.
+    An interrupt from the keyboard, which every process of a command gets, is left to the parent.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_watch, name="panto-parent", daemon=True).start()
@@ -25,4 +25,4 @@ def _watch() -> None:
     parent = parent_process()
     assert parent is not None  # a worker has one
     wait([parent.sentinel])
-    os._exit(ORPHANED)  # in the middle of its work, which nobody waits for any more
+    os._exit(ORPHANED)  # in the middle of its work, for which nobody waits any more

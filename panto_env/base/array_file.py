@@ -1,4 +1,4 @@
-"""A file of arrays and a table of plain data, as safetensors: no code runs from it, nothing in it unpacks."""
+"""A file of arrays and a table of plain data, as safetensors: it can neither run code nor unpack to more."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .checksums import with_checksum, without_checksum
 from .files import write_whole
 
 KEY = "panto_env"
-"""Of the file's metadata, under which the table stands, as JSON."""
+"""Key of the file's metadata that holds the table as JSON."""
 
 
 def write_arrays(path: str | Path, table: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write arrays by name and a table fit for JSON, whole or not at all, with a checksum of both.
 
-    Raises InputError where it can't be written.
+    Raises InputError where it cannot be written.
     """
     content = save(dict(arrays), {KEY: json.dumps(with_checksum(table, arrays))})
     with write_whole(path) as temporary:
@@ -29,10 +29,10 @@ def write_arrays(path: str | Path, table: Mapping[str, Any], arrays: Mapping[str
 
 
 def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Table and arrays that ``write_arrays`` wrote.
+    """Table and arrays of a file of ``write_arrays``.
 
-    Raises OSError where the file can't be read, and ValueError, with the reason as a clause, where it is
-    damaged or was made in another way.
+    Raises OSError where the file cannot be read, and ValueError, with the reason as a clause, where it is
+    damaged or was written by something else.
     """
     try:
         with safe_open(path, "np") as file:
@@ -41,6 +41,6 @@ def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any
                 raise ValueError("it was not written by panto-env")
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         return without_checksum(json.loads(metadata[KEY]), arrays), arrays
-    # Also of types that NumPy has not: a TypeError, or an AttributeError.
+    # Types that NumPy does not have lead to a TypeError or an AttributeError.
     except (SafetensorError, TypeError, AttributeError, RecursionError, MemoryError) as error:
         raise ValueError(str(error).partition("\n")[0].rstrip(".") or type(error).__name__) from error

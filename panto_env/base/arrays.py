@@ -1,4 +1,4 @@
-"""Types of numeric arrays in signatures; shapes stand in docstrings and comments."""
+"""Types of numeric arrays in signatures; shapes are given in docstrings and comments."""
 
 from typing import Any
 

@@ -1,15 +1,15 @@
-"""Colours of all pictures, told apart with any colour vision (Okabe, Ito: "Color universal design", 2008)."""
+"""Colours of all pictures, distinct with any colour vision (Okabe, Ito: "Color universal design", 2008)."""
 
 BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
 PURPLE, ORANGE, SKY, BROWN = "#b0528a", "#e69f00", "#56b4e9", "#7a4b2a"
 SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BROWN)
-"""Of several things alike, in this order."""
+"""Colours of several series, in this order."""
 LIMIT = "0.1"
-"""Of what must not be crossed: nearly black, as no series is."""
+"""Colour of limits: nearly black, unlike all series."""
 HIGH_IS_BAD, LOW_IS_BAD = "cividis", "cividis_r"
 """Colour maps of Matplotlib: in both dark is good and bright is bad."""
 
 
 def series_colour(number: int) -> str:
-    """Colour of one of several things alike, by its number; beyond the seventh they come again."""
+    """Colour of a series by its number; after the seventh the colours repeat."""
     return SERIES[number % len(SERIES)]

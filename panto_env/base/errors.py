@@ -1,13 +1,13 @@
-"""The one error that bad input of any kind raises, and our one warning."""
+"""The error for invalid input of any kind, and the warning about accuracy."""
 
 from .shown import one_line
 
 
 class InputError(ValueError):
-    """Bad input (action, argument or file): one sentence that says what was wrong and what to do."""
+    """Invalid input (action, argument or file): one sentence that says what is wrong and what to do."""
 
     def __init__(self, message: str = "") -> None:
-        """Whatever the message quotes, a damaged file or a broken name, it can be printed in one line."""
+        """message: printable in one line, whatever it quotes, such as a damaged file or a broken name."""
         super().__init__(one_line(message))
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a table of settings, in words: the key, what it must be, what was given."""
+"""Explanation of errors in a table of settings: the key, its valid values, and the given value."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ WORDS = {
     "dict_type": "must be a table",
     "string_type": "must be a text",
 }
-"""By pydantic's names of what is wrong; for others its own words are taken."""
+"""Words by pydantic's name of an error; for others pydantic's own words are used."""
 
 MOST = 8
-"""Keys of a table that are told as wrong; the others are counted."""
+"""Maximum number of wrong keys that are explained; the others are counted."""
 
 
 class Complaint(NamedTuple):
-    """What is wrong at one key."""
+    """An error at one key."""
 
     key: str  # dotted, "" for the table as a whole
     words: str  # "must be ...", or a clause of its own
-    given: str  # what was given, "" where that says nothing
+    given: str  # the given value, "" where it does not help
     clause: bool  # whether the words stand alone
 
 
 def explain(error: ValidationError, kind: type[BaseModel]) -> str:
-    """One clause per wrong key of a table of ``kind``; of many the first, and how many more there are."""
+    """One clause per wrong key of a table of ``kind``; of many only the first ones, and their number."""
     clauses = []
     found = complaints(error, kind)
     for key, words, given, clause in found[:MOST]:
@@ -52,7 +52,7 @@ def explain(error: ValidationError, kind: type[BaseModel]) -> str:
 
 
 def sentence(error: ValidationError, kind: type[BaseModel]) -> str:
-    """What is wrong with keyword arguments, in one sentence without its full stop."""
+    """All errors in keyword arguments, as one sentence without its full stop."""
     clauses = []
     for key, words, given, clause in complaints(error, kind):
         clauses.append(words if clause else f"{key} {words}{f', not {given}' if given else ''}")
@@ -60,11 +60,11 @@ def sentence(error: ValidationError, kind: type[BaseModel]) -> str:
 
 
 def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]:
-    """One complaint per key; alternatives of a union, which complain one by one, are joined."""
+    """One complaint per key; errors of the alternatives of a union are joined."""
     found: dict[str, Complaint] = {}
     for problem in error.errors():
         if problem["type"] == "too_short" and len(problem["input"]) and len(error.errors()) > 1:
-            continue  # entries that are wrong are not counted; what is wrong with them is told
+            continue  # wrong entries are not counted, but explained by their own errors
         one = _complaint(problem, kind)
         before = found.get(one.key)
         if before is not None:
@@ -78,7 +78,7 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
     key, given = ".".join(map(str, place)), shortly(problem["input"])
     match problem["type"]:
         case "missing":
-            field = fields.get(str(place[-1]))  # none where a list is too short
+            field = fields.get(str(place[-1]))  # None where a list is too short
             words = f": {field.description or _table_of(field)}" if field is not None else ""
             return Complaint(key, f"is missing{words}", "", False)
         case "extra_forbidden":
@@ -92,7 +92,7 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
             whole = isinstance(cause, InputError) or not words.startswith("must ")
             return Complaint(key, words, "" if whole else given, whole)
         case "tuple_type":
-            return Complaint(key, f"must be a list, as [{given}]", "", False)
+            return Complaint(key, f"must be a list, e.g. [{given}]", "", False)
         case "too_long":
             return Complaint(key, f"must hold at most {problem['ctx']['max_length']} values", "", False)
         case other:
@@ -101,9 +101,9 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
 
 
 def _place(problem: ErrorDetails, kind: type[BaseModel]) -> tuple[list[int | str], dict[str, FieldInfo]]:
-    """The keys and places that lead to a problem, and the fields of the table that holds it.
+    """The keys and indices that lead to a problem, and the fields of the table that holds it.
 
-    Between them pydantic tells which alternative of a union it tried, which nobody asked for.
+    The names of a union's alternatives, which pydantic inserts, are left out.
     """
     place: list[int | str] = []
     fields: dict[str, FieldInfo] = kind.model_fields

@@ -1,4 +1,4 @@
-"""Files: TOML read with clear errors, any file written whole or not at all, rows, numbers fit for JSON."""
+"""Files: reading TOML with clear errors, writing whole or not at all, tables of rows, data fit for JSON."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .errors import InputError
 from .paths import check_path
 
 TRIAL = 4096
-"""Bytes that are written for a test of whether a folder takes any: the least that a disk stores."""
+"""Bytes written to test whether a folder is writable: the smallest unit that a disk stores."""
 
 
 @contextmanager
 def write_whole(path: str | Path) -> Iterator[Path]:
-    """A temporary path to write to; it takes the place of ``path`` at the end.
+    """A temporary path to write to, which replaces ``path`` at the end.
 
-    If the body raises, ``path`` is as it was. A symbolic link stays: what it leads to is replaced. Raises
-    InputError where it can't be written, the body's OSError included, and for what is no regular file.
+    If the body raises, ``path`` is unchanged. A symbolic link stays: its target is replaced. Raises
+    InputError where the file cannot be written, the body's OSError included, or is not a regular file.
     """
     check_path(path)
     target = regular_file(path)
@@ -47,15 +47,15 @@ def write_whole(path: str | Path) -> Iterator[Path]:
 
 
 def _reach_the_disk(path: Path) -> None:
-    """Wait until a file is on the disk: else a power failure may leave its name without its content."""
+    """Wait until a file is on the disk: otherwise a power failure may leave its name without its content."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
 
 
 def regular_file(path: str | Path) -> Path:
-    """Where a file of this name stands, or would stand: at the end of symbolic links.
+    """Path of a regular file, existing or not, with symbolic links resolved.
 
-    Raises InputError where something else stands there: a folder, a device, a pipe or a socket.
+    Raises InputError where something else has this name: a folder, a device, a pipe or a socket.
     """
     try:
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
@@ -70,36 +70,36 @@ def regular_file(path: str | Path) -> Path:
         raise InputError(f"{path} cannot be written: its symbolic links lead round in a circle.")
     if not stat.S_ISREG(mode):
         raise InputError(
-            f"{path} cannot be written: it is no regular file, but a device, a pipe or a socket."
+            f"{path} cannot be written: it is not a regular file, but a device, a pipe or a socket."
         )
     return target
 
 
 def _beside(target: Path, suffix: str) -> Path:
-    """A new and empty file beside another one; suffix: what it is written as, by which a link may differ."""
+    """A new and empty file in the folder of another one; suffix: of the new file, which sets its format."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=suffix)
     os.close(handle)
     return Path(name)
 
 
 def _reason(error: OSError | ValueError) -> str:
-    """What the system says, in its own words."""
+    """The system's own description of an error."""
     number = getattr(error, "errno", None)
     return os.strerror(number) if number else str(error).rstrip(".")
 
 
 TABLES = (".csv", ".parquet")
-"""Suffixes of files that hold rows."""
+"""Suffixes of files for tables of rows."""
 PICTURES = (".png", ".svg", ".pdf")
-"""Suffixes of files that a plot can be written to."""
+"""Suffixes of files for plots."""
 PAGES = (".html",)
-"""Suffixes of files that a page can be written to."""
+"""Suffixes of files for pages."""
 
 
 def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
-    """Raise InputError unless a file of this name can be written: to be asked before any work begins.
+    """Raise InputError unless a file of this name can be written; to be called before any work begins.
 
-    suffixes: one of which, in any case, says how it is written. Its folder must exist: none is made for it.
+    suffixes: the allowed ones, in lower case. The folder must exist: it is not made.
     """
     check_path(path)
     target = Path(path)
@@ -110,14 +110,14 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
     if not os.path.exists(target.parent):
         raise InputError(f"{path} cannot be written: there is no folder {target.parent}, so make it first.")
     if not target.parent.is_dir():
-        raise InputError(f"{path} cannot be written: {target.parent} is no folder.")
+        raise InputError(f"{path} cannot be written: {target.parent} is not a folder.")
     if not os.access(target.parent, os.W_OK):
-        raise InputError(f"{path} cannot be written: the folder {target.parent} does not allow it.")
+        raise InputError(f"{path} cannot be written: the folder {target.parent} is write-protected.")
     _try(target, f"{path} cannot be written")
 
 
 def _try(target: Path, otherwise: str) -> None:
-    """Write a file beside another one, and remove it: a full disk, or one that takes nothing, is found so."""
+    """Write a trial file in the folder of another one, and remove it, to find a full or read-only disk."""
     trial = None
     try:
         try:
@@ -131,9 +131,9 @@ def _try(target: Path, otherwise: str) -> None:
 
 
 def make_folder(path: str | Path) -> None:
-    """Make a folder that is itself what was asked for, and those above it.
+    """Make a folder and those above it.
 
-    Raises InputError where it can't be made, or nothing can be written into it.
+    Raises InputError where it cannot be made, or nothing can be written into it.
     """
     check_path(path)
     try:
@@ -161,7 +161,7 @@ def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The table of a TOML file. Raises InputError, naming the file, where it can't be read."""
+    """The table of a TOML file. Raises InputError, naming the file, where it cannot be read."""
     check_path(path)
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -172,13 +172,13 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path} could not be read: it is not text in UTF-8.") from error
     except RecursionError as error:
-        raise InputError(f"{path} is not valid TOML: it is nested too deeply; mend the file.") from error
-    except ValueError as error:  # TOML's own, and of whole numbers with thousands of digits
-        raise InputError(f"{path} is not valid TOML: {error}; mend the file.") from error
+        raise InputError(f"{path} is not valid TOML: it is nested too deeply; correct the file.") from error
+    except ValueError as error:  # TOML's own, and for whole numbers with thousands of digits
+        raise InputError(f"{path} is not valid TOML: {error}; correct the file.") from error
 
 
 def finite(value: Any) -> Any:
-    """Plain data for JSON: arrays as lists, and null for what is no number."""
+    """Plain data for JSON: arrays as lists, and null for numbers that are not finite."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Names and values in one line, as ``gain=0.5,places=[(4, 5)]``: of policies and of presets."""
+"""Names and values in one line, such as ``gain=0.5,places=[(4, 5)]``, for policies and presets."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ OPENING, CLOSING, QUOTES = "([{", ")]}", "'\""
 
 
 def parse_inline(text: str) -> dict[str, Any]:
-    """Values by name of "name=value,name=value"; a value is a Python literal, or else a word.
+    """Values by name from "name=value,name=value"; a value is a Python literal, or else a word.
 
     Commas within brackets and quotes belong to a value. Raises InputError where a part has no "=", or a
-    name stands twice.
+    name occurs twice.
     """
     values: dict[str, Any] = {}
     for part in filter(None, map(str.strip, _parts(text))):
@@ -27,13 +27,13 @@ def parse_inline(text: str) -> dict[str, Any]:
             raise InputError(f"'{name}' is given twice.")
         try:
             values[name] = ast.literal_eval(value.strip())
-        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):  # whatever is no literal
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):  # not a literal
             values[name] = value.strip()
     return values
 
 
 def _parts(text: str) -> Iterator[str]:
-    """Pieces between the commas that stand in no bracket and no quotes."""
+    """Parts between commas outside brackets and quotes."""
     depth, quote, begin = 0, "", 0
     for place, letter in enumerate(text):
         if quote:

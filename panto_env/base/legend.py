@@ -1,4 +1,4 @@
-"""The legend of pictures."""
+"""The legend of plots."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ if TYPE_CHECKING:
 
 
 def legend_above(axis: Axes, columns: int = 5) -> None:
-    """A legend above the axis, at the right, where it covers no data."""
+    """Draw a legend above the axis, at the right, where it covers no data."""
     axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=columns, fontsize="small", frameon=False)

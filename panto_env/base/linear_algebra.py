@@ -1,4 +1,4 @@
-"""Linear algebra whose last bits do not depend on how many threads the machine gives it."""
+"""Linear algebra whose last bits do not depend on the number of threads."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from threadpoolctl import threadpool_limits
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Within the body, linear algebra uses one thread: several would add up in another order.
+    """Within the body, linear algebra uses one thread: several would sum in another order.
 
-    This holds for libraries that are loaded when the body begins. SciPy has one of its own: import what the
-    body needs of ``scipy.linalg`` before it.
+    This holds for libraries that are loaded when the body begins. SciPy has its own library: import
+    ``scipy.linalg`` before the body where it is used.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         yield

@@ -1,4 +1,4 @@
-"""One process at a time in a folder."""
+"""A lock that allows one process at a time in a folder."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .files import make_folder
 def alone_in(folder: Path, doing: str) -> Iterator[None]:
     """Within the body no other process is in the folder, as far as files can be locked there.
 
-    doing: what a process does there, such as "trains into". The folder is made if need be; the system opens
-    the lock of a process that is killed. Raises InputError where another one holds it.
+    doing: what a process does there, such as "trains into". The folder is made if necessary; the system
+    releases the lock of a killed process. Raises InputError where another process holds the lock.
     """
     make_folder(folder)
     lock = FileLock(folder / ".lock")

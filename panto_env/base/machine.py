@@ -1,4 +1,4 @@
-"""The machine that the program runs on."""
+"""Cores and memory of the machine."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 CAN_CHOOSE_CORES = hasattr(os, "sched_setaffinity")
-"""Whether a process can say on which cores it runs: Linux has it, macOS and Windows have not."""
+"""Whether a process can choose its cores: on Linux, not on macOS and Windows."""
 
 
 def cores() -> int:
@@ -18,7 +18,7 @@ def cores() -> int:
 
 
 def memory() -> float:
-    """Bytes of memory that the machine has; infinite where the system doesn't say."""
+    """Memory of the machine (bytes); infinite where the system does not report it."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, OSError, ValueError):  # Windows
@@ -29,7 +29,7 @@ def memory() -> float:
 def on_cores(count: int) -> Iterator[None]:
     """Within the body the caller's thread, and threads that it starts there, run on ``count`` cores.
 
-    These are the first of those that it may use, which must be as many. For where CAN_CHOOSE_CORES is true.
+    These are the first of those that it may use. Only where CAN_CHOOSE_CORES is true.
     """
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(allowed)[:count])

@@ -1,4 +1,4 @@
-"""Misspelt names: the nearest known one, as a clause for an error's message."""
+"""Misspelt names: the nearest known name, as a clause for an error message."""
 
 from __future__ import annotations
 

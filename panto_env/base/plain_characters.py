@@ -1,4 +1,4 @@
-"""Characters that an output cannot show, in others that it can: nothing computed is lost to an encoding."""
+"""Replacement of characters that an output's encoding cannot show, so that no result is lost."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ PLAIN = {
     "µ": "u", "ν": "nu", "π": "pi", "ρ": "rho", "σ": "sigma", "Σ": "Sigma", "τ": "tau", "φ": "phi",
     "ω": "omega", "Ω": "Ohm", "ß": "ss", "ø": "o", "Ø": "O", "æ": "ae",
 }  # fmt: skip
-"""What stands for a character that has no plain form of its own in Unicode's tables."""
+"""Replacements of characters without a plain form in Unicode's tables."""
 BOXES, BLOCKS = range(0x2500, 0x2580), range(0x2580, 0x25A0)
-"""Lines of tables and frames, and what bars and pictures in a terminal are made of."""
+"""Characters of lines of tables and frames, and of bars and pictures in a terminal."""
 
 
 def show_always() -> None:
-    """From here on standard output and error show what their encoding cannot as plain characters."""
+    """Let standard output and error replace characters that their encoding lacks by plain ones."""
     codecs.register_error(HANDLER, _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -30,19 +30,19 @@ def show_always() -> None:
 
 
 def shows_all(stream: object) -> bool:
-    """Whether a stream can show every character: its encoding is one of Unicode's, or none."""
+    """Whether a stream can show every character: it has one of Unicode's encodings, or none."""
     return str(getattr(stream, "encoding", None) or "utf").lower().startswith("utf")
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
-    """What the codec writes instead of characters that it cannot."""
+    """Error handler of a codec: plain characters instead of those that it cannot encode."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(plain, error.object[error.start : error.end])), error.end
 
 
 def plain(character: str) -> str:
-    """A character in those of ASCII."""
+    """A character replaced by ASCII."""
     if character in PLAIN:
         return PLAIN[character]
     code = ord(character)
@@ -50,5 +50,5 @@ def plain(character: str) -> str:
         return "-" if character in "─━═╌┄┈╴╶╸╺" else "|" if character in "│┃║╎┆┊╵╷╹╻" else "+"
     if code in BLOCKS:
         return "#"
-    # Accents come off, raised and lowered digits come down.
+    # Accents are removed, superscript and subscript digits become normal ones.
     return unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode() or "?"

@@ -1,6 +1,6 @@
-"""What installed packages bring, this one included: policies, loaders of model files, commands.
+"""Plug-ins of installed packages, this one included: policies, loaders of model files, commands.
 
-Each is an entry point: a name and the object that it stands for, in one of the groups below.
+Each is an entry point, a name and its object, in one of the groups below.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ COMMANDS = "panto_env.commands"
 
 
 def installed(group: str) -> dict[str, EntryPoint]:
-    """Entry points of a group by name, in the order of names; nothing is imported."""
+    """Entry points of a group by name, sorted; nothing is imported."""
     return {point.name: point for point in sorted(entry_points(group=group), key=lambda point: point.name)}
 
 
 def load(point: EntryPoint) -> Any:
-    """The object that an entry point stands for. Raises InputError where a package is missing."""
+    """The object of an entry point. Raises InputError where a package is missing."""
     try:
         return point.load()
     except ImportError as error:

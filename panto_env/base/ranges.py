@@ -1,4 +1,4 @@
-"""Numbers within a range: what each value of a schema may be, wide enough for anything real."""
+"""Numbers within a range, for the values of schemas; ranges are wide enough for anything real."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 class Between:
     """Annotation of a ``float`` or ``int`` that must lie from ``low`` to ``high``, both included.
 
-    Only a number is one: text, truth values, nan and infinity are refused. The message names the range
-    and the unit, so that a value in kN or mm is seen for what it is.
+    Text, truth values, nan and infinity are refused. The message names the range and the unit, so that a
+    value in kN or mm is noticed.
     """
 
     low: float
@@ -26,7 +26,7 @@ class Between:
     unit: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """A check before the type's own: pydantic would take text and truth values for numbers."""
+        """A check before the type's own: pydantic would accept text and truth values as numbers."""
         check = partial(self._checked, whole=source is int)
         return core_schema.no_info_before_validator_function(check, handler(source))
 
@@ -40,7 +40,7 @@ class Between:
 
 
 def ranges_of(annotation: Any) -> Iterator[Between]:
-    """The ranges of an annotation and of what it is made of, as of the numbers of a tuple."""
+    """The ranges of an annotation and of its parts, such as the numbers of a tuple."""
     for part in get_args(annotation):
         if isinstance(part, Between):
             yield part

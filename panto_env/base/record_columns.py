@@ -15,17 +15,17 @@ from .errors import InputError
 from .names import suggest
 
 JITTER = 0.05
-"""How far a time stamp may lie from equal steps, as a share of the step: more is no rounding of digits."""
+"""Maximum distance of a time stamp from equal steps, as a share of the step: more is not rounding."""
 _HEADING = re.compile(r"([^(\[]*)(?:[(\[]([^)\]]*)[)\]])?")
 
 
 @dataclass(frozen=True)
 class Column:
-    """How a column may be written, and in which units; case, spaces, '_' and '-' in names don't matter."""
+    """Names and units of a column; case, spaces, '_' and '-' in names do not matter."""
 
     spellings: tuple[str, ...]
     units: Mapping[str, float]  # scale to SI by unit
-    example: str  # unit that messages show
+    example: str  # unit for messages
     required: bool = True
 
 
@@ -38,9 +38,9 @@ def read_columns(
 ) -> dict[str, Array]:
     """Columns by name, (n,) each, in SI units.
 
-    Units stand in the header, as ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which wins.
-    Other columns are ignored, and so are lines that are empty or begin with #. The separator is a comma,
-    semicolon or tab. Raises InputError, naming the line and the column, for anything missing or not a number.
+    Units are given in the header, as in ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which has
+    priority. Other columns are ignored, and so are lines that are empty or begin with #. The separator is a
+    comma, semicolon or tab. Raises InputError, naming line and column, for anything missing or not a number.
     """
     lines = _lines(path)
     header, body = lines[0][1], lines[1:]
@@ -53,19 +53,19 @@ def read_columns(
     return values
 
 
-def equal_step(time: Array, least: int, purpose: str) -> float:
+def equal_step(time: Array, minimum: int, purpose: str) -> float:
     """Time step (s) of time stamps (s).
 
-    least: samples that there must be; purpose: what fewer are too few for, as "to identify anything".
-    Raises InputError where they are fewer, or do not increase in equal steps.
+    minimum: required number of samples; purpose: for the message, such as "to identify anything". Raises
+    InputError where there are fewer samples, or they do not increase in equal steps.
     """
-    if len(time) < least:
-        raise InputError(f"The record has {len(time)} samples, too few {purpose}; give {least} or more.")
+    if len(time) < minimum:
+        raise InputError(f"The record has {len(time)} samples, too few {purpose}; give {minimum} or more.")
     steps = np.diff(time)
     if (steps <= 0).any():
         place = int(np.argmax(steps <= 0)) + 2
         raise InputError(
-            f"Time does not increase at sample {place}; sort the record and drop doubled samples."
+            f"Time does not increase at sample {place}; sort the record and remove duplicate samples."
         )
     step = float((time[-1] - time[0]) / (len(time) - 1))
     away = np.abs(time - (time[0] + step * np.arange(len(time))))
@@ -105,7 +105,7 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
     except csv.Error as error:  # also a cell that is longer than any number
         raise InputError(
             f"Line {kept[len(rows)][0]} of {path} has a quotation mark without its second one, or a cell "
-            "without end; mend or drop such lines."
+            "without end; correct or remove such lines."
         ) from error
     return rows
 
@@ -129,10 +129,10 @@ def _places(
         places[name] = (place, _scale(path, name, columns[name], units.get(name) or (match[2] or "").strip()))
     missing = [name for name, column in columns.items() if column.required and name not in places]
     if missing:
-        wanted = ", ".join(f"{name} ({column.example})" for name, column in columns.items())
+        names = ", ".join(f"{name} ({column.example})" for name, column in columns.items())
         raise InputError(
             f"{path} has no column {', '.join(missing)} (its header: {', '.join(header)}); "
-            f"name the columns {wanted}."
+            f"name the columns {names}."
         )
     return places
 
@@ -140,7 +140,7 @@ def _places(
 def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> float:
     if not unit:
         raise InputError(
-            f"Column {name} of {path} has no unit; write it in the header, as "
+            f"Column {name} of {path} has no unit; write it in the header, e.g. "
             f"'{name} ({column.example})', or give --unit."
         )
     if unit not in column.units:
@@ -159,6 +159,6 @@ def _number(text: str, path: str | Path, line: int, name: str) -> float:
         shown = f"holds '{text}'" if text else "is empty"
         raise InputError(
             f"Line {line} of {path}: column {name} {shown}, which is not a finite number; "
-            "mend or drop such lines (a decimal point is wanted, not a comma)."
+            "correct or remove such lines (decimals need a point, not a comma)."
         )
     return value

@@ -1,4 +1,4 @@
-"""Results that are kept for the next call with the same arguments."""
+"""Cache of a function's results for calls with the same arguments."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 KEPT = 16
-"""Results of a function that are kept."""
+"""Number of results that are kept per function."""
 
 
 def remembered(function: F) -> F:
-    """Keep what a function returns, which nobody may change, for calls with equal arguments.
+    """Cache a function's results, which must not be changed, for calls with equal arguments.
 
-    A call with arguments that cannot be told apart so, such as data with a list in it, is made anew.
+    A call with arguments that have no hash, such as data with a list, is not cached.
     """
     kept = lru_cache(maxsize=KEPT)(function)
 

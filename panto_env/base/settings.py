@@ -1,4 +1,4 @@
-"""Keyword arguments that are data: a preset's name, a table, or the settings themselves."""
+"""Settings from keyword arguments: a preset's name, a table, or the settings themselves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .shown import shown
 
 
 def _number(value: Any) -> Any:
-    """The value, unless it is text or a truth value, which pydantic would take for a number."""
+    """The value, unless it is text or a truth value, which pydantic would accept as a number."""
     if isinstance(value, str | bytes | bool):
         raise PydanticCustomError("float_type", "must be a number")
     return value
@@ -33,7 +33,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
-        """Itself: what never changes need not be copied, and a copy of an environment should be quick."""
+        """Itself: frozen data need no copy, and a copy of an environment should be quick."""
         return self
 
 
@@ -56,13 +56,13 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
             return _changed(presets[preset], changes, name)
     options = [f"'{preset}'" for preset in presets]
     if presets:
-        options[-1] += f" (with values, as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
+        options[-1] += f" (with values, e.g. '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {shown(value)}.")
 
 
 def _changed(preset: S, changes: str, name: str) -> S:
-    """A preset with values of "key=value,..."."""
+    """A preset with values from "key=value,..."."""
     try:
         given = parse_inline(changes)
     except InputError as error:
@@ -80,7 +80,7 @@ def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:
 def parse_kind(
     kinds: Mapping[str, type[S]], value: Any, name: str, presets: Mapping[str, S] | None = None
 ) -> S:
-    """As ``parse``, where the table's key "kind" says which of several settings are meant; else the first."""
+    """As ``parse``, for one of several settings classes: the table's key "kind", by default the first."""
     family = tuple(kinds.values())
     if isinstance(value, family):
         return value
@@ -93,7 +93,7 @@ def parse_kind(
 
 
 def plain(value: Any) -> Any:
-    """A value with NumPy's numbers as Python's own, in tables and lists too."""
+    """A value with NumPy's numbers converted to Python's, in tables and lists too."""
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return value.item()
     if isinstance(value, Mapping):

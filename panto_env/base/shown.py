@@ -1,4 +1,4 @@
-"""Values as messages show them: of any size and kind, also those that Python can't write."""
+"""Values as text for messages: of any size and kind, also those without a representation."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 LONGEST = 300
-"""Letters of a value, or of a word, that is shown whole."""
+"""Maximum letters of a value, or of a word, that is shown whole."""
 LONGEST_LINE = 1000
-"""Letters of a message that is told whole: what a user gave may be a whole file."""
+"""Maximum letters of a message that is shown whole: an input may be a whole file."""
 _WORD = re.compile(r"\S+|\s+")
 _CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""What tells a terminal to do something, or turns the direction of writing; line ends are none of it."""
+"""Characters that control a terminal or change the direction of writing, except line ends."""
 
 
 def shown(value: Any) -> str:
@@ -28,12 +28,12 @@ def one_line(text: str) -> str:
 
 
 def harmless(text: str) -> str:
-    """A text in which a file that may be anyone's has no control over the terminal: they are escaped."""
+    """A text with its control characters escaped, so that an untrusted file cannot control the terminal."""
     return _CONTROLS.sub(lambda control: repr(control[0])[1:-1], text)
 
 
 def shortly(value: Any) -> str:
-    """A value as Python writes it, shortened to some 30 letters."""
+    """A value as Python writes it, shortened to about 30 letters."""
     return _written(reprlib.repr, value)
 
 
@@ -45,5 +45,5 @@ def _cut(text: str, longest: int) -> str:
 def _written(write: Callable[[Any], str], value: Any) -> str:
     try:
         return write(value)
-    except Exception:  # a number of thousands of digits, or an object of anyone's
+    except Exception:  # a number with thousands of digits, or a foreign object
         return f"a value of type {type(value).__name__} that cannot be shown"

@@ -1,4 +1,4 @@
-"""Standard output and error of a command that may be closed, or lead to a disk that is full."""
+"""Standard output and error of a command, which may be closed or lead to a full disk."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .shown import harmless
 
 def say(sentence: str) -> None:
     """Print a line on standard error, if that is open."""
-    if sys.stderr is not None:  # print would take standard output instead, which is for results
+    if sys.stderr is not None:  # print would use standard output instead, which is for results
         print(f"panto: {harmless(sentence)}", file=sys.stderr)
 
 
 class _Guarded:
-    """A stream that asks what to do where it cannot be written."""
+    """A stream that calls a handler where it cannot be written."""
 
     def __init__(self, stream: TextIO, failed: Callable[[OSError], None]) -> None:
         self._stream = stream
@@ -45,10 +45,9 @@ class _Guarded:
 
 @contextmanager
 def guarded_streams() -> Iterator[None]:
-    """Within the body, standard output that cannot be written raises InputError; what cannot be written on
-    standard error is lost without ending the work.
+    """Within the body, standard output that cannot be written raises InputError; standard error is dropped.
 
-    Where nobody reads on, as in ``panto list | head``, the process exits with status 1 without a word.
+    Where the reader has closed the pipe, as in ``panto list | head``, the process exits silently with 1.
     """
     output, remarks = sys.stdout, sys.stderr
 
@@ -70,7 +69,7 @@ def guarded_streams() -> Iterator[None]:
 
 
 def _empty(stream: TextIO | None) -> None:
-    """Drop what is in a stream's buffer and cannot be written: the exit would fail over it."""
+    """Drop a stream's buffer where it cannot be written: otherwise the exit would fail."""
     if stream is None:
         return
     try:

@@ -1,4 +1,4 @@
-"""A table for people, as data: a terminal prints it, a document holds it as Markdown."""
+"""A table as data, to be printed in a terminal or written as Markdown."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 class Alarm(str):
-    """A cell that says that something is wrong: a terminal shows it in red."""
+    """A cell that reports a problem: a terminal shows it in red."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Table:
     title: str
     headings: tuple[str, ...]
     rows: Sequence[tuple[str | float, ...]]
-    text_columns: int = 1  # so many columns from the left are aligned left, the others right
+    text_columns: int = 1  # number of columns, from the left, that are aligned left; the others right
     section_ends: tuple[int, ...] = ()  # rows, counted from 0, after which a line is drawn
 
     @property

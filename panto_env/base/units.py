@@ -1,4 +1,4 @@
-"""Speeds: m/s inside, km/h where people give and read them. The one place that knows the factor."""
+"""Speeds: m/s inside, km/h for users. The only place that knows the factor."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .arrays import Array
 T = TypeVar("T", float, Array)
 
 METRES_PER_SECOND = 3.6
-"""One of them in km/h."""
+"""1 m/s in km/h."""
 
 
 def from_kmh(speed: T) -> T:

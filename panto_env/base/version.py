@@ -11,12 +11,12 @@ __version__ = "0.2.0"
 
 @cache
 def commit() -> str | None:
-    """Short hash of the checkout's commit, "-dirty" behind it where files differ; None if this is none."""
+    """Short hash of the checkout's commit, with "-dirty" where files differ; None outside a checkout."""
     folder = Path(__file__).resolve().parents[2]
     if not (folder / ".git").exists():
         return None
     try:
-        told = subprocess.run(
+        described = subprocess.run(
             ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*"],
             capture_output=True,
             text=True,
@@ -25,4 +25,4 @@ def commit() -> str | None:
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return told.stdout.strip() or None
+    return described.stdout.strip() or None

@@ -1,4 +1,4 @@
-"""What a controller asks for, as numbers: anything else is refused, and nothing is read into it."""
+"""Check of a controller's action: only real numbers of the right shape are accepted."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ..base.shown import shortly
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 NUMBERS = "fiub"
-"""Kinds of NumPy's types that are real numbers; text and complex ones would be cast to some."""
+"""Kinds of NumPy's types that are real numbers; text and complex numbers would be cast to them."""
 
 
 def checked(action: Any, shape: tuple[int, ...]) -> Array:
-    """Action as an array of real numbers of this shape. Raises InputError where it is none."""
+    """The action as an array of real numbers with this shape. Raises InputError for anything else."""
     plain = type(action) is np.ndarray and (action.dtype is SINGLE or action.dtype is DOUBLE)
     force: Array | None = action if plain else numbers(action)
     if force is None:
@@ -27,11 +27,11 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
 
 
 def numbers(action: Any) -> Array | None:
-    """Action as an array of floats, or None where it is not made of real numbers, or some are masked."""
+    """The action as an array of floats; None where it is not made of real numbers, or some are masked."""
     if isinstance(action, np.ma.MaskedArray):
         return None
     try:
         given = np.asarray(action)
         return given.astype(np.float64) if given.dtype.kind in NUMBERS else None
-    except Exception:  # of lists of lists of several lengths, or of an object that only looks like an array
+    except Exception:  # for ragged lists, or an object that only looks like an array
         return None

@@ -1,4 +1,4 @@
-"""Settings as keyword arguments of a class: names, defaults and types stand in the settings alone."""
+"""Settings as keyword arguments of a class: names, defaults and types are stated only in the settings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ P = ParamSpec("P")
 def takes(
     kind: Callable[P, RunSettings],
 ) -> Callable[[Callable[[Any, dict[str, Any]], None]], Callable[Concatenate[Any, P], None]]:
-    """Give an ``__init__`` the keyword arguments of a class of settings, explicitly.
+    """Decorator that gives an ``__init__`` the keyword arguments of a class of settings.
 
-    What is decorated gets what was given, by name. An unknown argument raises TypeError, as Python does.
+    The decorated function receives the given arguments by name. An unknown one raises TypeError.
     """
     settings: type[RunSettings] = kind  # type: ignore[assignment]
 
@@ -28,7 +28,7 @@ def takes(
         @wraps(initialise)
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
-                raise TypeError(f"{type(self).__name__}() takes its arguments by name, as catenary='re250'")
+                raise TypeError(f"{type(self).__name__}() takes its arguments by name, e.g. catenary='re250'")
             check_arguments(given, settings, type(self).__name__)
             initialise(self, given)
 
@@ -40,7 +40,7 @@ def takes(
 
 
 def parameters(kind: type[RunSettings] = RunSettings) -> list[inspect.Parameter]:
-    """The settings as parameters of a signature, to be given by name."""
+    """The settings as keyword-only parameters of a signature."""
     return [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=field.get_default())
         for name, field in fields(kind).items()
@@ -48,7 +48,7 @@ def parameters(kind: type[RunSettings] = RunSettings) -> list[inspect.Parameter]
 
 
 def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function: str) -> None:
-    """Raise TypeError for a name that is no setting, as Python does for an unknown argument."""
+    """Raise TypeError for a name that is not a setting, as Python does for an unknown argument."""
     for name in given:
         if name not in kind.model_fields:
             near = nearest(name, list(kind.model_fields))

@@ -1,4 +1,4 @@
-"""What a policy may know of an episode."""
+"""Information about an episode that a policy may use."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .observation import Layout
 
 @dataclass(frozen=True)
 class Context:
-    """What a policy may know of the episode at its start."""
+    """Information about an episode that a policy may use, known at its start."""
 
     layout: Layout  # of the observation
     actions: int  # length of an action, each in -1..1
-    channels: tuple[int, ...]  # what each action drives: 0 frame, 1 head
+    channels: tuple[int, ...]  # place where each action acts: 0 frame, 1 head
     force_limit: float  # force of an action of 1 (N)
     control_interval: float  # s
     speed: float  # of the train (m/s)

@@ -1,4 +1,4 @@
-"""What a run takes, of the machine's memory and of time: estimated, and refused, before anything is made."""
+"""Estimated memory and computing time of a run; too large a run is refused before it begins."""
 
 from __future__ import annotations
 
@@ -12,48 +12,49 @@ from ..base.errors import InputError
 from ..plant.state import SAMPLE_ROWS
 
 COPIES = 2
-"""How often a record lies in memory: as it is written, and as a trajectory."""
+"""Copies of a record in memory: the arrays of the run, and the trajectory."""
 SHARE = 0.7
-"""Of the machine's memory that records may take."""
+"""Maximum share of the machine's memory for records."""
 STEP, NUMBER = 1e-6, 0.5e-9
-"""Seconds that a time step takes, by itself and for each number that moves in it: of a wire, of a delay."""
+"""Computing time (s) of a time step, and for each number of the state (of a wire, of a delay line)."""
 LONGEST = 12 * 3600.0
-"""Seconds of computing that one run may take."""
+"""Maximum computing time of a run (s)."""
 FEW_LANES = 1024
-"""So many fit into any machine; of more, what they take is looked at before they are made."""
+"""Number of lanes that fit into any machine; the memory of more is checked before they are created."""
 REMEDY = "take a shorter distance, fewer spans, a higher speed or a longer time step"
 
 
 class Cost(NamedTuple):
-    """What a run takes, or several at once."""
+    """Cost of a run, or of several at once."""
 
     steps: float  # of the plant, in the longest episode of a lane
     memory: float  # bytes, of the record
     seconds: float  # of computing, on one core
 
     def check(self, what: str, remedy: str = "") -> None:
-        """Raise InputError where it does not fit into the machine's memory, or takes longer than ``LONGEST``.
+        """Raise InputError where the cost exceeds the machine's memory, or the time ``LONGEST``.
 
-        what: it is the record of; remedy: what else helps, beginning with ", or".
+        what: name of the run for the message; remedy: an additional way out, beginning with ", or".
         """
         there = machine.memory()
         if self.memory > SHARE * there:
             time = f", and to compute it {in_words(self.seconds)}" if self.seconds else ""
             raise InputError(
-                f"The record of {what} would take {gigabytes(self.memory)}, and this machine has "
+                f"The record of {what} would take {gigabytes(self.memory)}, but this machine has "
                 f"{gigabytes(there)} of memory{time}; {REMEDY}{remedy}."
             )
         if self.seconds > LONGEST:
             raise InputError(
-                f"To compute {what} would take {in_words(self.seconds)}, and a run may take "
-                f"{in_words(LONGEST)} at most; {REMEDY}{remedy}."
+                f"To compute {what} would take {in_words(self.seconds)}, but the maximum for a run is "
+                f"{in_words(LONGEST)}; {REMEDY}{remedy}."
             )
 
 
 def run_cost(lanes: int, steps: float, supports: int, droppers: int, moving: float, record: bool) -> Cost:
-    """Cost of a run of so many time steps, with these many supports and droppers recorded, in all lanes.
+    """Cost of a run in all lanes.
 
-    moving: numbers that move in a step, in all lanes together. record: whether one is kept, of all steps.
+    steps: time steps. supports, droppers: numbers of those recorded. moving: numbers in the state of all
+    lanes together. record: whether all steps are recorded.
     """
     columns = SAMPLE_ROWS + supports + droppers
     memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
@@ -66,12 +67,12 @@ def check_record(needed: float, what: str) -> None:
 
 
 def check_lanes(lanes: int, some: int, arrays: Iterable[Any]) -> None:
-    """Raise InputError where lanes don't fit into memory; arrays: named tuples of arrays, of some lanes."""
+    """Raise InputError where lanes do not fit into memory; arrays: named tuples of the arrays of ``some``."""
     needed = lanes / some * sum(numbers.nbytes for each in arrays for numbers in arrays_of(each))
     there = machine.memory()
     if needed > SHARE * there:
         raise InputError(
-            f"{lanes:,} lanes would take {gigabytes(needed)}, and this machine has {gigabytes(there)} of "
+            f"{lanes:,} lanes would take {gigabytes(needed)}, but this machine has {gigabytes(there)} of "
             "memory; take fewer."
         )
 
@@ -91,7 +92,7 @@ def gigabytes(size: float) -> str:
 
 
 def in_words(seconds: float) -> str:
-    """About how long that is."""
+    """An approximate duration with its unit, from years to seconds."""
     for unit, length in (("years", 365.25 * 86400), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2 * length:
             count = seconds / length

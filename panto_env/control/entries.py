@@ -1,7 +1,7 @@
-"""Entries of an observation, each in one piece: name, scale, unit, where it belongs, and its writer.
+"""Entries of an observation: for each its name, scale, unit, kinds of observation, and writer.
 
-A new entry is one decorated function here; its place in an observation is that among these functions.
-A writer gives the physical value for one lane. It may look at ``episode`` (``Episode``), ``own`` (the lane's
+A new entry is one decorated function here; the order of these functions is the order of the entries.
+A writer returns the physical value for one lane. It may read ``episode`` (``Episode``), ``own`` (the lane's
 rows of ``Row``), ``task`` (of ``TaskRow``) and ``now`` (of ``Now``); ``number`` distinguishes entries that
 share a writer.
 """
@@ -20,9 +20,9 @@ from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .state import NOW, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
-"""Kinds of observation: what a train can measure; that and more, free of noise and delay; what it can
-measure and the nominal force, each entry with a mean near 0 and a spread near 1 in a passive run; the first
-with the contact force that a filter estimates, in the place of one that is measured."""
+"""Kinds of observation: what a train can measure; in addition values that it cannot, without noise and
+delay; measured values and the nominal force, each with a mean near 0 and a spread near 1 in a passive run;
+measured values with the contact force that a filter estimates instead of a measured one."""
 CENTRES = {
     "head displacement": (0.056, 0.012),
     "frame displacement": (0.084, 0.013),
@@ -31,7 +31,7 @@ CENTRES = {
     "speed": (70.0, 10.0),
     "nominal force": (120.0, 30.0),
 }
-"""Centre and scale in "centred" of entries that "measured" has too, from passive runs of Pantograph-v0."""
+"""Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
 """Scale and unit of the force deviation."""
 READING_ENTRIES = (
@@ -41,13 +41,13 @@ READING_ENTRIES = (
     ("frame velocity", 1.0, "m/s"),
     ("contact force", 100.0, "N"),
 )
-"""Name, scale and unit of what sensors read, in the order of ``Reading``."""
+"""Name, scale and unit of the sensors' readings, in the order of ``Reading``."""
 KINDS: dict[str, tuple[str, ...]] = {
     MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED),
     FULL: (FULL,),
     CENTRED: (CENTRED,),
 }
-"""Kinds of observation that have an entry, by where it is said to belong."""
+"""Kinds of observation that have an entry, by the kind that its decorator names."""
 
 
 class Entry(NamedTuple):
@@ -62,8 +62,8 @@ class Entry(NamedTuple):
     slope: float = 0.0  # in its unit, for each m/s of the train
 
 
-class Asked(NamedTuple):
-    """What decides which entries there are, beside the kind of observation."""
+class EntryOptions(NamedTuple):
+    """What determines the entries of an observation, besides its kind."""
 
     actuator: ActuatorSettings
     pantograph: PantographData
@@ -72,22 +72,25 @@ class Asked(NamedTuple):
 
 
 Writer = Callable[..., Any]
-Listing = Callable[[Asked], list[tuple[str, float, str, int]]]
+Listing = Callable[[EntryOptions], list[tuple[str, float, str, int]]]
 """Name, scale, unit and number of all entries that share a writer."""
 WRITERS: list[Writer] = []
-"""Writers of all entries; a kernel knows an entry's writer by its place here."""
+"""Writers of all entries; a kernel identifies a writer by its index here."""
 _LISTINGS: list[tuple[str, Listing]] = []
 
 
 def entry(
     kind: str, name: str, scale: float, unit: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator of the writer of one entry; kind: MEASURED, which all have, or the only one that has it."""
+    """Decorator of the writer of one entry.
+
+    kind: MEASURED for an entry of all kinds of observation, FULL or CENTRED for one of that kind only.
+    """
     return entries(kind, lambda _: [(name, scale, unit, 0)])
 
 
 def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
-    """Decorator of a writer of several entries, or of entries that depend on actuator or pantograph."""
+    """Decorator of a writer of several entries, or of entries that depend on ``EntryOptions``."""
 
     def register(writer: Writer) -> Writer:
         WRITERS.append(inlined(writer))
@@ -97,13 +100,13 @@ def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
     return register
 
 
-def entries_of(kind: str, asked: Asked) -> list[Entry]:
+def entries_of(kind: str, options: EntryOptions) -> list[Entry]:
     """All entries of an observation, in order."""
     entries = [
         Entry(name, scale, unit, writer, number)
         for writer, (belongs_to, listing) in enumerate(_LISTINGS)
         if kind in KINDS[belongs_to]
-        for name, scale, unit, number in listing(asked)
+        for name, scale, unit, number in listing(options)
     ]
     if kind != CENTRED:
         return entries
@@ -117,12 +120,12 @@ def entries_of(kind: str, asked: Asked) -> list[Entry]:
 
 
 def earlier(name: str, steps: int) -> str:
-    """Name of an entry as it was so many control steps ago."""
+    """Name of an entry's value a number of control steps ago."""
     return f"{name}, {steps} step{'s' if steps > 1 else ''} ago"
 
 
 def present(entry: Entry) -> str:
-    """Name of an entry, or of that which it is an earlier value of."""
+    """Name of an entry; for an earlier value, the name of the present one."""
     return entry.name.partition(", ")[0]
 
 
@@ -141,11 +144,11 @@ def _span_cosine(episode, own, task, now, number):
     return episode.odometer.sight * cosine_of_turns(now[NOW.SPANS])
 
 
-def _harmonics(asked: Asked) -> list[tuple[str, float, str, int]]:
-    """Sine and cosine of each multiple of the position within the span but the first, two above."""
+def _harmonics(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    """Sine and cosine of each multiple, from 2 on, of the position within the span."""
     return [
         (f"{wave} of span position, harmonic {k}", 1.0, "-", 2 * k + half)
-        for k in range(2, asked.harmonics + 1)
+        for k in range(2, options.harmonics + 1)
         for half, wave in enumerate(("sine", "cosine"))
     ]
 
@@ -171,8 +174,8 @@ def _nominal_force(episode, own, task, now, number):
     return own[ROW.NOMINAL_FORCE]
 
 
-def _actions(asked: Asked) -> list[tuple[str, float, str, int]]:
-    return [(name, 1.0, "-", k) for k, name in enumerate(_action_names(asked.actuator))]
+def _actions(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    return [(name, 1.0, "-", k) for k, name in enumerate(_action_names(options.actuator))]
 
 
 def _action_names(actuator: ActuatorSettings) -> list[str]:
@@ -189,19 +192,19 @@ def _wire_displacement(episode, own, task, now, number):
     return own[ROW.WIRE_HEIGHT]
 
 
-@entries(FULL, lambda asked: [("frame force", asked.actuator.force_limit, "N", 0)])
+@entries(FULL, lambda options: [("frame force", options.actuator.force_limit, "N", 0)])
 def _frame_force(episode, own, task, now, number):
     return own[ROW.FRAME_FORCE]
 
 
-@entries(FULL, lambda asked: [("head force", asked.actuator.force_limit, "N", 0)])
+@entries(FULL, lambda options: [("head force", options.actuator.force_limit, "N", 0)])
 def _head_force(episode, own, task, now, number):
     return own[ROW.HEAD_FORCE]
 
 
-def _inner_masses(asked: Asked) -> list[tuple[str, float, str, int]]:
+def _inner_masses(options: EntryOptions) -> list[tuple[str, float, str, int]]:
     """Displacement and velocity of each mass between head and frame."""
-    count = len(asked.pantograph.masses)
+    count = len(options.pantograph.masses)
     places = [(k, f"mass {k + 1}") for k in range(1, count - 1)]
     pairs = [
         ((f"{mass} displacement", 0.1, "m", k), (f"{mass} velocity", 1.0, "m/s", count + k))
@@ -215,13 +218,13 @@ def _pantograph_state(episode, own, task, now, number):
     return own[ROW.STATE + number]
 
 
-def _remembered(asked: Asked) -> list[tuple[str, float, str, int]]:
-    """Readings and actions of earlier control steps; number: row behind that of the first action."""
-    actions = _action_names(asked.actuator)
+def _remembered(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    """Readings and actions of earlier control steps; number: row counted from that of the first action."""
+    actions = _action_names(options.actuator)
     rows = [*READING_ENTRIES, *((name, 1.0, "-") for name in actions)]
     return [
         (earlier(name, k), scale, unit, len(actions) + (k - 1) * len(rows) + row)
-        for k in range(1, asked.history + 1)
+        for k in range(1, options.history + 1)
         for row, (name, scale, unit) in enumerate(rows)
     ]
 
@@ -231,9 +234,9 @@ def _earlier(episode, own, task, now, number):
     return task[TASK_ROW.ACTION + number]
 
 
-def _remembered_deviations(asked: Asked) -> list[tuple[str, float, str, int]]:
-    rows = {name: number for name, _, _, number in _remembered(asked)}
-    steps = range(1, asked.history + 1)
+def _remembered_deviations(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    rows = {name: number for name, _, _, number in _remembered(options)}
+    steps = range(1, options.history + 1)
     return [
         (earlier("force deviation", k), FORCE_DEVIATION, OF_NOMINAL, rows[earlier("contact force", k)])
         for k in steps

@@ -1,4 +1,4 @@
-"""What the task knows of all lanes, and what it tells of them, as arrays for kernels."""
+"""State of the episodes of all lanes, and the results of a control step, as arrays for kernels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Flags = NDArray[np.bool_]
 
 
 class Episode(NamedTuple):
-    """One episode per lane, in all of them."""
+    """State and constants of the episodes, one per lane."""
 
     action: Array  # (lanes, actions): requested in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
@@ -31,26 +31,26 @@ class Episode(NamedTuple):
     table: Array  # (lanes, ACTION + actions + history): rows of ``TaskRow``
     now: Array  # (lanes, rows of ``Now``): of the present control step
     weights: Array  # (terms,): of the reward
-    idle: Flags  # (lanes,): lanes that are to stay as they are
-    steps: Index  # (lanes,): control steps that a call makes
+    idle: Flags  # (lanes,): lanes that the next call skips
+    steps: Index  # (lanes,): control steps per call
     writers: Index  # (entries, 2): writer and number of each entry of the observation
-    history: int  # of the observation: earlier control steps
-    centre: Array  # (entries,): of the observation, what reads 0, in the unit of what it is of
-    slope: Array  # (entries,): of the observation, what is added to that for each metre in a plant step
-    per_unit: Array  # (entries,): of the observation, for one unit of what it is of
-    odometer: OdometerArrays  # by which trains know where they are, and their speed
+    history: int  # earlier control steps in the observation
+    centre: Array  # (entries,): value at which an entry of the observation is 0, in its unit
+    slope: Array  # (entries,): change of the centre for each metre per plant step
+    per_unit: Array  # (entries,): 1 / scale of the entries
+    odometer: OdometerArrays  # for the trains' position and speed readings
     alignment: AlignmentArrays  # of the line
     time_step: float  # s
     control_steps: int  # plant steps in a control step
-    mean_share: float  # of the running mean of the force that a control step replaces
+    mean_share: float  # weight of a control step in the running mean of the force
     loss_limit: int  # plant steps without contact that end an episode
-    head_range: float  # height of the head (m), either way, that ends an episode
+    head_range: float  # height of the head (m), up or down, that ends an episode
 
 
 def new_episode(
     settings: RunSettings, plant: Plant, layout: Layout, control_steps: int, odometer: OdometerArrays
 ) -> Episode:
-    """Of all lanes of a plant, none begun; control_steps: plant steps in a control step."""
+    """Arrays for the episodes of all lanes of a plant; control_steps: plant steps in a control step."""
     lanes, actuator = plant.lanes, settings.actuator
     actions = len(actuator.places)
     return Episode(
@@ -78,7 +78,7 @@ def new_episode(
 
 
 class Results(NamedTuple):
-    """What a control step, or the start of an episode, gives for all lanes."""
+    """Results of a control step, or of the start of an episode, for all lanes."""
 
     observation: NDArray[np.float32]  # (lanes, entries)
     values: Array  # (lanes, RESULT_ROWS): rows of ``Result``
@@ -91,21 +91,21 @@ class Results(NamedTuple):
 
     @property
     def truncated(self) -> Flags:
-        """(lanes,): whether the end of the run is reached within it, a view."""
+        """(lanes,): whether the end of the run is reached within the valid range, a view."""
         return self.flags[:, Flag.TRUNCATED]
 
     @property
     def reward_and_terms(self) -> Array:
-        """(1 + terms, lanes): the reward, and its terms, not weighted; a view."""
+        """(1 + terms, lanes): the reward and its unweighted terms, a view."""
         return self.values[:, Result.REWARD : Result.CONTACT_FORCE].T
 
     def copy(self) -> Results:
-        """The same in arrays of its own."""
+        """A copy of the arrays."""
         return Results(self.observation.copy(), self.values.copy(), self.flags.copy())
 
 
 def new_results(lanes: int, entries: int) -> Results:
-    """Room for the results of so many lanes."""
+    """Empty arrays for the results of all lanes."""
     return Results(
         np.empty((lanes, entries), dtype=np.float32),
         np.empty((lanes, RESULT_ROWS)),

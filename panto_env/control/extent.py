@@ -1,4 +1,4 @@
-"""How far a run goes, on how long a line, and the plant that is good for it."""
+"""Distance of a run, spans of its line, and the plant that is built for it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .settings import RunSettings
 
 
 def runs(settings: RunSettings) -> Runs:
-    """What the plant must be good for."""
+    """The runs for which the plant is built."""
     slow, quick = settings.speeds
     drift = largest_drift(settings.drift)
     pantograph, interval = settings.pantograph, settings.control_interval
@@ -24,22 +24,22 @@ def runs(settings: RunSettings) -> Runs:
 
 
 def spans(settings: RunSettings) -> int | None:
-    """Spans of the line: a line too short for the distance asked for gets more, unless told how many."""
+    """Number of spans: as given, or as many as the distance needs, at least the line's own; None: its own."""
     if settings.spans is not None or settings.distance is None:
         return settings.spans
     line = settings.catenary
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in)
-    wanted = last + (CLEAR if last >= line.spans else 1)
-    if wanted > MOST_SPANS:
+    needed = last + (CLEAR if last >= line.spans else 1)
+    if needed > MOST_SPANS:
         longest = line.alignment().support(MOST_SPANS - CLEAR)
         raise InputError(
             f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
         )
-    return max(line.spans, wanted)
+    return max(line.spans, needed)
 
 
 def whole_steps(control_interval: float, time_step: float) -> int:
-    """Time steps in a control interval. Raises InputError where they are no whole number."""
+    """Time steps in a control interval. Raises InputError where that is not a whole number."""
     steps = round(control_interval / time_step)
     if steps < 1 or abs(steps * time_step - control_interval) > 1e-9:
         raise InputError(
@@ -50,7 +50,7 @@ def whole_steps(control_interval: float, time_step: float) -> int:
 
 
 def new_plant(settings: RunSettings, lanes: int) -> Plant:
-    """The plant of so many lanes. Raises InputError where they do not fit into memory."""
+    """The plant of a run with a number of lanes. Raises InputError where they do not fit into memory."""
     make_plant = partial(
         Plant,
         settings.catenary,

@@ -1,4 +1,4 @@
-"""What identifies a run: every setting as plain data, with the grid and the time step that it came to."""
+"""Identity of a run: every setting as plain data, with the resulting grid and time step."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
 
 NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward")
-"""Settings that only a policy sees."""
+"""Settings that only concern policies."""
 
 
 def plain(settings: RunSettings) -> dict[str, Any]:
-    """Settings by name as plain data; a line and a pantograph by their names alone."""
+    """Settings by name as plain data; line and pantograph only by their names."""
     values = {
         name: getattr(settings, name) for name in type(settings).model_fields if name not in NOT_OF_A_RUN
     }
@@ -30,23 +30,23 @@ def plain(settings: RunSettings) -> dict[str, Any]:
 
 
 def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, Any]:
-    """The same of a run along ``distance`` (m), with its time step (s), spans and grid, and the version."""
-    came_to = {"time_step": plant.time_step, "spans": plant.spans, "distance": distance}
+    """Identity of a run over ``distance`` (m): version, settings, time step (s), spans and grid."""
+    resulting = {"time_step": plant.time_step, "spans": plant.spans, "distance": distance}
     grid = plant.model.grid or dict.fromkeys(("spacing", "window", "precision"))
-    return {"version": __version__, **plain(settings), **came_to, **grid}
+    return {"version": __version__, **plain(settings), **resulting, **grid}
 
 
 def settings_of(identity: Mapping[str, Any], design: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings that a run of this identity was made with, to make it anew; the inverse of ``identity``.
+    """Settings with which a run of this identity can be repeated; the inverse of ``identity``.
 
-    design: line and pantograph by value, as ``Trajectory.design`` has them. What only a policy sees is not
-    among the settings. Raises KeyError or ValueError where something is missing or not valid.
+    design: line and pantograph by value, as in ``Trajectory.design``. Settings that only concern policies
+    are missing. Raises KeyError or ValueError where something is missing or not valid.
     """
     line = design["catenary"]
     values = {
         name: value
         for name, value in identity.items()
-        if name in RunSettings.model_fields and value is not None  # what is None was not asked for
+        if name in RunSettings.model_fields and value is not None  # None: not given
     }
     values["catenary"] = CATENARIES[line["kind"]].schema.model_validate(line)
     values["pantograph"] = PantographData.model_validate(design["pantograph"])

@@ -1,4 +1,4 @@
-"""Results of runs that are kept on disk, each under a checksum of what it was made of."""
+"""Cache of results of runs on disk, each under a checksum of its inputs."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..base.errors import InputError
 
 
 def kept(folder: str, inputs: Any, compute: Callable[[], Any]) -> Any:
-    """What ``compute`` gives for these inputs, both plain data; from the disk where a process kept it before.
+    """Result of ``compute`` for these inputs, both plain data; from the disk where it is cached already.
 
-    It is kept in a folder beside the compiled kernels of the same sources, where something can be kept.
+    The cache is a folder beside the compiled kernels of the same sources; without one nothing is cached.
     """
     cache = cache_folder()
     if cache is None:
         return compute()
     made_of = checksum([source_hash(), inputs])
     file = cache / folder / f"{made_of}.json"
-    with suppress(InputError):  # nothing is there, or it is damaged
+    with suppress(InputError):  # the file does not exist, or is damaged
         found = read_checked(file)
         if found["made_of"] == made_of:
             return found["value"]
     value = compute()
-    with suppress(InputError, OSError):  # no room: the next process works it out again
+    with suppress(InputError, OSError):  # no room: the next process computes it again
         file.parent.mkdir(exist_ok=True)
         write_checked(file, {"made_of": made_of, "value": value})
     return value

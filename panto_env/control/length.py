@@ -17,16 +17,16 @@ from .settings import RunSettings, speed_range
 
 
 class EpisodeLength:
-    """Of all lanes of a task; each lane's speed, run-in and drift say how long its own episode is."""
+    """Length of the episodes of a task, which depends on each lane's speed, run-in and drift."""
 
     def __init__(self, settings: RunSettings, plant: Plant) -> None:
-        """Raises InputError for a distance, a control interval or speeds that the plant is not good for."""
+        """Raises InputError for a distance, control interval or speed that is not possible on the plant."""
         self._drift, self._plant = settings.drift, plant
         self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
         if self.distance > plant.model.length:
             raise InputError(
                 f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
-                f"not {self.distance:g} m; ask for more spans."
+                f"not {self.distance:g} m; set more spans."
             )
         self.control_interval = settings.control_interval
         self.control_steps = whole_steps(settings.control_interval, plant.time_step)
@@ -53,33 +53,33 @@ class EpisodeLength:
     def plant_steps(self, speed: Any, run_in: Any = 0, drift: Array | None = None) -> Any:
         """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
 
-        Of a speed (m/s), or of each of an array. run_in: control steps before the episode begins. drift: of
-        each speed, as ``Plant.start`` takes it.
+        speed: m/s, a number or an array. run_in: control steps before the episode begins. drift: of each
+        speed, as in ``Plant.start``.
         """
         stride = speed * self.control_interval
         if drift is not None:
             return np.array([self._drifting_steps(*each) for each in zip(stride, run_in, drift, strict=True)])
-        wanted = run_in + np.ceil(self.distance / stride - 1e-9)
+        needed = run_in + np.ceil(self.distance / stride - 1e-9)
         possible = self._plant.model.length / stride + 1e-9
-        return np.maximum(1, np.floor(np.minimum(wanted, possible))) * self.control_steps
+        return np.maximum(1, np.floor(np.minimum(needed, possible))) * self.control_steps
 
     def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
-        """The same of one train that drifts about this stride of a control step (m)."""
+        """``plant_steps`` of one train with drift; stride: mean distance in a control step (m)."""
         lag = largest_lag(self._drift)
-        most = min(self._plant.model.length, stride * run_in + lag + self.distance) + lag
-        steps = np.arange(math.ceil(most / stride) + 1.0)
-        position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # it rises
-        wanted = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
+        farthest = min(self._plant.model.length, stride * run_in + lag + self.distance) + lag
+        steps = np.arange(math.ceil(farthest / stride) + 1.0)
+        position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # increasing
+        needed = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
         possible = np.searchsorted(position, self._plant.model.length + 1e-9) - 1
-        return max(1, min(int(wanted), int(possible))) * self.control_steps
+        return max(1, min(int(needed), int(possible))) * self.control_steps
 
     @property
     def _late(self) -> int:
-        """Plant steps by which a train may fall back."""
+        """Maximum delay of a train by its drift (plant steps)."""
         lag = largest_lag(self._drift)
         return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
 
     @property
     def most_control_steps(self) -> int:
-        """Control steps of an episode at the lowest speed: the longest that there are."""
+        """Control steps of the longest possible episode, at the lowest speed."""
         return (int(self.plant_steps(self.speed_range[0])) + self._late) // self.control_steps

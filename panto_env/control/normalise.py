@@ -1,7 +1,7 @@
-"""An observation counted from what a passive run reads: entries then have a mean near 0 and a spread near 1.
+"""Observation normalised by a passive run, so that entries have a mean near 0 and a spread near 1.
 
-The mean of a reading changes with the speed, nearly in proportion where the uplift does: what an entry is
-counted from is linear in it. The scale is one for all speeds, so that a swing twice as large is seen as such.
+The mean of a reading depends on the speed, nearly linearly, as the uplift does: so the centre of an entry is
+linear in the speed. The scale is the same at all speeds, so that a swing twice as large reads twice as much.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _ROWS = {name: row for row, (name, _, _) in enumerate(READING_ENTRIES)}
 
 
 def normalised(layout: Layout, run: PassiveRun, speed_kmh: tuple[float, float]) -> Layout:
-    """The layout with readings, present and earlier ones, and speed counted from a passive run.
+    """The layout with speed and readings, present and earlier, normalised by a passive run.
 
-    speed_kmh: range of speeds that was given for it (km/h). Raises InputError where a reading has no spread.
+    speed_kmh: the given range of speeds (km/h). Raises InputError where a reading has no spread.
     """
     entries = tuple(_normalised(entry, run) for entry in layout.entries)
     return replace(layout, entries=entries, normalise=speed_kmh)
@@ -37,7 +37,7 @@ def _normalised(entry: Entry, run: PassiveRun) -> Entry:
     scale = float(np.sqrt(np.mean(run.spreads[:, row] ** 2)))
     if scale == 0.0:
         raise InputError(
-            f"The {present(entry)} does not change in a passive run, so it can't be scaled by its spread; "
+            f"The {present(entry)} does not change in a passive run, so it cannot be scaled by its spread; "
             "leave out normalise."
         )
     means, several = run.means[:, row], len(run.speeds) > 1

@@ -1,4 +1,4 @@
-"""What a policy sees: scaled entries, float32, within finite bounds."""
+"""Observation of a policy: scaled entries, float32, within finite bounds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..plant.alignment import in_spans
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from ..plant.train import position, stride
-from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Asked, Entry, earlier, entries_of
+from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, EntryOptions, earlier, entries_of
 from .state import CONTROLLED, NOW, TASK_ROW
 
 READINGS = len(Reading)
@@ -33,7 +33,7 @@ class Layout:
     entries: tuple[Entry, ...]
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
-    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that readings count from
+    normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
 
     @property
     def scale(self) -> Array:
@@ -42,17 +42,17 @@ class Layout:
 
     @property
     def centre(self) -> Array:
-        """What each entry, (entries,), is counted from, in its unit."""
+        """Value at which each entry, (entries,), is 0, in its unit."""
         return np.array([entry.centre for entry in self.entries])
 
     @property
     def slope(self) -> Array:
-        """By how much that grows, (entries,), in its unit for each m/s of the train."""
+        """Change of the centre, (entries,), in its unit for each m/s of the train."""
         return np.array([entry.slope for entry in self.entries])
 
     @property
     def earlier(self) -> tuple[Index, Index]:
-        """Places of all earlier values, and of the present value of each."""
+        """Indices of all earlier values, and of the present value of each."""
         names = {entry.name: place for place, entry in enumerate(self.entries)}
         steps = range(1, self.history + 1)
         pairs = [(names[earlier(n, k)], p) for n, p in names.items() for k in steps if earlier(n, k) in names]
@@ -65,16 +65,17 @@ class Layout:
         return np.array([(entry.writer, entry.number) for entry in self.entries])
 
     def index(self, name: str) -> int:
-        """Place of an entry. Raises InputError where there is none of this name."""
+        """Index of an entry. Raises InputError where none has this name."""
         names = [entry.name for entry in self.entries]
         if name not in names:
             raise InputError(f"The observation has no entry '{name}': {suggest(name, names)}.")
         return names.index(name)
 
     def read(self, observation: NDArray[np.float32], name: str) -> float:
-        """Physical value of an entry. Raises InputError where there is none of this name.
+        """Physical value of an entry. Raises InputError where none has this name.
 
-        "contact force" (N) may be asked for of every kind: from a deviation it is computed.
+        "contact force" (N) exists for every kind of observation; where needed, it is computed from the
+        deviation.
         """
         if name == "contact force" and self.kind == CENTRED:
             nominal_force = self.read(observation, "nominal force")
@@ -86,20 +87,20 @@ class Layout:
 
 
 OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "normalise")
-"""Settings of a run that decide what a policy sees, and nothing else."""
+"""Settings of a run that determine only the observation."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
 
 
-def layout(kind: str, asked: Asked) -> Layout:
-    """Entries of the observation ``kind``, one of OBSERVATIONS."""
-    return Layout(kind, tuple(entries_of(kind, asked)), asked.harmonics, asked.history)
+def layout(kind: str, options: EntryOptions) -> Layout:
+    """Layout of an observation; kind: one of OBSERVATIONS."""
+    return Layout(kind, tuple(entries_of(kind, options)), options.harmonics, options.history)
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """Kernel code that calls the writer at a place known only as it runs.
+    """Kernel code that calls a writer by its index.
 
-    Its source is put together here, a branch per writer: a kernel can't call a function out of a list.
+    Its source is generated here, a branch per writer: a kernel cannot call a function from a list.
     """
     names: dict[str, Any] = {f"writer_{place}": writer for place, writer in enumerate(writers)}
     lines = ["def write(chosen, episode, own, task, now, number):"]
@@ -116,7 +117,7 @@ _write = _branches(WRITERS)
 
 @inlined
 def add_noise(sensors, readings, lane):
-    """Add to a lane's readings the noise that is next."""
+    """Add the next noise to a lane's readings."""
     noise = sensors.noise[lane, CONTROLLED, sensors.noise_used[lane] & NOT_NEGATIVE]
     for k in range(READINGS):
         readings[k] += noise[k]
@@ -125,7 +126,7 @@ def add_noise(sensors, readings, lane):
 
 @inlined
 def prepare_entries(episode, sensors, run, own, now, lane):
-    """Make ready what entries of a lane's observation look at: noise is added to its readings."""
+    """Prepare the values that entries of a lane's observation read: readings with noise, position, speed."""
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], lane)
     now[NOW.SPANS] = in_spans(episode.alignment, position(run, CONTROLLED, lane, own[ROW.STEP]))
@@ -140,7 +141,7 @@ def prepare_entries(episode, sensors, run, own, now, lane):
 
 @inlined
 def remember(episode, task, now):
-    """Let a lane's readings and actions be the latest of its history."""
+    """Insert a lane's readings and actions as the latest of its history."""
     actions = episode.places.size
     each = READINGS + actions
     past = task[TASK_ROW.ACTION + actions :]
@@ -155,7 +156,7 @@ def remember(episode, task, now):
 
 @inlined
 def begin_history(episode, task, now):
-    """Let a lane's history have been as its first readings."""
+    """Fill a lane's history with its first readings."""
     actions = episode.places.size
     for step in range(episode.history):
         past = task[TASK_ROW.ACTION + actions + step * (READINGS + actions) :]

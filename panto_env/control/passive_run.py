@@ -1,7 +1,7 @@
-"""What a passive run of line and pantograph as designed reads, by speed: means and spreads.
+"""Means and spreads of the readings of a passive run, by speed, with line and pantograph as designed.
 
-Agents' observations and rewards may be counted from it. What is found is kept on disk, under a hash of the
-sources and of all that the runs are made of.
+Observations and rewards of agents can be relative to them. Results are cached on disk, under a hash of the
+sources and of the run's settings.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
 
 KNOT_DISTANCE = 25.0
-"""Largest distance (km/h) of the speeds that are run; between them it is interpolated."""
+"""Maximum distance (km/h) between the speeds of the runs; between them values are interpolated."""
 LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
 NO_MATTER = (*OBSERVATION_SETTINGS, "estimator", "known_pantograph", "reward", "actuator", "sensors")
 """Settings on which a passive run does not depend."""
 
 RunPassively = Callable[[RunSettings], Trajectory]
-"""The record of a run without control."""
+"""Function from settings to the record of a run without control."""
 
 
 @dataclass(frozen=True)
 class PassiveRun:
-    """Means and spreads over the settled spans, by speed; rows as of ``Reading``, then ``LOW_PASSED``."""
+    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``."""
 
     speeds: Array  # (speeds,): m/s, rising
     means: Array  # (speeds, rows): in the unit of each
@@ -60,7 +60,7 @@ def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPass
 
 
 def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[list[float]]:
-    """Means and spreads at one speed (m/s), from the disk where they are kept."""
+    """Means and spreads at one speed (m/s), from the disk where they are cached."""
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
@@ -72,7 +72,7 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
 def _measured(run: Trajectory) -> list[list[float]]:
     if run.terminated:
         raise InputError(
-            f"The passive run that observation or reward are to be counted from has no figures: {run.ending}"
+            f"The passive run that normalises observation or reward has no figures: {run.ending}"
         )
     inside = run.inside()
     filtered = low_pass(run.contact_force, run.time_step)

@@ -1,4 +1,4 @@
-"""The record of a lane's run, and why it has none: it ended early, or its computation diverged."""
+"""The record of a lane's run, and the messages for a run that ended early or diverged."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from .state import CONTROLLED, TaskRow
 from .task_state import TaskState
 
 LARGEST_DEVIATION = 2e3
-"""Mean deviation of the contact force (N), ten times any real one, beyond which a computation diverged."""
+"""Mean deviation of the contact force (N), ten times any real one: beyond it a computation has diverged."""
 
 
 def diverged(task: TaskState, lanes: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
-    """Whether the mean deviation of lanes, (n,), from their nominal force (N), or their wire's height (m),
-    is that of no line.
+    """Whether lanes, (n,), have diverged, as their ending or an impossible value shows.
+
+    deviation: mean, from the nominal force (N). height: of the wire (m).
     """
     possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
     endings = task.episode.table[lanes, TaskRow.ENDING]
@@ -33,7 +34,7 @@ def diverged(task: TaskState, lanes: Any, deviation: Array, height: Array) -> ND
 
 
 def divergence(task: TaskState, lane: int) -> str:
-    """That a lane's computation diverged, and what to do, as a sentence."""
+    """Message that a lane's computation diverged, and what to do."""
     plant = task.plant
     return (
         f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
@@ -44,9 +45,9 @@ def divergence(task: TaskState, lane: int) -> str:
 def _way_out(plant: Plant) -> str:
     """What to do where a computation diverged."""
     if plant.catenary.kind == "rig":
-        return "the loop of a rig that is not stable does so, see panto rig --stability"
+        return "the loop of the rig may be unstable, see panto rig --stability"
     return (
-        f"take a time_step below {1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped "
+        f"use a time_step below {1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped "
         "contact"
     )
 
@@ -56,7 +57,7 @@ def trajectory(
 ) -> Trajectory:
     """Record of a lane's run so far. Raises InputError where its computation diverged.
 
-    last: whether the task runs no more, so that large arrays need no copy.
+    last: the task does not run any more, so large arrays need no copy.
     """
     plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE)
     steps = int(plant.of(lane, Row.STEP))
@@ -103,7 +104,7 @@ def trajectory(
 
 
 def ending(task: TaskState, lane: int) -> str:
-    """Where and why a lane's run ended early, as a sentence; empty where it did not."""
+    """Where and why a lane's run ended early, as a sentence; empty if it did not."""
     which = _ending(task, lane)
     if which is Ending.NONE:
         return ""

@@ -1,4 +1,4 @@
-"""How episodes begin: lanes put at their start, run in, observed."""
+"""Start of episodes: lanes are put at the line's start, run in, and observed."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def reset(
     static_forces: Callable[[Array], Array | None],
     results: Results,
 ) -> None:
-    """Start episodes in lanes, (n,), and run them in as far as drawn; arguments as of ``Task.reset``.
+    """Start episodes in lanes, (n,), and make their run-in; see ``Task.reset``.
 
-    static_forces: of lanes with speeds, (n,) (m/s), in N, or None where they are applied as they are.
+    static_forces: of lanes (N), (n,), as a function of their speeds (m/s); None where none is trimmed.
     """
     plant = task.plant
     of_lane = random if callable(random) else lambda _: random
@@ -67,17 +67,17 @@ def reset(
 
 
 def _begin(task: TaskState, lanes: Any, end: Array) -> None:
-    """Let episodes begin in lanes where they are, and end so many plant steps from the line's start."""
+    """Begin episodes in lanes at their present positions; end: plant steps from the line's start."""
     start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
-    if not nominal[low] > 0:  # the reward is in shares of it
+    if not nominal[low] > 0:  # the reward is relative to it
         raise InputError(
             f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
-            f"against the wire, its lift is {nominal[low]:g} N; give it a static_force or an "
-            "aerodynamic_coefficient, or ask for a mean_force."
+            f"against the wire: its lift is {nominal[low]:g} N. Give it a static_force or an "
+            "aerodynamic_coefficient, or set a mean_force."
         )
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
@@ -90,7 +90,7 @@ def _begin(task: TaskState, lanes: Any, end: Array) -> None:
 
 
 def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
-    """Run lanes, just reset, for so many control steps each without control; there episodes begin."""
+    """Run lanes, just reset, for ``steps`` control steps each without control, and begin episodes there."""
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
@@ -98,13 +98,13 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(ending(task, lane))
     _begin(task, lanes, rows[:, TaskRow.END])
-    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards are not of the episode
+    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards of the run-in do not count
     if task.layout.history:
         _forget(task, lanes, rows, results)
 
 
 def _forget(task: TaskState, lanes: Any, rows: Array, results: Results) -> None:
-    """Let the history of lanes that have run in have been as what they read at the end of that.
+    """Fill the history of lanes after a run-in with their last readings.
 
     rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
     """

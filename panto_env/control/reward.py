@@ -18,10 +18,12 @@ MEAN_TIME = 1.0
 
 
 class Reward(Settings):
-    """Weights of the terms. A control step costs 1 for each term at: a mean deviation as large as
-    the nominal force; contact lost all along; full force; full force reversed within the step; a running
-    mean of the contact force that is wrong by the nominal force; a low-passed contact force that is wrong by
-    the nominal force or, with the target "passive", by the standard deviation of a passive run.
+    """Weights of the terms of the reward.
+
+    Each term, times its weight, costs 1 in a control step with: a mean deviation equal to the nominal force;
+    no contact; full force; full force reversed within the step; a deviation of the running mean of the
+    contact force by the nominal force; a deviation of the low-passed contact force by the nominal force or,
+    with the target "passive", by the standard deviation of a passive run.
     """
 
     cost_function: NonNegative = Field(1.0, description="weight of CF, Eq. 14 of paper 1 (-)")
@@ -40,20 +42,20 @@ class Reward(Settings):
     )
     target: Literal["nominal", "passive"] = Field(
         "nominal",
-        description="force that mean_force and low_passed count from: the nominal one, or the mean of a "
-        "passive run of line and pantograph as designed at the train's speed",
+        description="target of mean_force and low_passed: the nominal force, or the mean force of a passive "
+        "run of line and pantograph as designed, at the train's speed",
     )
 
     @property
     def weights(self) -> Array:
-        """(terms,): in the order of the terms."""
+        """Weights, (terms,), in the order of ``Term``."""
         return np.array([getattr(self, name) for name in TERMS])
 
 
 REWARDS: dict[str, Reward] = {
     "paper1": Reward(),
-    # What the benchmark measures: sigma over that of the passive run, at its mean force. Without its weight
-    # for the mean, an agent would press less and call the smaller swing a success.
+    # What the benchmark measures: sigma relative to the passive run's, at its mean force. Without a weight
+    # for the mean, an agent would simply reduce the contact force, and with it the swing.
     "agent": Reward(
         cost_function=0.0,
         contact_loss=1.0,
@@ -67,7 +69,7 @@ REWARDS: dict[str, Reward] = {
 
 @inlined
 def begin_terms(task, now):
-    """Begin a control step."""
+    """Reset the sums of a control step."""
     now[NOW.DEVIATION_BEFORE] = task[TASK_ROW.DEVIATION]
     now[NOW.SQUARED_BEFORE] = task[TASK_ROW.SQUARED_DEVIATION]
     now[NOW.COST] = 0.0
@@ -77,7 +79,7 @@ def begin_terms(task, now):
 
 @inlined
 def add_sample_to_terms(own, task, now, force_before):
-    """Add a plant step to the cost and the loss of its control step; force_before: of contact (N)."""
+    """Add a plant step to the sums of its control step; force_before: previous contact force (N)."""
     force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.NOMINAL_FORCE]
     # An interval lies between two samples: before the first one there is none.
     between = 1.0 if own[ROW.STEP] > 1.5 else 0.0
@@ -102,7 +104,7 @@ def compute_reward(episode, own, task, now, values):
     task[TASK_ROW.MEAN_DEVIATION] += episode.mean_share * change
     shift, per_spread = task[TASK_ROW.TARGET_SHIFT], task[TASK_ROW.PER_SPREAD]
     mean_deviation = (task[TASK_ROW.MEAN_DEVIATION] - shift) * per_nominal_force
-    # The running figures have the sums about the nominal force; about the target they follow from these.
+    # The running figures have sums of deviations from the nominal force; those from the target follow.
     deviation = task[TASK_ROW.DEVIATION] - now[NOW.DEVIATION_BEFORE]
     squared = task[TASK_ROW.SQUARED_DEVIATION] - now[NOW.SQUARED_BEFORE]
     about_target = (squared - 2.0 * shift * deviation) * per_step + shift * shift
@@ -125,7 +127,7 @@ def compute_reward(episode, own, task, now, values):
 
 @inlined
 def early_end_charge(episode, own, task):
-    """What a run that ends here pays, as if it went on without contact: ending must not be a way out."""
+    """Charge of an early end: as for the rest of the run without contact, so that ending does not pay."""
     left = (task[TASK_ROW.END] - own[ROW.STEP]) * (1.0 / episode.control_steps)
     missing = (own[ROW.NOMINAL_FORCE] + task[TASK_ROW.TARGET_SHIFT]) * task[TASK_ROW.PER_SPREAD]
     weights = episode.weights

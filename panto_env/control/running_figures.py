@@ -1,4 +1,4 @@
-"""Figures of an episode, kept as it runs."""
+"""Figures of an episode, updated during the run."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from .state import NOW, RESULT, TASK_ROW, TERM, TaskRow
 
 
 class RunningFigures(NamedTuple):
-    """What figures of all lanes need beside the rows of ``TaskRow``."""
+    """Arrays for the figures of all lanes, besides the rows of ``TaskRow``."""
 
     sections: Array  # (sections, 6): EN 50317's filter, second-order sections
     settled: Array  # (2 sections,): its state settled at 1 N
-    peak: Array  # (lanes, supports): largest uplift (m)
+    peak: Array  # (lanes, supports): maximum uplift (m)
 
 
 def running_figures(lanes: int, supports: int, time_step: float) -> RunningFigures:
-    """Of ``lanes`` lanes."""
+    """Arrays for the running figures of all lanes; time_step: s."""
     sections, settled = low_pass_sections(time_step)
     return RunningFigures(sections.copy(), settled.flatten(), np.zeros((lanes, supports)))
 
 
 def no_figures(rows: int) -> Array:
-    """So many rows of ``TaskRow`` at the start of an episode, (rows,)."""
+    """Values of a number of rows of ``TaskRow`` at the start of an episode, (rows,)."""
     values = np.zeros(rows)
     values[TaskRow.MAX], values[TaskRow.MIN] = -np.inf, np.inf
     return values
@@ -43,11 +43,11 @@ def figures_so_far(
     time_step: float,
     ahead: Callable[[Array], Array],
 ) -> dict[str, Array]:
-    """Each of ``Figures`` by name, (lanes,), of runs so far.
+    """The ``Figures`` of runs so far, by name, (lanes,) each.
 
     table: (lanes, rows of TaskRow). peak: (lanes, supports). run: (lanes, rows of Row). supports: their
-    positions (m). time_step: s. ahead: how far the trains are ahead of steady ones (m), (lanes, n), after
-    steps, (lanes, n).
+    positions (m). time_step: s. ahead: from numbers of steps, (lanes, n), to the lead of the trains over
+    steady ones (m), (lanes, n).
     """
     stride, steps = run[:, Row.STRIDE], run[:, Row.STEP]
     samples = table[:, TaskRow.SAMPLES]
@@ -55,7 +55,7 @@ def figures_so_far(
     mean = run[:, Row.NOMINAL_FORCE] + shift
     std = np.sqrt(np.maximum(table[:, TaskRow.SQUARED_DEVIATION] / samples - shift**2, 0.0))
     begin, shifted = steps - samples, ahead(np.stack([steps - samples, steps], axis=1)).T
-    # Where the train was: half a step before either end.
+    # Positions of the first and last sample: half a step before each end.
     first, last = (begin - 0.5) * stride + shifted[0], (steps - 0.5) * stride + shifted[1]
     passed = (supports > first[:, None] - 1e-6) & (supports < last[:, None] + 1e-6)
     largest = np.max(np.where(passed, peak, -np.inf), axis=1, initial=-np.inf)
@@ -96,7 +96,7 @@ def low_pass(running, task, force):
 
 @inlined
 def add_sample_to_figures(running, samples, own, task, frame_before, head_before, lane):
-    """Add a plant step; frame_before, head_before: forces of the actuators in the one before (N)."""
+    """Add a plant step; frame_before, head_before: forces of the actuators in the previous step (N)."""
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
     between = 0.0 if task[TASK_ROW.SAMPLES] == 0.0 else 1.0  # a change lies between two samples
     frame, head = own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]

@@ -1,6 +1,6 @@
-"""What a run can be told, stated once: name, default, unit and help of every setting.
+"""Settings of a run, stated once: name, default, unit and help of each.
 
-Python's arguments, the tables of trainings and benchmarks and the command line all take theirs from here.
+The arguments in Python, the tables of trainings and benchmarks, and the command line are all made from them.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from .reward import REWARDS, Reward
 
 R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9
-"""Distance (m) beyond which no line goes, whatever it is made of."""
-_Speed = Annotated[float, Field(allow_inf_nan=True)]  # a line says itself which speeds it bears
-# Ranges of settings that tables of benchmarks and oracles have as well.
+"""Maximum distance (m), longer than any line."""
+_Speed = Annotated[float, Field(allow_inf_nan=True)]  # the line checks which speeds are possible
+# Ranges of settings that tables of benchmarks and oracles share.
 PantographScatter = Annotated[float, Between(0, 0.3)]
 # Own choice: a driver, or cruise control, keeps within some km/h.
 SpeedDrift = Annotated[float, Between(0, 20, "km/h")]
@@ -96,10 +96,10 @@ def _mean_force(value: Any) -> float | str | None:
 
 
 def speed_range(speed_kmh: Any, name: str = "speed_kmh") -> tuple[float, float]:
-    """Lowest and highest speed (km/h) of a number or a range; InputError, naming it, where it is neither."""
+    """Lowest and highest speed (km/h) of a number or a range. Raises InputError for anything else."""
     values = speed_kmh if isinstance(speed_kmh, list | tuple | np.ndarray) else (speed_kmh,) * 2
     try:
-        if any(isinstance(value, str | bool) for value in values):  # float would take them
+        if any(isinstance(value, str | bool) for value in values):  # float() would accept them
             raise TypeError
         low, high = (float(value) for value in values)
     except (TypeError, ValueError, OverflowError) as error:
@@ -116,7 +116,7 @@ def _normalise(value: Any) -> tuple[float, float] | None:
 
 
 class RunSettings(Numerics):
-    """All that a run can be told. ``time_step``, ``spacing``, ``window``, ``precision``: see ``Numerics``."""
+    """All settings of a run. ``time_step``, ``spacing``, ``window``, ``precision``: see ``Numerics``."""
 
     catenary: Annotated[CatenaryData, BeforeValidator(load_catenary)] = Field(
         "en50318-2002", validate_default=True, description="line: a name of the catalogue or a TOML file"
@@ -133,78 +133,78 @@ class RunSettings(Numerics):
     )
     speed_drift: SpeedDrift = Field(
         0.0,
-        description="rms of a slow drift of the speed about its mean, of periods of 7 to 29 s, drawn per run "
-        "(km/h)",
+        description="rms of a slow drift of the speed about its mean, with periods of 7 to 29 s, drawn per "
+        "run (km/h)",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='actuator: "ideal", "realistic", "head-motor", one with values as '
+        description='actuator: "ideal", "realistic", "head-motor", one with values such as '
         '"realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='sensors: "ideal", "realistic", "blind", one with values as "ideal:force_noise=5", or a '
-        "table",
+        description='sensors: "ideal", "realistic", "blind", one with values such as "ideal:force_noise=5", '
+        "or a table",
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn", one with values and defects as '
-        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; of a list one is drawn per run',
+        description='condition of the line: "new", "fair", "worn", one with values and defects such as '
+        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; from a list one is drawn per run',
     )
     mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
         None,
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
-        "standard's largest; by default as the pantograph says: its force applied, or met by the mean",
+        "standard's maximum; by default as the pantograph's data say: its force applied, or met by the mean",
     )
     run_in: Annotated[float, Between(0, 20, "spans")] = Field(
         0.0,
-        description="spans that the train runs without control before the episode begins: drawn per run from "
-        "0 up to this",
+        description="maximum number of spans without control before the episode begins; the number is drawn "
+        "per run, from 0 up",
     )
     pantograph_scatter: PantographScatter = Field(
         0.0, description="rms relative difference of masses, springs and dampers, drawn per run (-)"
     )
     observation: Annotated[str, BeforeValidator(_observation)] = Field(
         "measured",
-        description='what a policy sees: "measured", "full", "centred" or "estimated": as measured, but with '
-        "the contact force that a Kalman filter estimates from the pantograph's motion",
+        description='what a policy sees: "measured", "full", "centred", or "estimated": as measured, but '
+        "with the contact force that a Kalman filter estimates from the pantograph's motion",
     )
     harmonics: Annotated[int, Between(1, 14)] = Field(
         1, description="sines and cosines of the position within the span, up to this multiple of it (-)"
     )
     history: Annotated[int, Between(0, 8)] = Field(
-        0, description="earlier control steps whose readings and actions are observed, too (-)"
+        0, description="earlier control steps whose readings and actions are also observed (-)"
     )
     normalise: Annotated[tuple[_Speed, _Speed] | None, BeforeValidator(_normalise)] = Field(
         None,
-        description="speeds (km/h), a range or one, over whose passive runs, of line and pantograph as "
-        "designed, readings have a mean near 0 and a spread near 1 in the observation; by default as the "
-        "observation has them",
+        description="speed or range of speeds (km/h) of passive runs, with line and pantograph as designed, "
+        "by which readings are normalised to a mean near 0 and a spread near 1; by default the scales of the "
+        "observation",
     )
     estimator: Annotated[EstimatorSettings, BeforeValidator(_estimator)] = Field(
         "usual",
         validate_default=True,
-        description='that of the observation "estimated": "usual", "displacements", one with values as '
-        '"usual:suspension_drift=0", or a table',
+        description='estimator of the observation "estimated": "usual", "displacements", one with values '
+        'such as "usual:suspension_drift=0", or a table',
     )
     known_pantograph: Annotated[PantographData | None, BeforeValidator(_known_pantograph)] = Field(
         None,
-        description="pantograph that estimator and policies take it for: a name of the catalogue or a TOML "
+        description="pantograph that estimator and policies assume: a name of the catalogue or a TOML "
         "file; by default the true one",
     )
     reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
         None,
         validate_default=True,
-        description='weights of the reward\'s terms: "paper1", "agent", one with values as '
+        description='weights of the reward\'s terms: "paper1", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,
-        description="distance to run (m); by default to the end of the line, and a pass outside an "
-        f"environment to the end of span {LAST_USUAL} at least; a short line gets more spans",
+        description="distance to run (m); by default to the end of the line, and outside an environment at "
+        f"least to the end of span {LAST_USUAL}; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
@@ -230,14 +230,14 @@ class RunSettings(Numerics):
 
     @property
     def numerics(self) -> Numerics:
-        """How the plant is computed."""
+        """Settings of the discretisation."""
         return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
 
 
 def far_enough(settings: RunSettings) -> RunSettings:
-    """Settings of a pass: one that was told neither distance nor spans goes on until its start has died out.
+    """Settings of a pass; without distance and spans it runs until its start has died out, and ten spans on.
 
-    The line gets as many spans as that takes, and so many more that its end is not felt.
+    The line gets as many spans as necessary, and enough more that its end has no influence.
     """
     line = settings.catenary
     if settings.distance is not None or settings.spans is not None:
@@ -247,7 +247,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
 
 
 def as_designed(settings: RunSettings, speed: float) -> RunSettings:
-    """Settings of a pass at a speed (m/s) along line and pantograph as designed: nothing of it is drawn."""
+    """Settings of a pass at a speed (m/s) with line and pantograph as designed: nothing is random."""
     nothing_drawn = {
         "line_condition": (LineCondition(),),
         "pantograph_scatter": 0.0,
@@ -261,13 +261,13 @@ def as_designed(settings: RunSettings, speed: float) -> RunSettings:
 
 
 def fields(kind: type[RunSettings] = RunSettings) -> dict[str, FieldInfo]:
-    """Settings by name in the order in which they are shown: how a run is computed comes last."""
+    """Settings by name in the order in which they are shown: those of the discretisation come last."""
     last = {name: field for name, field in kind.model_fields.items() if name in Numerics.model_fields}
     return {name: field for name, field in kind.model_fields.items() if name not in last} | last
 
 
 def default(name: str) -> Any:
-    """Default of a setting, as a user would give it."""
+    """Default of a setting, in the form in which a user gives it."""
     return RunSettings.model_fields[name].default
 
 
@@ -277,12 +277,12 @@ def description(name: str) -> str:
 
 
 def run_settings(given: Mapping[str, Any]) -> RunSettings:
-    """Settings of a run from what is given by name. Raises InputError where a value is not valid."""
+    """Settings of a run from values by name. Raises InputError where a value is not valid."""
     return read_settings(given, RunSettings)
 
 
 def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
-    """As ``run_settings``, of a class of settings that has more."""
+    """As ``run_settings``, for a class with more settings than ``RunSettings``."""
     try:
         return kind.model_validate(plain(given))
     except ValidationError as error:
@@ -290,7 +290,7 @@ def read_settings(given: Mapping[str, Any], kind: type[R]) -> R:
 
 
 def check_names(given: Mapping[str, Any], what: str) -> None:
-    """Raise InputError for a name that is no setting; what: such as "option"."""
+    """Raise InputError for a name that is not a setting; what: its role for the message, e.g. "option"."""
     for name in given:
         if name not in RunSettings.model_fields:
             raise InputError(f"Unknown {what} '{name}': {suggest(str(name), list(fields()))}.")

@@ -1,4 +1,4 @@
-"""What is drawn at the start of episodes."""
+"""Random values of an episode, drawn at its start."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ..plant.pantograph.schema import PantographData
 from .settings import RunSettings
 
 LaneGenerators = np.random.Generator | Callable[[int], np.random.Generator]
-"""The generator of all lanes, or that of each by its number."""
+"""One random generator for all lanes, or a function from a lane's number to its generator."""
 
 
 _UNUSED = np.random.default_rng(0)
 
 
 class Starts(NamedTuple):
-    """What was drawn for some lanes."""
+    """Values that were drawn for some lanes."""
 
     speed: Array  # (lanes,): m/s
     line: Sequence[DrawnLine]  # of each lane
-    pantograph: Sequence[PantographData]  # likewise; empty where all are alike
-    way: Array  # (lanes,): that they run in (m)
-    drift: Array | None  # (lanes, DRIFT_ROWS): of their speeds; None where these are constant
+    pantograph: Sequence[PantographData]  # of each lane; empty where all are alike
+    way: Array  # (lanes,): distance of the run-in (m)
+    drift: Array | None  # (lanes, DRIFT_ROWS): of the speeds; None where these are constant
 
 
 def draw_starts(
@@ -42,7 +42,7 @@ def draw_starts(
     time_step: float,
     alignment: Alignment,
 ) -> Starts:
-    """Draw the starts of lanes, (n,), each from its own generator, asked for only where something is random.
+    """Draw the starts of lanes, (n,), each from its own generator, which is only made where it is needed.
 
     speeds: minimum and maximum (m/s). droppers, supports, alignment: of the line. time_step: s.
     """

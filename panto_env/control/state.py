@@ -1,4 +1,4 @@
-"""Rows of what the task keeps of each lane, by name."""
+"""Names of the rows of the task's tables."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ TERMS = tuple(term.name.lower() for term in Term)
 
 
 class TaskRow(IntEnum):
-    """Rows of the table of all lanes."""
+    """Rows of each lane in the task's table."""
 
-    DISTANCE = 0  # that the episode covers (m)
-    END = 1  # plant steps that the episode has
+    DISTANCE = 0  # of the episode (m)
+    END = 1  # number of plant steps of the episode
     ENDING = 2  # why it ended early, an ``Ending``
     LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
-    MEAN_DEVIATION = 4  # running mean of the contact force less the nominal one (N)
-    TARGET_SHIFT = 5  # force that the reward counts from, less the nominal one (N)
-    PER_SPREAD = 6  # for a squared deviation from it of 1 (1/N)
+    MEAN_DEVIATION = 4  # running mean of contact force minus nominal force (N)
+    TARGET_SHIFT = 5  # target force of the reward minus nominal force (N)
+    PER_SPREAD = 6  # 1 / deviation from the target that counts as 1 (1/N)
     # Running figures.
     FILTER_STATE = 7  # of EN 50317's filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6
-    DEVIATION = FILTER_STATE + 7  # sum of the filtered contact force less the nominal one (N)
-    SQUARED_DEVIATION = FILTER_STATE + 8  # sum (N^2)
+    DEVIATION = FILTER_STATE + 7  # sum of filtered contact force minus nominal force (N)
+    SQUARED_DEVIATION = FILTER_STATE + 8  # sum of the squares (N^2)
     MAX = FILTER_STATE + 9  # of the filtered contact force (N)
     MIN = FILTER_STATE + 10  # of the filtered contact force (N)
     ALL_LOSS_STEPS = FILTER_STATE + 11  # plant steps without contact
@@ -49,23 +49,23 @@ class TaskRow(IntEnum):
 
 
 class Now(IntEnum):
-    """Rows of what a kernel keeps of a lane during a control step."""
+    """Rows of a lane's values within a control step."""
 
     COST = 0  # sum of deviations at both ends of each interval (N)
     LOSS_STEPS = 1  # plant steps without contact
-    SIGNED_DEVIATION = 2  # sum of the contact force less the nominal one (N)
-    EFFORT = 3  # the reward's term
-    RATE = 4  # likewise
+    SIGNED_DEVIATION = 2  # sum of contact force minus nominal force (N)
+    EFFORT = 3  # term of the reward
+    RATE = 4  # term of the reward
     SPANS = 5  # travelled since the line's start, as read (-)
     SPEED = 6  # of the train, as read (m/s)
     STRIDE = 7  # mean distance covered in a plant step (m)
-    DEVIATION_BEFORE = 8  # running figure of that name as the control step begins (N)
-    SQUARED_BEFORE = 9  # likewise (N^2)
+    DEVIATION_BEFORE = 8  # ``TaskRow.DEVIATION`` at the start of the control step (N)
+    SQUARED_BEFORE = 9  # ``TaskRow.SQUARED_DEVIATION`` at the start of the control step (N^2)
     READING = 10  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):
-    """Rows of what a control step tells of all lanes beside their observations."""
+    """Rows of a lane's results of a control step, besides its observation."""
 
     REWARD = 0
     TERM = 1  # of the reward, one row per term
@@ -78,14 +78,14 @@ class Result(IntEnum):
 
 
 class Flag(IntEnum):
-    """Rows of what it tells that is true or not."""
+    """Rows of a lane's Boolean results of a control step."""
 
     TERMINATED = 0  # whether the plant has left its valid range
     TRUNCATED = 1  # whether the end of the run is reached, within it
 
 
 CONTROLLED = 0
-"""The collector that is controlled, observed and judged."""
+"""The collector that is controlled and observed, and whose contact force is evaluated."""
 TASK_ROW, TERM, NOW = constants(TaskRow), constants(Term), constants(Now)
 RESULT, FLAG = constants(Result), constants(Flag)
 NOW_ROWS = int(Now.READING) + len(Reading)

@@ -19,7 +19,7 @@ from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 @inlined
 def take_action(run, episode, task, now, lane):
-    """Clip a lane's action; the forces that it asks for, and the reward's terms of it."""
+    """Clip a lane's action, and set the requested forces and the reward's terms for the action."""
     for c in range(run.command.shape[0]):
         run.command[c, lane, PLACE.FRAME] = 0.0
         run.command[c, lane, PLACE.HEAD] = 0.0
@@ -36,7 +36,7 @@ def take_action(run, episode, task, now, lane):
 
 @inlined
 def end_episode(line, wire, episode, own, task, values, flags, lane):
-    """Whether a lane's episode ends here; one that ends early pays for it."""
+    """Whether a lane's episode ends here; an early end is charged to the reward."""
     ending = ending_by_wire(line, wire, lane)
     if task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit:
         ending = ENDING.LOSS
@@ -57,7 +57,7 @@ def end_episode(line, wire, episode, own, task, values, flags, lane):
 
 
 @inlined
-def tell(run, own, values, lane):
+def write_sample(run, own, values, lane):
     """Write a lane's last sample into its results."""
     values[RESULT.CONTACT_FORCE] = own[ROW.CONTACT_FORCE]
     values[RESULT.HEAD_HEIGHT] = own[ROW.HEAD_HEIGHT]
@@ -69,7 +69,7 @@ def tell(run, own, values, lane):
 
 @inlined
 def control_lane(packed, entries, values, flags, lane):
-    """Control steps of one lane, none beyond the end of its episode, and its results, each (n,).
+    """Make control steps in one lane, none beyond the end of its episode, and write its results, each (n,).
 
     Returns whether its episode has ended.
     """
@@ -79,7 +79,7 @@ def control_lane(packed, entries, values, flags, lane):
     ended = False
     for _ in range(episode.steps[lane]):
         if own[ROW.STEP] >= task[TASK_ROW.END]:
-            break  # no step beyond it, whoever asks: there are neither line nor rows of samples
+            break  # beyond the end there are neither line nor rows of samples
         begin_terms(task, now)
         now[NOW.STRIDE] = mean_stride(run, CONTROLLED, lane, float(episode.control_steps))
         for step in range(1, episode.control_steps + 1):
@@ -100,7 +100,7 @@ def control_lane(packed, entries, values, flags, lane):
         entry = entry_of(episode, own, task, now, k)
         entries[k] = 0.0 if diverged else entry
     remember(episode, task, now)
-    tell(run, own, values, lane)
+    write_sample(run, own, values, lane)
     return ended
 
 
@@ -116,11 +116,11 @@ def all_finite(action):
 
 @kernel
 def control_steps(packed, entries, values, flags, first, last):
-    """Control steps of the lanes from ``first`` to before ``last`` under ``episode.action``.
+    """Make control steps in the lanes from ``first`` to before ``last`` under ``episode.action``.
 
-    Returns 0 where no episode has ended, 1 where one has, and -1, having done nothing, where an action is not
-    finite. Results go to entries, values and flags, as of ``Results``. A lane that is idle stays as it is.
-    packed: line, wire, pantographs, actuators, run, sensors, samples, episode, running figures.
+    Returns 0 where no episode has ended, 1 where one has, and -1, without a step, where an action is not
+    finite. Results go to entries, values and flags, as in ``Results``. Idle lanes are skipped. packed: line,
+    wire, pantographs, actuators, run, sensors, samples, episode, running figures.
     """
     _, _, _, _, _, _, _, episode, _ = open_packed(packed)
     if not all_finite(episode.action):
@@ -134,7 +134,7 @@ def control_steps(packed, entries, values, flags, first, last):
 
 @kernel
 def observe_start(packed, entries, values, flags, first, last):
-    """Results of the lanes from ``first`` to before ``last`` at their start, but of idle ones; as above."""
+    """Write the results of lanes at their start, except idle ones; arguments as in ``control_steps``."""
     _, _, _, _, run, sensors, _, episode, _ = open_packed(packed)
     for lane in range(first, last):
         if not episode.idle[lane]:
@@ -146,6 +146,6 @@ def observe_start(packed, entries, values, flags, first, last):
                 entries[lane, k] = entry_of(episode, own, task, now, k)
             for k in range(RESULT_ROWS):
                 values[lane, k] = 0.0
-            tell(run, own, values[lane], lane)
+            write_sample(run, own, values[lane], lane)
             for k in range(flags.shape[1]):
                 flags[lane, k] = False

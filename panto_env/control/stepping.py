@@ -1,4 +1,4 @@
-"""Lanes that make control steps: kernels bound to their arrays, and whose episode has ended."""
+"""Lanes that make control steps: kernels bound to their arrays, and which episodes have ended."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .episode import Flags, Results, new_results
 from .step import control_steps, observe_start
 
 COASTED = 100
-"""Control steps without a policy that are made at once."""
+"""Control steps without a policy per call."""
 BOUND_ANEW = ("_threads", "_plain_step", "_observe_start")
-"""Attributes that ``Stepping._bind`` makes of the others."""
+"""Attributes that ``Stepping._bind`` makes from the others."""
 
 
 class Stepping:
-    """Lanes of a plant with the arrays of their episodes, stepped together or some of them."""
+    """Lanes of a plant with the arrays of their episodes; all or some of them are stepped together."""
 
     def __init__(
         self,
@@ -38,8 +38,10 @@ class Stepping:
         odometers: Odometers,
         entries: int,
     ) -> None:
-        """Bind the kernels. entries: of an observation; sensors, samples, episode, running: named tuples of
-        arrays, as the kernels take them after those of the plant.
+        """Bind the kernels.
+
+        entries: number of entries of an observation. sensors, samples, episode, running: named tuples of
+        arrays, which the kernels take after those of the plant.
         """
         self.plant, self.lanes, self.noise, self.odometers = plant, lanes, noise, odometers
         self.sensors, self.samples, self.episode, self.running = sensors, samples, episode, running
@@ -65,7 +67,7 @@ class Stepping:
         self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what a copy has to bind anew, since its arrays lie elsewhere."""
+        """State without the bound kernels: a copy has arrays of its own, and binds them again."""
         return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -74,16 +76,16 @@ class Stepping:
         self._bind()
 
     def new_results(self) -> Results:
-        """Room for the results of a step."""
+        """Empty arrays for the results of a step."""
         return new_results(self.lanes, self._entries)
 
     def begin(self, lanes: Any) -> None:
-        """Take it that episodes begin in lanes, (n,)."""
+        """Mark that episodes begin in lanes, (n,)."""
         self._over[lanes] = False
         self._any_over = bool(self._over.any())
 
     def observe_start(self, lanes: Any, results: Results) -> None:
-        """Write into results what is observed of lanes, (n,), that stand at their start."""
+        """Write the results of lanes, (n,), at their start."""
         idle = self.episode.idle
         idle[:] = True
         idle[lanes] = False
@@ -96,11 +98,11 @@ class Stepping:
         skip: Flags | None = None,
         results: Results | None = None,
     ) -> bool:
-        """One control step of all lanes, but those to skip, under actions, (lanes, actions).
+        """Make one control step in all lanes, except those to skip, under actions, (lanes, actions).
 
         Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
-        default the task's own. Lanes that are skipped stay as they are. Raises InputError, and changes
-        nothing, for an action that is not finite, or a lane whose episode has ended or not begun.
+        default the task's own. Skipped lanes do not change. Raises InputError, and changes nothing, for an
+        action that is not finite, or a lane whose episode has ended or not begun.
         """
         if self._any_over:
             self._refuse_over(skip)
@@ -110,25 +112,25 @@ class Stepping:
         if self.odometers.drawn:
             self.odometers.prepare(self.episode.odometer, skip)
         if skip is None and results is None:
-            return self._told(self._plain_step(), self.results)  # the usual step, as short as it can be
+            return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible
         results = results or self.results
         if skip is None:
-            return self._told(self._threads.step(*results), results)
+            return self._evaluate(self._threads.step(*results), results)
         self.episode.idle[:] = skip
         answer = self._threads.step(*results)
         self.episode.idle[:] = False
-        return self._told(answer, results, skip)
+        return self._evaluate(answer, results, skip)
 
     def _refuse_over(self, skip: Flags | None) -> None:
-        """Raise InputError where a lane that is not skipped has nothing to step."""
+        """Raise InputError where a lane that is not skipped has no running episode."""
         over = self._over if skip is None else self._over & ~skip
         if over.any():
             raise InputError(
                 f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
             )
 
-    def _told(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
-        """What a kernel has answered: whether an episode has ended; InputError for a wrong action."""
+    def _evaluate(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
+        """Whether an episode has ended, from a kernel's answer. Raises InputError for an invalid action."""
         if answer > 0:
             ended = results.terminated | results.truncated
             self._over |= ended if skip is None else ended & ~skip
@@ -143,7 +145,7 @@ class Stepping:
     def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
         """Run all lanes, just reset, to their ends without actuators.
 
-        watch: called with this object now and then, after some control steps; it must change nothing.
+        watch: called with this object after every ``COASTED`` control steps; it must change nothing.
         """
         ended = np.zeros(self.lanes, dtype=np.bool_)
         while not ended.all():
@@ -153,9 +155,9 @@ class Stepping:
                 watch(self)
 
     def coast(self, steps: Any, results: Results) -> None:
-        """Control steps without control, (lanes,) of them in each lane, none beyond an episode's end.
+        """Make ``steps``, (lanes,), control steps without control, none beyond an episode's end.
 
-        Noise is drawn for the observation behind the last step alone.
+        Noise is drawn only for the observation after the last step.
         """
         self.episode.steps[:] = steps
         self.step(np.zeros_like(self.episode.action), steps == 0, results)

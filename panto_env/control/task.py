@@ -18,7 +18,7 @@ from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
 from .cost import Cost, arrays_of, run_cost
-from .entries import ESTIMATED, Asked
+from .entries import ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
@@ -36,7 +36,7 @@ from .task_state import TaskState
 
 
 class Task(TaskState):
-    """Lanes of one pantograph, line and controller; each lane is reset and judged on its own."""
+    """Lanes with one line, pantograph and controller; each lane is reset and evaluated on its own."""
 
     def __init__(
         self,
@@ -47,23 +47,23 @@ class Task(TaskState):
         record_droppers: bool = False,
         trim: Trim | None = None,
     ) -> None:
-        """Build the plant and the arrays of an episode; ``cost`` says what the longest one takes.
+        """Build the plant and the arrays of an episode; ``cost`` is that of the longest one.
 
-        keep_samples: keep those of a whole episode, for ``trajectory``; record_droppers: with the tension
-        of every dropper. trim: static force, where a mean force is to be met; by default that of the line and
-        the pantograph as designed. Raises InputError for what is not valid together.
+        keep_samples: keep the samples of a whole episode, for ``trajectory``. record_droppers: with the
+        tension of every dropper. trim: static force where a mean force is required; by default that of line
+        and pantograph as designed. Raises InputError for settings that are not valid together.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.catenary.kind == "rig":
-            raise InputError("A rig runs its line at one speed; leave out speed_drift, or take another line.")
+            raise InputError("A rig runs its line at one speed; leave out speed_drift, or use another line.")
         self.settings, self.actuator, self.trim = settings, settings.actuator, trim
         plant = new_plant(settings, lanes)
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
-        asked = Asked(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
-        self.layout = layout(settings.observation, asked)
+        options = EntryOptions(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
+        self.layout = layout(settings.observation, options)
         self.known_pantograph = settings.known_pantograph or settings.pantograph
         if settings.normalise is not None:
             known = settings.model_copy(update={"pantograph": self.known_pantograph})
@@ -90,9 +90,9 @@ class Task(TaskState):
         )
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
-        """What the longest episode takes.
+        """Cost of the longest episode.
 
-        Raises InputError where that is more memory than the machine has, or more time than anyone has.
+        Raises InputError where it exceeds the machine's memory or the maximum computing time.
         """
         steps, supports = self.length.most_plant_steps, len(plant.model.supports)
         droppers = len(plant.model.droppers) if self.record_droppers else 0
@@ -114,18 +114,18 @@ class Task(TaskState):
         return estimating(settings.sensors, settings.estimator, self.known_pantograph, speed, span, *form)
 
     def reset(self, lanes: Lanes, random: LaneGenerators, results: Results | None = None) -> None:
-        """Start episodes in lanes, a number or (n,), and run them in without control as far as drawn.
+        """Start episodes in lanes, a number or (n,), and make their run-in without control.
 
-        random: the generator of all lanes, or of each, from which its speed, its line, its pantograph and how
-        far it runs in are drawn; it is not asked for where nothing is. Results go to ``results``, by default
-        the task's own. Raises InputError where a run leaves the plant's valid range before its episode.
+        random: the generator of all lanes, or a function that gives each lane's, from which speed, line,
+        pantograph and run-in are drawn; it is not called where nothing is random. Results go to ``results``,
+        by default the task's own. Raises InputError where a run-in leaves the plant's valid range.
         """
         lanes = np.atleast_1d(lanes)
         self.begin(lanes)
         reset(self, lanes, random, self.static_forces, results or self.results)
 
     def static_forces(self, speeds: Array) -> Array | None:
-        """Static forces (N) at speeds (m/s) where a mean force is to be met, else None."""
+        """Static forces (N) at speeds (m/s) where a mean force is required, else None."""
         if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
@@ -133,11 +133,11 @@ class Task(TaskState):
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
 
     def end(self, lane: int) -> int:
-        """Plant steps that a lane's episode has."""
+        """Number of plant steps of a lane's episode."""
         return int(self.episode.table[lane, TaskRow.END])
 
     def context(self, lane: int) -> Context:
-        """What a policy may know of a lane's episode."""
+        """Information about a lane's episode that a policy may use."""
         return Context(
             layout=self.layout,
             actions=len(self.actuator.places),
@@ -162,7 +162,7 @@ class Task(TaskState):
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
     def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
-        """Figures of several lanes, (n,), by name; and which have none, as their computation diverged."""
+        """Figures of several lanes, (n,), by name, and which lanes have none, because they diverged."""
         run, supports = self.plant.run.table[CONTROLLED, lanes], self.plant.model.supports
         with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
             figures = figures_so_far(
@@ -178,20 +178,21 @@ class Task(TaskState):
         return figures, diverged(self, lanes, deviation, run[:, Row.WIRE_HEIGHT])
 
     def divergence(self, lane: int) -> str:
-        """That a lane's computation diverged, and what to do, as a sentence."""
+        """Message that a lane's computation diverged, and what to do."""
         return divergence(self, lane)
 
     def trajectory(
         self, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
     ) -> Trajectory:
-        """Record of a lane's run so far; last: of a task that runs no more, whose arrays it takes over.
+        """Record of a lane's run so far.
 
-        Raises InputError where the computation diverged.
+        last: the task does not run any more, so the record may take over its arrays. Raises InputError where
+        the computation diverged.
         """
         return trajectory(self, lane, policy, seed, last=last)
 
     def ending(self, lane: int) -> str:
-        """Where and why a lane's run ended early, as a sentence; empty where it did not."""
+        """Where and why a lane's run ended early, as a sentence; empty if it did not."""
         return ending(self, lane)
 
 

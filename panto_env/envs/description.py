@@ -1,10 +1,10 @@
-"""What the environment's own description says of arguments, ids and observations: the tables in it."""
+"""Tables of arguments, ids and observations in the environment's docstring."""
 
 from __future__ import annotations
 
 from ..catalog import load_pantograph
 from ..control.arguments import table
-from ..control.entries import CENTRED, Asked
+from ..control.entries import CENTRED, EntryOptions
 from ..control.observation import layout
 from ..control.settings import default
 from ..plant.actuators import actuator_settings
@@ -13,7 +13,7 @@ from .settings import EnvironmentSettings
 
 
 def described(text: str) -> str:
-    """A description with its tables put in."""
+    """A description with its tables inserted."""
     return text.format(
         in_service=_indented(_id_table("Pantograph-v0")),
         centred=_indented(_observation_table(CENTRED)),
@@ -25,7 +25,7 @@ def described(text: str) -> str:
 def _observation_table(kind: str) -> str:
     """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, Asked(actuator, pantograph)).entries
+    entries = layout(kind, EntryOptions(actuator, pantograph)).entries
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
         for k, each in enumerate(entries)
@@ -36,7 +36,7 @@ def _observation_table(kind: str) -> str:
 
 
 def _id_table(name: str) -> str:
-    """What an id sets, as a Markdown table."""
+    """Arguments that an id sets, as a Markdown table."""
     rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
     return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
 

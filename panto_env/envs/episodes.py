@@ -1,4 +1,4 @@
-"""What the single and the vector environment do alike about episodes: their options, and their longest."""
+"""Episodes of the single and the vector environment: their options and their maximum length."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..control.settings import check_names, read_settings
 
 
 def task_with_options(usual: Task, options: Mapping[str, Any]) -> Task:
-    """The task of an episode with ``options``: arguments of the environment, for this episode alone.
+    """The task of an episode with ``options``: arguments of the environment, only for this episode.
 
-    Without any it is ``usual``. Raises InputError where they are not valid, or would change a space.
+    Without options it is ``usual``. Raises InputError where they are not valid, or would change a space.
     """
     check_names(options, "option")
     if not options:
@@ -32,11 +32,11 @@ def task_with_options(usual: Task, options: Mapping[str, Any]) -> Task:
 
 
 def with_longest_episode(spec: EnvSpec | None, steps: int) -> EnvSpec | None:
-    """The spec of an environment whose longest episode has ``steps``: wrappers ask how long it is."""
+    """A copy of an environment's spec with the maximum steps of an episode, which wrappers read."""
     if spec is None:
         return None
-    told = copy.copy(spec)
-    told.max_episode_steps = steps
-    # ``make_vec`` adds it to the arguments as well: were it left there, a spec made of this one would differ.
-    told.kwargs = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
-    return told
+    completed = copy.copy(spec)
+    completed.max_episode_steps = steps
+    # ``make_vec`` also adds it to the arguments; left there, a spec made from this one would differ.
+    completed.kwargs = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
+    return completed

@@ -1,4 +1,4 @@
-"""The registered ids, and what each sets."""
+"""The registered ids, and the arguments that each sets."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ IDS: dict[str, dict[str, Any]] = {
     "Pantograph-v0": {
         "speed_kmh": (200.0, 300.0),
         "line_condition": "as-built",
-        "pantograph_scatter": 0.05,  # own choice: what makers and wear make of masses, springs and dampers
+        "pantograph_scatter": 0.05,  # own choice: spread of masses, springs and dampers by making and wear
         "run_in": 1.0,
         "actuator": "realistic",
         "sensors": "realistic",
         "observation": "centred",
         "window": 8,  # half of what figures take by default: sigma within 1 to 2 %, and twice as fast
-        # As little as keeps the force from chattering, and the mean within the benchmark's rule.
+        # The smallest weights that avoid chattering and keep the mean within the benchmark's rule.
         "reward": {"rate": 0.1, "mean_force": 50.0},
     },
     "PantographStiffness-v0": {"catenary": "periodic-stiffness", "pantograph": "three-mass"},
@@ -25,4 +25,4 @@ IDS: dict[str, dict[str, Any]] = {
 """Registered ids and the arguments that set them apart."""
 BARE = {name: default(name) for name in IDS["Pantograph-v0"]}
 """Arguments that make Pantograph-v0 the papers' bare form: one speed, a line and a pantograph as designed,
-ideal actuator and sensors, and a reward of CF and CL alone."""
+ideal actuator and sensors, and a reward of CF and CL only."""

@@ -1,4 +1,4 @@
-"""What the infos of the single and of the vector environment hold: the same, under the same keys."""
+"""Infos of the single and the vector environment: the same content under the same keys."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ FRAME_FORCE, HEAD_FORCE = int(Result.FRAME_FORCE), int(Result.HEAD_FORCE)
 POSITION = int(Result.POSITION)
 
 FIGURES_TO_COME = {field.name: math.inf for field in fields(Figures)}
-"""Figures of an episode that has not ended. Recorders want the same keys in every info, and nan would not do:
-no two infos with nan are equal, which Gymnasium's checkers ask, and some learners refuse it."""
+"""Figures of an episode that has not ended. Recorders require the same keys in every info; nan would make two
+infos unequal, which Gymnasium's checkers refuse, as some learners do."""
 
 
-def told(task: Task) -> dict[str, float]:
+def final_figures(task: Task) -> dict[str, float]:
     """Figures of the ended episode of a task's only lane, for infos."""
     return {name: float(value[0]) for name, value in ended_figures(task, np.zeros(1, dtype=np.int64)).items()}
 
 
 def lane_infos(answer: Answer) -> dict[str, Any]:
-    """Infos of lanes as Gymnasium's vector environments have them.
+    """Infos of lanes in the form of Gymnasium's vector environments.
 
-    Each key holds an array with a value per lane, or a dictionary of such; "_key" marks who has it.
+    Each key holds an array with a value per lane, or a dictionary of such arrays; "_key" marks the lanes
+    that have a value.
     """
     (_, values, _), speed_kmh, lanes = answer
     rows = values.T
@@ -75,7 +76,7 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
 
 
 def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
-    """Figures, (lanes,), by name, of the lanes whose episodes have ended, as they stand in infos."""
+    """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended."""
     values: dict[str, Any] = {}
     for name, value in figures.items():
         values[name], values[f"_{name}"] = value, lanes.copy()

@@ -1,4 +1,4 @@
-"""The lanes of a vector environment: each runs the usual task, or one of its own for an episode."""
+"""The lanes of a vector environment: each runs the usual task, or another one for an episode."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..control.start import LaneGenerators
 
 
 class Answer(NamedTuple):
-    """What lanes have come to."""
+    """Results of a step or a reset."""
 
     results: Results
     speed_kmh: Array  # (lanes,): km/h
-    lanes: Flags  # (lanes,): which of them it is of; it has zeros for the others
+    lanes: Flags  # (lanes,): which lanes have results; the others are zero
 
     def of(self, lanes: Flags) -> Answer:
-        """What is of these lanes, in arrays of its own."""
+        """A copy with the results of these lanes only."""
         values = self.results.values.copy()
         values[~lanes] = 0.0
         speed_kmh = np.where(lanes, self.speed_kmh, 0.0)
@@ -32,22 +32,22 @@ class Answer(NamedTuple):
 
 
 class VectorLanes:
-    """All lanes, and the tasks that they run: most often the same one."""
+    """All lanes, and the tasks that they run: usually the same one."""
 
     def __init__(self, usual: Task) -> None:
         """usual: the task of episodes without options, of all lanes."""
         self.usual = usual
-        self._results = usual.results  # of the last step, in arrays that nobody writes to once answered
-        self._others: list[tuple[Task, Flags]] = []  # tasks of episodes with options, and whose they are
+        self._results = usual.results  # of the last step, in arrays that are not written to after return
+        self._others: list[tuple[Task, Flags]] = []  # tasks of episodes with options, and their lanes
         self._speed_kmh = np.zeros(usual.lanes)
 
     def begin(self, lanes: Flags, task: Task, random: LaneGenerators) -> None:
-        """Begin episodes of a task, the usual one or another of as many lanes, in the lanes marked."""
+        """Begin episodes of a task, the usual one or another with as many lanes, in the marked lanes."""
         self._results = self._results.copy()
         self._begin(lanes, task, random)
 
     def step(self, action: Array, waiting: Flags | None, random: LaneGenerators) -> bool:
-        """One control step of all lanes under actions, (lanes, actions), but those waiting to begin anew.
+        """Make one control step under actions, (lanes, actions); lanes in ``waiting`` are reset instead.
 
         Returns whether an episode has ended. Raises InputError, and changes nothing, for an action that is
         not finite.
@@ -78,18 +78,18 @@ class VectorLanes:
         self._speed_kmh[lanes] = to_kmh(task.speed[lanes])
 
     def _take(self, results: Results, lanes: Flags) -> None:
-        """Take over the results of some lanes."""
+        """Copy the results of some lanes."""
         if results is not self._results:
             own = np.flatnonzero(lanes)
             for taken, given in zip(self._results, results, strict=True):
                 taken[own] = given[own]
 
     def answer(self) -> Answer:
-        """What all lanes have come to."""
+        """Results of all lanes."""
         return Answer(self._results, self._speed_kmh.copy(), np.ones(self.usual.lanes, dtype=np.bool_))
 
     def task_of(self, lane: int) -> Task:
-        """The task that a lane runs in."""
+        """The task that a lane runs."""
         return next((task for task, its in self._others if its[lane]), self.usual)
 
     def figures(self, lanes: Flags) -> dict[str, Array]:
@@ -115,10 +115,10 @@ class VectorLanes:
 
 
 def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:
-    """Figures of lanes, (n,), whose episodes have ended, by name: what infos tell of them.
+    """Figures of lanes, (n,), whose episodes have ended, by name, for infos.
 
-    Infinite where a run has none: as uplift without supports, or all, with an AccuracyWarning that says why,
-    where its computation diverged.
+    Infinite where a run has none, for example uplift without supports; all figures where its computation
+    diverged, with an AccuracyWarning.
     """
     figures, without = task.figures_of(lanes)
     for lane in lanes[without].tolist():

@@ -1,4 +1,4 @@
-"""An environment is used by one thread at a time: a second one at once is refused."""
+"""An environment is used by one thread at a time: a second one is refused."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class InUse:
-    """Whether a thread is using an environment just now; the copy of one is not in use.
+    """Lock that shows whether a thread is using an environment; a copy is not in use.
 
-    In a forked process it stays in use if another thread was using it: nobody finishes there what that thread
-    had begun, and a generator of random numbers that it had locked would be waited for without end.
+    In a forked process it stays in use if another thread was using it: that thread does not exist there, and
+    a random generator that it had locked would block forever.
     """
 
     def __init__(self) -> None:
@@ -30,13 +30,13 @@ class InUse:
 def refuse() -> NoReturn:
     """Raise InputError: another thread is using an environment."""
     raise InputError(
-        "Another thread is using this environment just now, or was when this process was forked; give each "
-        "thread and each process one of its own."
+        "Another thread is using this environment, or was when this process was forked; give each thread and "
+        "each process one of its own."
     )
 
 
 def one_at_a_time(method: F) -> F:
-    """Decorator of a method of an environment, which has an ``InUse`` under ``_in_use``.
+    """Decorator of a method of an environment with an ``InUse`` in ``_in_use``.
 
     The method raises InputError, and does nothing, while another thread is in one of these methods.
     """

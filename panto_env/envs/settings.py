@@ -1,4 +1,4 @@
-"""What the environments can be told beside the settings of a run."""
+"""Arguments of the environments, in addition to the settings of a run."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..base.shown import shown
 from ..control.settings import RunSettings
 
 MOST_LANES = 10_000_000
-"""As many as a large machine's memory holds where the wire has no mass; fewer where it has."""
+"""Lanes that fit into a large machine's memory with a massless wire; with others fewer do."""
 Pixels = Annotated[int, Between(64, 4096)]
 SlowMotion = Field(
-    1.0, description="how many times slower than in life a film of the frames is, as `render_fps` tells (-)"
+    1.0, description="factor by which a film of the frames is slowed down, included in `render_fps` (-)"
 )
 
 
@@ -46,16 +46,16 @@ class VectorSettings(RunSettings):
     )
     autoreset_mode: AutoresetMode = Field(
         AutoresetMode.NEXT_STEP,
-        description='when a lane whose episode has ended begins anew: "NextStep", "SameStep" or "Disabled"',
+        description='when a lane whose episode has ended is reset: "NextStep", "SameStep" or "Disabled"',
     )
     max_episode_steps: Annotated[int, Between(1, 10**12)] | None = Field(
         None, description="steps after which an episode is truncated; by default the line's end"
     )
     render_mode: Literal["rgb_array"] | None = Field(
-        None, description='None, or "rgb_array" for frames from `render()`, one per lane that is drawn'
+        None, description='None, or "rgb_array" for frames from `render()`, one per drawn lane'
     )
     render_lanes: tuple[Annotated[int, Between(0, 10**6)], ...] | None = Field(
-        None, description="numbers of the lanes that are drawn, by default all"
+        None, description="numbers of the drawn lanes, by default all"
     )
     render_size: tuple[Pixels, Pixels] = Field((640, 360), description="width and height of a frame (px)")
     slow_motion: Annotated[float, Between(0.01, 1000)] = SlowMotion
@@ -87,7 +87,7 @@ class VectorSettings(RunSettings):
 
 
 def frames_per_second(control_interval: float, slow_motion: float) -> float:
-    """Of a film with one frame per control step, whole where it is nearly so."""
+    """Frames per second of a film with one frame per control step, rounded where nearly whole."""
     exact = 1 / control_interval / slow_motion
     return round(exact) if abs(exact - round(exact)) < 1e-6 * exact else exact
 

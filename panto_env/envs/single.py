@@ -19,7 +19,7 @@ from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
 from .description import described
 from .episodes import task_with_options, with_longest_episode
-from .infos import CONTACT_FORCE, FIGURES_TO_COME, first_info, told
+from .infos import CONTACT_FORCE, FIGURES_TO_COME, final_figures, first_info
 from .one_thread import InUse, one_at_a_time, refuse
 from .settings import EnvironmentSettings, render_metadata
 
@@ -27,35 +27,36 @@ if TYPE_CHECKING:
     from ..render.viewer import Viewer
 
 SEEN = ("_shape", "_observation", "_values", "_flags")
-"""Attributes that ``PantographEnv._watch`` takes from the task."""
+"""Attributes that ``PantographEnv._watch`` sets from the task."""
 
 
 class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A pantograph under a catenary, whose contact force an actuator is to keep steady.
+    """A pantograph under a catenary, with an actuator that reduces variations of the contact force.
 
     ## Description
-    A train runs at constant speed; its pantograph, pressed up by its nominal force, slides along the
-    contact wire. The line's uneven stiffness makes the contact force swing. An actuator on the
-    pantograph can calm it. Ids: `Pantograph-v0` (flexible catenary, EN 50318:2002),
+    A train runs at constant speed; its pantograph, lifted by its nominal force, slides along the
+    contact wire. The non-uniform stiffness of the line makes the contact force vary. An actuator on the
+    pantograph can reduce this variation. Ids: `Pantograph-v0` (flexible catenary, EN 50318:2002),
     `PantographStiffness-v0` (periodic stiffness, paper 3), `PantographThreeSpan-v0` (three-span
     modal catenary, paper 2).
 
-    `Pantograph-v0` sets these arguments; what you give takes their place:
+    `Pantograph-v0` sets these arguments; your own arguments replace them:
 
     {in_service}
 
-    So no two episodes are alike, and what is learnt is not one line by heart. `**panto_env.envs.BARE` among
-    the arguments makes it the papers' bare form, which the class and the other ids are by default.
+    So no two episodes are alike, and a policy cannot learn one line by heart. `**panto_env.envs.BARE` among
+    the arguments gives the papers' bare form, the default of the class and of the other ids.
 
     ## Action Space
     `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={{"place": "both"}}`: share of the actuator's
-    force limit (100 N unless told otherwise), up on the frame or up on the head and down on the mass
+    force limit (100 N by default), up on the frame or up on the head and down on the mass
     below it. Held for one control interval (10 ms). Values outside are clipped; NaN, infinite or
-    wrongly shaped actions raise an error and leave the environment as it was.
+    wrongly shaped actions raise an error and do not change the environment.
 
     ## Observation Space
-    `Box(-10, 10, (n,), float32)`, each entry a physical value less its centre, over its scale. Those of
-    `Pantograph-v0`, `observation="centred"`, have a mean near 0 and a spread near 1 in a passive run:
+    `Box(-10, 10, (n,), float32)`; each entry is a physical value minus its centre, divided by its scale. In
+    `Pantograph-v0`, with `observation="centred"`, entries have a mean near 0 and a spread near 1 in a passive
+    run:
 
     {centred}
 
@@ -70,35 +71,35 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Rewards
     Minus the cost function CF over the control step (relative to the nominal force) and minus the
     share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
-    effort and rate of the action and for the mean force have weight 0 but in `Pantograph-v0`. A `reward` of
-    your own takes the place of all its weights. `reward="agent"` is what the benchmark measures: the squared
-    deviation of the low-passed contact force from the passive run's mean, over its variance there; with it go
-    terms that hold the mean and keep the action from chattering. `info["reward_terms"]` holds the unweighted
-    terms: over an episode "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
+    effort and rate of the action and for the mean force have weight 0 except in `Pantograph-v0`. Your own
+    `reward` replaces all its weights. `reward="agent"` is what the benchmark measures: the squared deviation
+    of the low-passed contact force from the passive run's mean, over its variance there, with terms that hold
+    the mean and prevent chattering. `info["reward_terms"]` holds the unweighted terms: over an episode
+    "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
 
     ## Starting State
-    At the start of the line, at rest under the nominal force; with `run_in`, so many spans later at most.
+    At the start of the line, at rest under the nominal force; with `run_in`, up to that many spans later.
 
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
-    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the rest of
-    the run is then charged as if without contact.
+    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the reward is
+    then charged for the rest of the run as if without contact.
 
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
     actuators (N), position (m), speed (km/h), the reward's terms. `info["figures"]` holds the episode's
-    figures when it ends, those of `Trajectory.summary()`. Until then they are infinite, as is always one that
-    the run has not, such as uplift where no support is passed. A `TimeLimit` ends episodes without the
-    environment's knowledge: `trajectory.summary()` has the figures then, too.
+    figures when it ends, those of `Trajectory.summary()`. Until then they are infinite; a figure that the run
+    does not have, such as uplift where no support is passed, stays infinite. A `TimeLimit` ends episodes
+    without the environment's knowledge: `trajectory.summary()` has the figures then, too.
 
     ## Arguments
     {arguments}
 
-    `reset(options=...)` takes the same for one episode, but those that change a space.
+    `reset(options=...)` takes the same for one episode, except those that change a space.
 
     ## Copies
-    `copy.deepcopy` and `pickle` take the environment as it is, in the middle of an episode too; the copy goes
-    on bit for bit as the original would, as tree search and worker processes need.
+    `copy.deepcopy` and `pickle` copy the environment with its state, also in the middle of an episode; the
+    copy continues bit for bit as the original, as tree search and worker processes require.
 
     ## Version History
     * v0: first version.
@@ -114,7 +115,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = render_metadata(self.metadata, settings)
         self._in_use = InUse()
         self._viewer: Viewer | None = None
-        self._reward_so_far = 0.0  # told in pictures
+        self._reward_so_far = 0.0  # shown in pictures
         self._spec: EnvSpec | None = None
         self._usual = Task(settings)
         self._watch(self._usual)
@@ -125,7 +126,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How `gymnasium.make` made it, with the steps of its longest episode without options."""
+        """The spec from `gymnasium.make`, with the maximum steps of an episode without options."""
         return self._spec
 
     @spec.setter
@@ -134,7 +135,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def context(self) -> Context:
-        """What a policy may know of the present episode."""
+        """Information about the present episode that a policy may use."""
         return self.task.context(0)
 
     @property
@@ -146,7 +147,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; ``options`` are arguments of the class, for this episode alone."""
+        """Start an episode; ``options`` are arguments of the class, only for this episode."""
         task = task_with_options(self._usual, options or {})
         super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed)
         if task is not self.task:
@@ -160,7 +161,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._observation.copy(), first_info(task)
 
     def _watch(self, task: Task) -> None:
-        """Make this the task, and keep its only lane's arrays at hand for ``step``."""
+        """Set the task, and keep its only lane's arrays for ``step``."""
         self.task = task
         self._shape = (len(task.actuator.places),)
         results = task.results
@@ -168,7 +169,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._flags = results.flags[0]
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what a copy has to see anew, since its arrays lie elsewhere, and its window."""
+        """State without the views of the task's arrays, which a copy makes again, and without the window."""
         return {name: value for name, value in vars(self).items() if name not in SEEN} | {"_viewer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -216,7 +217,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         if terminated or truncated:
             self._running = False
-            info["figures"] = told(self.task)
+            info["figures"] = final_figures(self.task)
         if self.render_mode is not None:
             self._reward_so_far += reward
             if self.render_mode == "human":

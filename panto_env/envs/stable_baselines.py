@@ -1,4 +1,4 @@
-"""Who gives a vector environment to Stable-Baselines3 itself is told what to give it instead."""
+"""A clear error for a vector environment that is passed directly to Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..base.errors import InputError
 class NamedToStableBaselines(type):
     """Class of the vector environment.
 
-    Stable-Baselines3 has vector environments of its own kind and refuses all others in words that name
-    OpenAI Gym. It asks nothing of an environment before that, but it prints its class.
+    Stable-Baselines3 has its own kind of vector environment and refuses all others with a message about
+    OpenAI Gym. Before that it only prints the environment's class.
     """
 
     def __repr__(cls) -> str:

@@ -38,18 +38,18 @@ class PantographVectorEnv(
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
-    speed, line irregularity and noise drawn for each lane. Lane i, seeded seed + i, sees bit for bit what a
-    single environment seeded so sees. `autoreset_mode` is "NextStep" (as Gymnasium's default), "SameStep"
-    or "Disabled"; `max_episode_steps` truncates episodes as Gymnasium's `TimeLimit` does.
+    speed, line irregularity and noise drawn for each lane. Lane i, seeded with seed + i, is bit for bit the
+    same as a single environment with that seed. `autoreset_mode` is "NextStep" (Gymnasium's default),
+    "SameStep" or "Disabled"; `max_episode_steps` truncates episodes as Gymnasium's `TimeLimit` does.
 
-    `reset(options=...)` takes what the single environment takes, for the episodes that it begins. With
-    "reset_mask" among them, an array of bool, it begins them in the lanes marked alone.
+    `reset(options=...)` takes the options of the single environment, for the episodes that it begins. With
+    the option "reset_mask", an array of bool, it begins them only in the marked lanes.
 
-    `infos` holds what the single environment's does, in the form of Gymnasium's vector environments: arrays
-    with a value per lane, and under "_key" which lanes have it. Lanes whose episodes end have "figures"; with
-    "SameStep" these and all else that they ended with are in "final_info", beside "final_obs".
+    `infos` has the content of the single environment's info in the form of Gymnasium's vector environments:
+    arrays with a value per lane, and under "_key" the lanes that have one. Lanes whose episodes end have
+    "figures"; with "SameStep" these and all other final values are in "final_info", next to "final_obs".
 
-    Stable-Baselines3 takes it inside `panto_agents.vec_env.PantographVecEnv`.
+    For Stable-Baselines3, wrap it in `panto_agents.vec_env.PantographVecEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
@@ -67,7 +67,7 @@ class PantographVectorEnv(
         self._drawn, self._render_size = tuple(drawn), settings.render_size
         self._in_use = InUse()
         self._viewer: Viewer | None = None
-        self._reward_so_far = np.zeros(self.num_envs)  # told in pictures
+        self._reward_so_far = np.zeros(self.num_envs)  # shown in pictures
         self.single_observation_space = gymnasium.spaces.Box(
             -BOUND, BOUND, self.task.results.observation[0].shape, np.float32
         )
@@ -80,8 +80,8 @@ class PantographVectorEnv(
         self._spec: EnvSpec | None = None
         self._limit = settings.max_episode_steps
         self._lanes = VectorLanes(self.task)
-        self._random: dict[int, np.random.Generator] = {}  # by lane, made when first asked for
-        self._seeds: dict[int, int | None] = {}  # what each is, or will be, seeded with; None: anything
+        self._random: dict[int, np.random.Generator] = {}  # by lane, made when first needed
+        self._seeds: dict[int, int | None] = {}  # seed of each lane's generator; None: any
         self._running = False
         self._steps = np.zeros(self.num_envs, dtype=np.int64)  # of each lane's episode so far
         self._ended: Flags = np.zeros(self.num_envs, dtype=np.bool_)
@@ -89,7 +89,7 @@ class PantographVectorEnv(
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How `gymnasium.make_vec` made it, with the steps of the longest episode."""
+        """The spec from `gymnasium.make_vec`, with the maximum steps of an episode."""
         return self._spec
 
     @spec.setter
@@ -103,7 +103,7 @@ class PantographVectorEnv(
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """What each lane's generator was seeded with."""
+        """Seed of each lane's generator."""
         seeds = []
         for lane in range(self.num_envs):
             self._generator(lane)
@@ -119,8 +119,8 @@ class PantographVectorEnv(
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
 
-        seed: of lane 0, lane i having seed + i; or one per lane. Other options are arguments of the class,
-        for these episodes alone. Raises InputError, and changes nothing, where one is not valid.
+        seed: of lane 0, and seed + i for lane i; or one per lane. Other options are arguments of the class,
+        only for these episodes. Raises InputError, and changes nothing, where one is not valid.
         """
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
@@ -148,7 +148,7 @@ class PantographVectorEnv(
                 f"The episode of lane {np.flatnonzero(self._ended)[0]} has ended; "
                 "call reset with options={'reset_mask': ...}."
             )
-        waiting = None  # in "NextStep": lanes that begin anew instead of stepping
+        waiting = None  # in "NextStep": lanes that are reset instead of stepped
         if self._any_ended:
             waiting = self._ended
         ended = self._lanes.step(force, waiting, self._generator)
@@ -176,7 +176,7 @@ class PantographVectorEnv(
         return observation, reward, terminated, truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Frames, (height, width, 3), of the lanes that are drawn, with render_mode "rgb_array".
+        """Frames, (height, width, 3), of the drawn lanes, with render_mode "rgb_array".
 
         Raises InputError where the extra 'render' is missing.
         """
@@ -198,7 +198,7 @@ class PantographVectorEnv(
         return lane_figures(self._lanes.figures(self._ended), self._ended)
 
     def _begin_at_once(self, answer: Answer) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin anew where episodes have ended: observation, and infos with what they ended with."""
+        """Reset lanes whose episodes have ended; returns the observation, and infos with final values."""
         ended = self._ended.copy()
         final_observation = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended).tolist():
@@ -236,17 +236,17 @@ class PantographVectorEnv(
         return lanes
 
     def _seed(self, lanes: Flags, seed: int | Sequence[int | None] | None) -> None:
-        """Seed the lanes marked; one without a seed of its own keeps its generator if it has one."""
+        """Seed the marked lanes; a lane without a given seed keeps its generator if it has one."""
         seeds = self._lane_seeds(seed)
         for wrong in (each for each in seeds if each is not None and each < 0):
-            seeding.np_random(wrong)  # which says so
+            seeding.np_random(wrong)  # raises Gymnasium's own error
         for lane in np.flatnonzero(lanes).tolist():
             if seeds[lane] is not None or lane not in self._seeds:
                 self._seeds[lane] = seeds[lane]
                 self._random.pop(lane, None)
 
     def _generator(self, lane: int) -> np.random.Generator:
-        """A lane's generator. To make one takes longer than an episode of some lanes."""
+        """A lane's generator, made when first needed: making one can take longer than an episode."""
         if lane not in self._random:
             self._random[lane], self._seeds[lane] = seeding.np_random(self._seeds.get(lane))
         return self._random[lane]

@@ -1,1 +1,1 @@
-"""What is said of a run: its record, its figures of merit, and their names and units."""
+"""The record of a run, its figures of merit, and their names and units."""

@@ -1,4 +1,4 @@
-"""What a run is held against, EN 50367 and EN 50119, and what is told beside."""
+"""Criteria of EN 50367 and EN 50119 for a run, and additional values without limits."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from .criterion import Criterion
 from .figures import Figures
 
 SHARE_OF_WAVE_SPEED = 0.7
-"""Largest speed of a train over that of waves in the contact wire."""
+"""Maximum speed of a train relative to the wave speed of the contact wire."""
 WAVE_SOURCE = "EN 50119, seen"
 WAVE_NOTE = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
 
 
 @dataclass(frozen=True)
 class LineFacts:
-    """What of a line a run is judged by."""
+    """Data of a line that the criteria of a run depend on."""
 
     system: str = "AC"  # of power supply
     wave_speed: float = math.inf  # of the contact wire (m/s), infinite where no wave runs along it
     free_uplift: float = math.nan  # room for the uplift at a support (m)
     free_uplift_source: str = ""
     dropper_reflection: float = math.nan  # of a wave at a dropper (-)
-    support_reflection: float = math.nan  # of a wave at a support, as often as the train passes one (-)
+    support_reflection: float = math.nan  # of a wave at a support, at the rate of passing them (-)
 
     @classmethod
     def of(cls, line: CatenaryData, wave_speed: float, speed: float) -> LineFacts:
-        """Of a line and a train on it; both speeds in m/s."""
+        """Facts of a line with a train on it; both speeds in m/s."""
         dropper, support = line.reflections(speed / line.alignment().mean_length)
         return cls(
             system=line.system,
@@ -51,11 +51,10 @@ def compliance(
     tension: Array,
     tension_near: Array,
 ) -> list[Criterion]:
-    """All criteria of a run, then what is told beside them.
+    """All criteria of a run, then additional values without limits.
 
-    arcing: NQ (%); speed: of the train (m/s); mean_span: mean length of a span (m); tension,
-    tension_near: all samples of all droppers, and those of the span that the train is in (N), empty where
-    they were not recorded.
+    arcing: NQ (%). speed: of the train (m/s). mean_span: mean length of a span (m). tension, tension_near:
+    all samples of all droppers, and those of the train's present span (N), empty where not recorded.
     """
     return [
         *en50367.criteria(figures, arcing, speed, line.system),
@@ -77,7 +76,7 @@ def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
     if math.isinf(line.wave_speed):
         return []
     ratio = speed / line.wave_speed
-    told = [
+    values = [
         Criterion(
             "speed", "v/c, train over wave", "", ratio, None, SHARE_OF_WAVE_SPEED, WAVE_SOURCE, WAVE_NOTE
         ),
@@ -85,11 +84,11 @@ def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
     ]
     if not math.isnan(line.dropper_reflection):
         support = f"wave reflection at a support, at {frequency:.2g} Hz (one per span)"
-        told += [
+        values += [
             Criterion("dropper reflection", "wave reflection at a dropper", "", line.dropper_reflection),
             Criterion("support reflection", support, "", line.support_reflection),
         ]
-    return told
+    return values
 
 
 def _droppers(tension: Array, tension_near: Array) -> list[Criterion]:
@@ -97,6 +96,6 @@ def _droppers(tension: Array, tension_near: Array) -> list[Criterion]:
         return []
     slack = float(100 * (tension_near <= 0).mean())
     return [
-        Criterion("dropper force", "largest dropper force", "N", float(tension.max())),
+        Criterion("dropper force", "maximum dropper force", "N", float(tension.max())),
         Criterion("slack", "droppers of the train's span slack", "% of time", slack),
     ]

@@ -1,4 +1,4 @@
-"""One requirement on a run: a figure beside its limits, with where the limits come from."""
+"""A requirement on a run: a figure, its limits, and their source."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..base.table import Alarm, Table
 
 @dataclass(frozen=True)
 class Criterion:
-    """A figure in ``unit``; limits are None where there is none, as of what is told beside the others."""
+    """A figure in ``unit`` and its limits; None for no limit. Values without limits are for information."""
 
     key: str
     name: str
@@ -21,11 +21,11 @@ class Criterion:
     lowest: float | None = None
     highest: float | None = None
     source: str = ""  # of the limits: the standard, and whether it was seen or is recalled
-    note: str = ""  # how value and limits are meant
+    note: str = ""  # meaning of value and limits
 
     @property
     def margin(self) -> float:
-        """To the nearer limit, negative beyond it; nan without one."""
+        """Distance to the nearer limit, negative beyond it; nan without a limit."""
         margins = []
         if self.highest is not None:
             margins.append(self.highest - self.value)
@@ -35,7 +35,7 @@ class Criterion:
 
     @property
     def kept(self) -> bool | None:
-        """Whether the limits are kept; None without one."""
+        """Whether the limits are kept; None without a limit."""
         return None if math.isnan(self.margin) else self.margin >= 0
 
     @property
@@ -44,17 +44,17 @@ class Criterion:
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """The criterion as plain data, with its margin and whether it is kept."""
         return vars(self) | {"margin": self.margin, "kept": self.kept}
 
 
 def worst(runs: Sequence[Sequence[Criterion]]) -> list[Criterion]:
-    """Of several runs under the same criteria, each where its margin is least."""
+    """For each criterion, the one of several runs with the minimum margin."""
     return [min(same, key=lambda criterion: criterion.margin) for same in zip(*runs, strict=True)]
 
 
 def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
-    """For people, of the criteria that have limits: value, limit, margin, verdict and source."""
+    """Table of the criteria with limits: value, limit, margin, verdict and source."""
     verdicts = {True: "kept", False: Alarm("broken")}
     rows = [
         (
@@ -72,14 +72,14 @@ def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
 
 
 def remarks(criteria: Sequence[Criterion]) -> list[str]:
-    """Lines for people: how criteria are meant, and what has no limit."""
+    """Lines to print below the table: notes on criteria, and the values without limits."""
     notes = [f"{criterion.name}: {criterion.note}." for criterion in criteria if criterion.note]
-    told = (criterion for criterion in criteria if criterion.kept is None)
-    return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in told)]
+    without = (criterion for criterion in criteria if criterion.kept is None)
+    return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in without)]
 
 
 def limits_in_words(criterion: Criterion) -> str:
-    """The limits as people write them; "" where there is none."""
+    """The limits as text, e.g. "at most 0.2"; "" without limits."""
     if criterion.lowest is None:
         return "" if criterion.highest is None else f"at most {_digits(criterion.highest)}"
     if criterion.highest is None:
@@ -88,5 +88,5 @@ def limits_in_words(criterion: Criterion) -> str:
 
 
 def _digits(value: float) -> str:
-    """One figure after the comma of what is large, three of what is small."""
+    """A value with one decimal from 10 on, with three below."""
     return f"{value:.1f}" if abs(value) >= 10 else f"{value:.3f}"

@@ -12,27 +12,27 @@ from .labels import LABELS
 
 FAST = 200.0
 """Speed (km/h) above which other limits hold."""
-# a and b of the largest mean force a v^2 + b (N), up to FAST and above. The pairs meet at FAST.
+# a and b of the maximum mean force a v^2 + b (N), up to FAST and above. The pairs meet at FAST.
 LARGEST_MEAN = {
     "AC": ((0.00047, 90.0), (0.00097, 70.0)),
     "DC 1.5 kV": ((0.00178, 110.0), (0.00228, 90.0)),
     "DC 3 kV": ((0.00097, 110.0), (0.00097, 110.0)),
 }
-# Of the smallest mean force (N). For DC none is known to us.
+# a and b of the minimum mean force (N). For DC none is known to us.
 SMALLEST_MEAN = {"AC": (0.00047, 60.0)}
 STD_OF_MEAN = 0.3
-"""Largest σ over F_m."""
+"""Maximum σ over F_m."""
 SOURCE = "EN 50367, recalled"
 
 
 def largest_mean(speed: float, system: str = "AC") -> float:
-    """Largest mean force (N), which is also the one to aim at, under a system of ``LARGEST_MEAN``."""
+    """Maximum mean force (N), which is also the target, under a system of ``LARGEST_MEAN``."""
     a, b = LARGEST_MEAN[system][to_kmh(speed) > FAST]
     return a * to_kmh(speed) ** 2 + b
 
 
 def smallest_mean(speed: float, system: str = "AC") -> float | None:
-    """Smallest mean force (N), where one is known."""
+    """Minimum mean force (N), where one is known."""
     if system not in SMALLEST_MEAN:
         return None
     a, b = SMALLEST_MEAN[system]
@@ -40,19 +40,19 @@ def smallest_mean(speed: float, system: str = "AC") -> float | None:
 
 
 def maximum_limit(speed: float) -> float:
-    """Largest contact force (N)."""
+    """Maximum contact force (N)."""
     return 350.0 if to_kmh(speed) > FAST else 300.0
 
 
 def arcing_limit(speed: float) -> float:
-    """Largest NQ (%)."""
+    """Maximum NQ (%)."""
     return 0.2 if to_kmh(speed) > 250 else 0.1
 
 
 def criteria(figures: Figures, arcing: float, speed: float, system: str = "AC") -> list[Criterion]:
-    """Mean force, σ and maximum of a run's figures, and its NQ (%), beside their limits."""
+    """Mean force, σ, maximum and NQ (%) of a run, with their limits."""
     lowest = smallest_mean(speed, system)
-    unknown = f"of the smallest mean force under {system} no formula is known to us" if lowest is None else ""
+    unknown = f"no formula is known to us for the minimum mean force under {system}" if lowest is None else ""
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"
     return [
         _force("mean", figures.mean, lowest, largest_mean(speed, system), unknown),

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Array
 
 ARC = 5e-3
-"""Longest loss of contact (s) that is no arc."""
+"""Maximum duration (s) of a contact loss that does not count as an arc."""
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,15 @@ class Figures:
     cost_function: float  # CF, Eq. 14 of paper 1 (N m)
     effort: float  # rms actuator force (N)
     effort_rate: float  # rms rate of the actuator force (N/s)
-    distance: float  # that the figures cover (m)
+    distance: float  # distance that the figures cover (m)
 
     @classmethod
     def none(cls) -> Self:
-        """The figures of a run that has none, because it ended early: all nan."""
+        """Figures of a run that has none because it ended early: all nan."""
         return cls(*[float("nan")] * len(fields(cls)))
 
     def as_dict(self) -> dict[str, float]:
-        """Names and values, in this order."""
+        """Values by name, in the order of the fields."""
         return dict(vars(self))
 
 
@@ -57,9 +57,9 @@ def contact_loss(force: Array) -> float:
 
 
 def arcing(force: Array, time_step: float) -> float:
-    """NQ (%): share of time in losses of contact longer than ``ARC``, as far as steps resolve them.
+    """NQ (%): share of time in contact losses longer than ``ARC``, at the resolution of the time step.
 
-    Time with current is taken to be all of the time. Contact loss counts losses of any length.
+    The current is assumed to flow all the time. CL, in contrast, counts contact losses of any length.
     """
     edges = np.diff(np.concatenate([[0], (force <= 0).astype(int), [0]]))
     steps = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)

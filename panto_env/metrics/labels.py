@@ -1,4 +1,4 @@
-"""How figures are called where people read them: name, short name, unit, and scale from SI."""
+"""Labels of figures for tables and plots: name, short name, unit, and scale from SI."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Label:
-    """What a table or a plot writes of one figure."""
+    """Label of one figure in a table or a plot."""
 
     name: str
     short: str  # for narrow columns
@@ -44,4 +44,4 @@ LABELS = {
     "effort_rate": Label("rate of actuator force, rms", "effort rate", "N/s"),
     "distance": Label("over a distance of", "distance", "m"),
 }
-"""Of every figure of ``Figures``, in its order."""
+"""Label of every field of ``Figures``, in its order."""

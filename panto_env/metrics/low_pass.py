@@ -1,6 +1,7 @@
 """Butterworth low-passes of a force; by default EN 50317's of the contact force, of sixth order at 20 Hz.
 
-EN 50317's delays the force by 31 ms, 2.6 m at 300 km/h: right for figures, not for pictures along a line.
+EN 50317's filter delays the force by 31 ms, 2.6 m at 300 km/h: right for figures, not for pictures along a
+line.
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ from ..base.errors import InputError
 CUTOFF, ORDER = 20.0, 6
 """Hz, and the filter's order."""
 MIRRORED = 1.0
-"""Time (s) of the record that is mirrored about each end, where ``zero_phase_low_pass`` looks beyond it."""
+"""Part of the record (s) that ``zero_phase_low_pass`` continues by mirroring at each end."""
 
 
 @cache
 def low_pass_sections(time_step: float, cutoff: float = CUTOFF, order: int = ORDER) -> tuple[Array, Array]:
     """A filter as second-order sections, (order / 2, 6), and its state settled at 1, (order / 2, 2).
 
-    Every caller gets the same two arrays. Raises InputError where samples, ``time_step`` (s) apart, are
-    too far apart to carry the cut-off frequency (Hz).
+    Every caller gets the same two arrays. Raises InputError where the samples, ``time_step`` (s) apart, do
+    not resolve the cut-off frequency (Hz).
     """
     if not time_step < 0.5 / cutoff:
         raise InputError(
@@ -31,14 +32,14 @@ def low_pass_sections(time_step: float, cutoff: float = CUTOFF, order: int = ORD
             f"take a time step below {0.5e3 / cutoff:g} ms."
         )
     # Pairs of poles on a circle, by the bilinear transform that keeps the cut-off frequency. SciPy's own
-    # design is the same but for the order of factors; its import takes longer than all else at the start.
+    # design is the same except for the order of factors; its import would dominate the start-up time.
     angle = np.pi * (2 * np.arange(order // 2) + 1) / (2 * order)
     width, pole = np.tan(np.pi * cutoff * time_step), 2 * np.sin(angle)
     whole = 1 + pole * width + width**2
     b, one = width**2 / whole, np.ones(len(angle))
     a1, a2 = 2 * (width**2 - 1) / whole, (1 - pole * width + width**2) / whole
     sections = np.stack([b, 2 * b, b, one, a1, a2], axis=1)
-    # At 1 a section lets out 1: what it keeps follows from its last equation upwards.
+    # Input and output of a settled section are 1: its state follows from the last equation upwards.
     settled = np.stack([3 * b - a1 - a2, b - a2], axis=1)
     return sections, settled
 
@@ -73,9 +74,9 @@ def low_pass_from(
 
 
 def zero_phase_low_pass(force: Array, time_step: float) -> Array:
-    """Contact force (N) with the same attenuation, but not delayed: for pictures along a line.
+    """Contact force (N) with the attenuation of ``low_pass`` but without delay, for pictures along a line.
 
-    Its σ is that of ``low_pass``; single peaks differ, because a filter that delays also shifts phases.
+    Its σ equals that of ``low_pass``; single peaks differ, because a causal filter also shifts phases.
     Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
     """
     from scipy.signal import freqz_sos  # slow to import

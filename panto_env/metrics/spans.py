@@ -1,6 +1,6 @@
-"""Which spans the figures of a run cover: first to last, both included (EN 50318 takes 5 and 6).
+"""The spans that the figures of a run cover: first to last, both included (EN 50318 takes 5 and 6).
 
-By default these are the spans after the start has died out. Where they lie, the line's alignment says.
+By default these are the spans after the start has died out. The line's alignment knows their positions.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from ..plant.catenary.schema import MOST_SPANS
 SpanChoice: TypeAlias = Spans | Literal["all"] | None
 """The first and the last span, "all" for the whole run, or None for those after the start has died out."""
 FIRST_SETTLED = 10
-"""First span after the start has died out: the waves about the train take their time to build up. What is
-missing falls by about a fifth per span at any speed; docs/validation.md shows what is left."""
+"""First span after the start has died out: the waves about the train need time to build up. What is missing
+falls by about a fifth per span at any speed; docs/validation.md shows the remaining error."""
 LAST_USUAL = 19
-"""Last span of a run unless told otherwise, so that ten are evaluated."""
+"""Default last span of a run, so that ten are evaluated."""
 CLEAR = 8
-"""Spans that a line has beyond the last one of a pass: no window about the train reaches its end, whose
+"""Spans of a line beyond the last one of a pass: no window about the train then reaches the line's end, whose
 anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
 
 
 def check_spans(spans: Any) -> None:
-    """Raise InputError unless spans are two whole numbers from 1 up that do not fall."""
+    """Raise InputError unless spans are two whole numbers from 1 up, in order."""
     pair = tuple(spans) if isinstance(spans, list | tuple) else ()
     whole = len(pair) == 2 and all(isinstance(each, int) for each in pair)
     if not (whole and 1 <= pair[0] <= pair[1] <= MOST_SPANS):
@@ -36,14 +36,14 @@ def check_spans(spans: Any) -> None:
 
 
 def in_words(spans: Spans | None) -> str:
-    """The spans as a command takes them: "10-19", or "all" for the whole run."""
+    """The spans in the form of the command line: "10-19", or "all" for the whole run."""
     return "all" if spans is None else f"{spans[0]}-{spans[1]}"
 
 
 def chosen_spans(choice: SpanChoice, distance: float, alignment: Alignment) -> Spans | None:
-    """The spans that a choice means for a run of this distance (m); None for the whole run.
+    """First and last span of a choice, for a run of this distance (m); None for the whole run.
 
-    Raises InputError where it is none, or the run ends before its start has died out.
+    Raises InputError for an invalid choice, or where the run ends before its start has died out.
     """
     if choice == "all":
         return None
@@ -54,7 +54,7 @@ def chosen_spans(choice: SpanChoice, distance: float, alignment: Alignment) -> S
     if last < FIRST_SETTLED:
         raise InputError(
             f"A run of {distance:g} m ends before its start has died out, which takes "
-            f"{FIRST_SETTLED - 1} spans ({alignment.support(FIRST_SETTLED - 1):g} m); run further, or name "
-            'the spans to evaluate, as (5, 6), or "all".'
+            f"{FIRST_SETTLED - 1} spans ({alignment.support(FIRST_SETTLED - 1):g} m); run further, or give "
+            'the spans to evaluate, such as (5, 6), or "all".'
         )
     return FIRST_SETTLED, last

@@ -29,9 +29,9 @@ from .spans import SpanChoice, chosen_spans
 
 FORMAT = 3
 KEY = b"panto_env"
-"""Of the file's metadata, under which the facts stand as JSON, with the checksum of them and all columns."""
+"""Key of the file's metadata that holds the facts as JSON, with a checksum of them and of all columns."""
 LARGEST = 0.5
-"""Share of the machine's memory that a file may unpack to."""
+"""Maximum unpacked size of a file, as a share of the machine's memory."""
 DAMAGED = (
     OSError,
     LookupError,
@@ -42,9 +42,9 @@ DAMAGED = (
     RecursionError,
     MemoryError,
 )
-"""What reading a file that is damaged or made up can raise, beside errors of Arrow's own."""
+"""Errors that reading a damaged or forged file can raise, besides Arrow's own."""
 SUFFIXES = (".parquet",)
-"""Of the file that a run is saved to."""
+"""Suffixes of the file of a saved run."""
 SERIES = (
     "time",
     "position",
@@ -83,21 +83,21 @@ class Trajectory:
     alignment: Alignment  # of the line
     time_step: float  # s
     nominal_force: float  # static force and aerodynamic uplift, as applied (N)
-    target_mean: float = math.nan  # mean force (N) that the static force was trimmed for; nan: it was not
-    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # that identify the run, plain data
+    target_mean: float = math.nan  # mean force (N) for which the static force was trimmed; nan: it was not
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # identity of the run, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
-    ending: str = ""  # where and why it did, as a sentence
+    ending: str = ""  # where and why it ended early, as a sentence
     line: LineFacts = field(default_factory=LineFacts)
     design: Mapping[str, Any] = field(default_factory=dict)  # line and pantograph by value, plain data
 
     def summary(self, spans: SpanChoice = None) -> Figures:
-        """Figures over spans first..last, counted from 1 (EN 50318 takes 5 and 6), or "all" the run.
+        """Figures over spans (first, last), counted from 1 (EN 50318 takes 5 and 6), or "all".
 
-        By default the spans are those after the start has died out. Uplift is that of the supports at the
-        ends of these spans and between. Raises InputError where the run does not cover the spans, is too
-        short for its start to die out, or ended early and no spans before are named.
+        By default the spans are those after the start has died out. Uplift is the maximum at all supports of
+        these spans, both ends included. Raises InputError where the run does not cover the spans, is too
+        short for its start to die out, or ended early and no earlier spans are given.
         """
         covered = self.spans(spans)
         inside = self.inside(spans)
@@ -127,9 +127,9 @@ class Trajectory:
         )
 
     def compliance(self, spans: SpanChoice = None) -> list[Criterion]:
-        """What the run keeps of EN 50367 and EN 50119 over the spans, and what is told beside.
+        """Criteria of EN 50367 and EN 50119 for the run over the spans, and values without limits.
 
-        That of droppers needs their record. Raises InputError as ``summary`` does.
+        Values of droppers need their record. Raises InputError as ``summary`` does.
         """
         inside = self.inside(spans)
         tension = self.dropper_force[inside]
@@ -156,21 +156,21 @@ class Trajectory:
 
     @property
     def distance(self) -> float:
-        """Covered from the start to the end of the last step (m)."""
+        """Distance from the start to the end of the last step (m)."""
         return float(self.position[-1] + self.position[0])
 
     def time_at(self, position: float) -> float:
-        """When the train comes to a position (m): s since the start, however its speed drifts."""
+        """Time (s) since the start at which the train reaches a position (m), drift included."""
         places = np.array([0.0, *self.position, self.distance])
         return float(np.interp(position, places, [0.0, *self.time, self.time[-1] + 0.5 * self.time_step]))
 
     def spans(self, choice: SpanChoice = None) -> Spans | None:
-        """First and last span that a choice means, by default those after the start; None: the whole run.
+        """First and last span of a choice, by default those after the start; None for the whole run.
 
-        Raises InputError where the run does not cover them, or they are not to be had of it.
+        Raises InputError where the run does not cover them.
         """
         if choice is None and self.terminated:
-            raise InputError(f"{self.ending} It has no figures but those of spans before, named.")
+            raise InputError(f"{self.ending} It has figures only for earlier spans, which must be given.")
         spans = chosen_spans(choice, self.distance, self.alignment)
         if spans is None:
             return None
@@ -193,9 +193,9 @@ class Trajectory:
         return self.alignment.within(self.position, covered)
 
     def save(self, path: str | Path) -> None:
-        """Write a Parquet file, whole or not at all. Raises InputError for a name that is not such a file's.
+        """Write a Parquet file, whole or not at all. Raises InputError for a name with another suffix.
 
-        One column per series, and one per support and per dropper, by number.
+        The file has a column for each series, each support and each dropper, by number.
         """
         check_output(path, SUFFIXES)
         import pyarrow as pa
@@ -217,7 +217,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
-        """Read what ``save`` wrote. Raises InputError where it is not a whole trajectory, or is damaged."""
+        """Read a file of ``save``. Raises InputError where it is not a whole trajectory, or is damaged."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -250,13 +250,13 @@ class Trajectory:
         except (pa.ArrowException, *DAMAGED) as error:
             reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
             raise InputError(
-                f"{path} is not a whole trajectory file ({reason}); write it anew with "
+                f"{path} is not a whole trajectory file ({reason}); write it again with "
                 "Trajectory.save or `panto simulate --output`."
             ) from error
 
 
 def _check_size(metadata: Any) -> None:
-    """Raise ValueError where a file's table would not fit into memory: a few bytes can say that it is huge.
+    """Raise ValueError where a file's table would not fit into memory: a small file can declare a huge one.
 
     metadata: of Parquet.
     """

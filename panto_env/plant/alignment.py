@@ -25,7 +25,7 @@ Spans = tuple[int, int]
 
 
 class AlignmentArrays(NamedTuple):
-    """An alignment, for kernels."""
+    """Arrays of an alignment, for kernels."""
 
     supports: Array  # (spans + 1,): positions (m)
     per_metre: float  # spans per metre where all have one length, else 0 (1/m)
@@ -41,14 +41,14 @@ class Alignment:
 
     @classmethod
     def of_spans(cls, lengths: Sequence[float]) -> Self:
-        """The alignment of spans with these lengths (m), in their order."""
+        """The alignment of spans with these lengths (m), in the order of travel."""
         if len(set(lengths)) == 1:
             return cls.equal(lengths[0], len(lengths))
         return cls((0.0, *np.cumsum(lengths).tolist()))
 
     @classmethod
     def equal(cls, length: float, spans: int) -> Self:
-        """The alignment of so many spans of one length (m)."""
+        """The alignment of a number of spans with the same length (m)."""
         return cls(tuple((length * np.arange(spans + 1)).tolist()), length)
 
     @property
@@ -73,7 +73,7 @@ class Alignment:
 
     @cached_property
     def arrays(self) -> AlignmentArrays:
-        """The same for kernels."""
+        """The alignment as arrays, for kernels."""
         per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
         return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
 
@@ -131,7 +131,7 @@ class Alignment:
         return np.asarray((x >= begin) & (x < end))
 
     def last_whole_span(self, distance: float, tolerance: float = 0.0) -> int:
-        """Number of the last span that a run of this distance (m) covers whole; 0 if there is none.
+        """Number of the last span that a run of this distance (m) covers completely; 0 for none.
 
         tolerance: what may be missing from the span (spans), for a distance that is a rounded sum of steps.
         """
@@ -150,7 +150,7 @@ def in_spans(alignment, x):
 
 @inlined
 def mean_over_own_length(alignment, counted):
-    """Mean length of a span over that of the one at a position in spans; 1 where all have one length."""
+    """Mean span length over the length of the span at a position in spans; 1 for equal spans."""
     if alignment.per_metre > 0.0:
         return 1.0
     k = min(max(int(counted), 0), spans_of(alignment) - 1) & NOT_NEGATIVE

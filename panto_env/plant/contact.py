@@ -1,4 +1,4 @@
-"""The one law that joins any pantograph to any catenary."""
+"""The contact law between any pantograph and any catenary."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ..backend import inlined
 def contact_force(compliance, gap, change, damping, gap_yield, change_yield, lowest):
     """Mean contact force over one step (N), implicit and without sub-iteration.
 
-    ``gap`` (head height minus wire height, positive when pressed together, m) is its mean over the step and
-    ``change`` the way that it closes in the step (m), both as they were without this force, which makes
-    them smaller by ``gap_yield`` and ``change_yield`` times itself (m/N). The force is the gap over the
-    contact's ``compliance`` (m/N) plus ``damping`` (N s/m divided by the step, so N/m) times its change.
+    ``gap`` is head height minus wire height (m, positive in contact), its mean over the step, and ``change``
+    its growth over the step (m), both without this force, which reduces them by ``gap_yield`` and
+    ``change_yield`` per newton (m/N). The force is the gap over the contact's ``compliance`` (m/N) plus
+    ``damping`` (N s/m divided by the step, so N/m) times its change.
 
     ``lowest`` is 0 for a contact that can only push, -inf for papers that let it pull.
     """

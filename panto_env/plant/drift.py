@@ -1,7 +1,8 @@
-"""A train whose speed drifts slowly, and where it is: in closed form, at any time of its run.
+"""Slow drift of a train's speed, and its position in closed form, at any time of its run.
 
-The drift is a sum of sines whose accelerations are of one size, so that the slow ones move the speed most;
-its phases are drawn per run. The way is its integral. The aerodynamic force stays that of the mean speed.
+The drift is a sum of sines with equal acceleration amplitudes, so that the slow ones change the speed most;
+its phases are drawn per run. The distance is its integral. The aerodynamic force stays that of the mean
+speed.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from ..base.arrays import Array
 from .trigonometry import cosine_of_turns, sine_of_turns
 
 PERIODS = (7.0, 13.0, 29.0)
-"""Of the sines (s), own choice: between what a driver does and what gradients do. No two are multiples."""
+"""Periods of the sines (s), own choice: between a driver's actions and gradients. None is a multiple of
+another."""
 DRIFT_ROWS = 1 + 3 * len(PERIODS)
-"""Rows of a lane's drift: way at step 0 (m); then of each sine amplitude (m), turns per step and phase."""
+"""Entries of a lane's drift: offset at step 0 (m); then for each sine amplitude (m), turns per step, phase
+(turns)."""
 _TURN = 2 * math.pi
 
 
@@ -28,17 +31,17 @@ def speeds_of(rms: float) -> Array:
 
 
 def largest_drift(rms: float) -> float:
-    """By which the speed differs at most, in the unit of its rms."""
+    """Maximum difference from the mean speed, in the unit of its rms."""
     return float(np.sum(speeds_of(rms)))
 
 
 def largest_lag(rms: float) -> float:
-    """How far a train may fall back, or come ahead, in a run (m); rms: m/s."""
+    """Maximum distance by which a train lags, or leads, a steady one in a run (m); rms: m/s."""
     return float(np.sum(2 * speeds_of(rms) * np.array(PERIODS)) / _TURN)
 
 
 def draw_drift(rms: float, time_step: float, random: np.random.Generator) -> Array:
-    """A lane's drift, (DRIFT_ROWS,); rms: m/s; time_step: s."""
+    """Draw a lane's drift, (DRIFT_ROWS,); rms: m/s; time_step: s."""
     phases = random.uniform(0, 1, len(PERIODS))
     amplitudes = speeds_of(rms) * np.array(PERIODS) / _TURN
     waves = np.stack([amplitudes, time_step / np.array(PERIODS), phases], axis=1)
@@ -46,9 +49,9 @@ def draw_drift(rms: float, time_step: float, random: np.random.Generator) -> Arr
 
 
 def ahead(drift: Array, steps: Array) -> Array:
-    """How far trains are ahead of steady ones (m), (lanes, n), after steps, (lanes, n).
+    """Lead of trains over steady ones (m), (lanes, n), after numbers of steps, (lanes, n).
 
-    drift: (lanes, DRIFT_ROWS), or of no rows.
+    drift: (lanes, DRIFT_ROWS), or (lanes, 0) for steady trains.
     """
     way = np.zeros((len(drift), np.shape(steps)[-1]))
     if drift.shape[1]:
@@ -61,7 +64,7 @@ def ahead(drift: Array, steps: Array) -> Array:
 
 @inlined
 def drifted_way(drift, way, steps):
-    """Way (m) after a number of steps of a lane whose speed drifts; way: at its mean speed (m)."""
+    """Distance (m) after a number of steps of a lane whose speed drifts; way: at its mean speed (m)."""
     way += drift[0]
     for k in range(1, drift.size, 3):
         way += drift[k] * sine_of_turns(drift[k + 1] * steps + drift[k + 2])

@@ -23,7 +23,7 @@ def cubic_weights(fraction):
 def stencil(positions: ArrayLike, spacing: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """First of the four nodes around each position, shape (n,), and their weights, (n, 4)."""
     ratio = np.asarray(positions, dtype=float) / spacing
-    # A point on a node but for rounding is on the node.
+    # A point that misses a node by rounding alone is on the node.
     left = np.floor(ratio + 1e-9).astype(np.int64)
     weights = np.array(python_function(cubic_weights)(ratio - left)).T
     return left - 1, weights

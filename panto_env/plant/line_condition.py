@@ -1,4 +1,4 @@
-"""Condition of the line: irregularity of the contact wire's height, defects of the wires and their hold."""
+"""Condition of the line: irregularity of the contact wire, defects of wires, droppers and supports."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ IRREGULARITY = ((12.0, 0.15e-3), (5.0, 0.08e-3), (1.5, 0.03e-3))
 Number = Annotated[int, Between(1, 1000)]
 # Beyond this a wire is no longer nearly level.
 Error = Annotated[float, Between(-0.2, 0.2, "m")]
-# From a span's first support; a line says itself how long its spans are.
+# From a span's first support; the line checks that its span is long enough.
 Offset = Annotated[float, Between(0, 200, "m")]
 Mass = Annotated[float, Between(0, 100, "kg")]
 Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
@@ -30,7 +30,7 @@ Lost = Annotated[float, Between(0, 0.5)]
 
 
 class LineCondition(Settings):
-    """What differs from the line as designed. Spans, droppers in a span and supports count from 1."""
+    """Differences from the line as designed. Spans, droppers in a span and supports count from 1."""
 
     irregularity: Annotated[float, Between(0, 100)] = Field(
         0.0, description="height irregularity, as a multiple of a fair line's, of random phases (-)"
@@ -63,12 +63,12 @@ class LineCondition(Settings):
     )
     tension_scatter: Annotated[float, Between(0, 0.1)] = Field(
         0.0,
-        description="rms relative error of each wire's tension along the whole line, drawn at random, evenly "
-        "within sqrt(3) times as much either way (-)",
+        description="rms relative error of each wire's tension along the whole line, drawn at random, "
+        "uniformly within +-sqrt(3) times this value (-)",
     )
     hard_spots: tuple[tuple[Number, Offset, Mass, Stiffness], ...] = Field(
         (),
-        description="what hangs on the contact wire or holds it, as a section insulator: (span, distance "
+        description="masses and springs on the contact wire, such as section insulators: (span, distance "
         "from its first support (m), mass (kg), stiffness to the ground, unstressed at rest (N/m))",
     )
     worn_stretches: tuple[tuple[Number, Offset, Length, Worn], ...] = Field(
@@ -104,17 +104,17 @@ class LineCondition(Settings):
 
     @property
     def largest_tension_error(self) -> float:
-        """Relative error of a wire's tension, either way, that may be drawn."""
+        """Maximum relative error of a wire's tension, in either direction."""
         return math.sqrt(3) * self.tension_scatter
 
     @property
     def waves(self) -> int:
-        """How many cosines it takes."""
+        """Number of cosines in the wire's height."""
         return len(IRREGULARITY) * (self.irregularity > 0) + (self.wear_depth > 0)
 
     @property
     def shortest_wave(self) -> float:
-        """Of the wire's height (m), infinite where it is even."""
+        """Shortest wavelength of the wire's height (m), infinite where it is even."""
         irregularity = min(length for length, _ in IRREGULARITY) if self.irregularity > 0 else math.inf
         return min(irregularity, self.wear_wavelength if self.wear_depth > 0 else math.inf)
 
@@ -126,7 +126,7 @@ class LineCondition(Settings):
 
     @property
     def of_wires(self) -> tuple[Any, ...]:
-        """What changes the wires themselves, which all lanes of a plant share."""
+        """Defects of the wires themselves, which all lanes of a plant share."""
         return (
             self.hard_spots,
             self.worn_stretches,
@@ -141,10 +141,10 @@ NEW = LineCondition()
 LINE_CONDITIONS = {
     "new": NEW,
     "fair": LineCondition(irregularity=1.0),
-    # A line as it is built and kept, another one in every run. EN 50119 lets neighbouring droppers differ by
-    # 10 mm (recalled), taken as two standard deviations; the same of supports is an own choice. Tensions keep
-    # within 3 % of the design's, the friction of pulleys that are in order (own choice): 1.7 % rms. Wear
-    # waves are the shallowest published.
+    # A line as built and maintained, a different one in every run. EN 50119 lets neighbouring droppers differ
+    # by 10 mm (recalled), taken as two standard deviations; the same value for supports is an own choice.
+    # Tensions stay within 3 % of the design's, the friction of pulleys in good order (own choice): 1.7 % rms.
+    # Wear waves are the shallowest published.
     "as-built": LineCondition(
         irregularity=1.0,
         wear_depth=0.2e-3,
@@ -160,21 +160,21 @@ LINE_CONDITIONS = {
 
 @dataclass(frozen=True)
 class DrawnLine:
-    """One line in a condition, with what is random about it drawn."""
+    """One line in a condition, with its random values drawn."""
 
     condition: LineCondition
     waves: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(waves, 3): irregularity as amplitude (m), turns per metre (1/m), phase in turns."""
     scatter: Array | None = None  # (droppers,): length errors (m); None where there are none
-    heights: Array | None = None  # (supports,): height errors of the messenger's (m); likewise
+    heights: Array | None = None  # (supports,): height errors of messenger supports (m); None for none
     tensions: tuple[float, float] = (1.0, 1.0)
-    """Of contact and messenger wire, over those that the condition leaves them."""
+    """Tensions of contact and messenger wire, relative to those in the condition."""
 
 
 def draw(
     conditions: Sequence[LineCondition], random: np.random.Generator, droppers: int = 0, supports: int = 0
 ) -> DrawnLine:
-    """Draw one line of so many droppers and supports between its spans in one of these conditions."""
+    """Draw one line in one of these conditions; supports: those between two spans."""
     choice = int(random.integers(len(conditions))) if len(conditions) > 1 else 0
     condition = conditions[choice]
     rows = []
@@ -188,7 +188,7 @@ def draw(
     if condition.support_scatter > 0:
         heights = condition.support_scatter * random.standard_normal(supports)
     if condition.tension_scatter > 0:
-        # Bounded, since grid and time step are chosen to be stable under the largest.
+        # Bounded, since grid and time step are chosen to be stable at the maximum.
         largest = condition.largest_tension_error
         contact, messenger = (1 + largest * random.uniform(-1, 1, 2)).tolist()
         tensions = contact, messenger

@@ -26,19 +26,19 @@ class Numerics(Settings):
     accuracy: Literal["full", "fast"] = Field(
         "full",
         description='"full": grid and time step for which figures of a flexible line are within 1 % of '
-        'converged ones at the speeds asked for; "fast": coarser ones, three to twenty times as fast',
+        'converged ones at the given speeds; "fast": coarser ones, three to twenty times as fast',
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
-        None, description="time step (s), instead of the one that the accuracy asks for"
+        None, description="time step (s), instead of the one for the accuracy"
     )
     spacing: Annotated[float, Between(1e-3, 1000, "m")] | None = Field(
         None,
-        description="grid of the flexible catenary (m), instead of the one that the accuracy asks for; "
-        "the next finer one that has a multiple of 8 nodes per span is taken",
+        description="grid of the flexible catenary (m), instead of the one for the accuracy; "
+        "rounded down to the next one with a multiple of 8 nodes per span",
     )
     window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
-        description="spans of the flexible catenary computed about the train, of an even number one more "
+        description="spans of the flexible catenary computed about the train, with an even number one more "
         f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
         "0: the whole line",
     )
@@ -58,36 +58,36 @@ class Runs(NamedTuple):
     """The runs for which a plant is built."""
 
     speeds: tuple[float, float] = (from_kmh(250), from_kmh(300))  # lowest and highest (m/s)
-    control_interval: float = 0.01  # s, of which a time step is a whole part unless given
+    control_interval: float = 0.01  # s, a multiple of the time step unless that is given
     conditions: Sequence[LineCondition] = (LineCondition(),)
-    hard_contact: bool = False  # whether stiffer, or more damped, than a collector strip's
+    hard_contact: bool = False  # whether a contact is stiffer or more damped than a collector strip's
 
     def whole_part(self, longest: float) -> float:
-        """The longest time step (s) up to ``longest`` of which the control interval is a whole number."""
+        """The longest time step (s), up to ``longest``, that divides the control interval."""
         return self.control_interval / math.ceil(self.control_interval / longest - 1e-9)
 
     @property
     def shortest_wave(self) -> float:
-        """Of the height of the contact wire (m), infinite where it is even."""
+        """Shortest wavelength of the contact wire's height (m), infinite where it is even."""
         return min(condition.shortest_wave for condition in self.conditions)
 
     def wave_step(self, samples: float) -> float:
-        """Time step (s) in which the fastest train takes so many steps for the shortest wave."""
+        """Time step (s) with this number of steps in the shortest wave, for the fastest train."""
         return self.shortest_wave / self.speeds[1] / samples
 
     def carried_step(self, usual: float) -> float:
-        """A usual time step (s), shortened so that the interval is a whole number and waves are carried."""
+        """A usual time step (s), shortened to divide the control interval and to resolve all waves."""
         return self.whole_part(min(usual, self.wave_step(SAMPLES_PER_WAVE)))
 
     def check_wave(self, time_step: float) -> None:
-        """Raise InputError where the wire has waves that a time step (s) cannot carry."""
+        """Raise InputError where the wire has waves that a time step (s) cannot resolve."""
         if time_step > self.wave_step(2):
             raise InputError(
-                f"A time step of {1e3 * time_step:g} ms cannot carry waves of {self.shortest_wave:g} m at "
-                f"{to_kmh(self.speeds[1]):g} km/h, of which a train passes one in "
-                f"{1e3 * self.wave_step(1):.3g} ms; take one below {1e3 * self.wave_step(2):.2g} ms."
+                f"A time step of {1e3 * time_step:g} ms cannot resolve waves of {self.shortest_wave:g} m at "
+                f"{to_kmh(self.speeds[1]):g} km/h: a train passes one in {1e3 * self.wave_step(1):.3g} ms. "
+                f"Take a time step below {1e3 * self.wave_step(2):.2g} ms."
             )
 
 
 RUNS = Runs()
-"""Of a train at 250 to 300 km/h under an even wire."""
+"""Runs at 250 to 300 km/h under an even wire."""

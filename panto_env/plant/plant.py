@@ -40,12 +40,12 @@ class Plant:
         varied: bool = False,
         drifting: bool = False,
     ) -> None:
-        """Build the line and the tables of so many lanes; each must be started before it advances.
+        """Build the line and the tables of all lanes; each lane must be started before it advances.
 
-        runs: what the plant must be good for: speeds, conditions of the line. bilateral: let the
-        contact pull, as paper 3's equations do. varied: each lane may have a pantograph that differs in
-        its values. drifting: each may have a speed that drifts. Raises InputError where grid and step are
-        not usable, or the line has not what is said to be defective.
+        runs: the speeds and line conditions for which the plant is built. bilateral: let the contact pull, as
+        paper 3's equations do. varied: each lane may have a pantograph with other values. drifting: each
+        lane's speed may drift. Raises InputError where grid and step are not usable, or a defect is given at
+        a dropper, support or place that the line does not have.
         """
         self.catenary, self.train, self.lanes = catenary, train, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
@@ -80,10 +80,10 @@ class Plant:
             lowest_force=-np.inf if bilateral else 0.0,
         )
         copy_whole(*self.arrays)
-        self._advance: Callable[..., Any] | None = None  # bound to the arrays when it is wanted
+        self._advance: Callable[..., Any] | None = None  # bound to the arrays at the first call
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what is bound to the arrays, since a copy's lie elsewhere."""
+        """State without the kernel that is bound to the arrays: a copy has arrays of its own."""
         return vars(self) | {"_advance": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -104,11 +104,11 @@ class Plant:
         return float(self.run.table[0, lane, row])
 
     def ahead(self, lanes: Any, steps: Array) -> Array:
-        """How far trains in lanes, (n,), are ahead of steady ones (m), (n, m), after steps, (n, m)."""
+        """Lead of the trains in lanes, (n,), over steady ones (m), (n, m), after numbers of steps, (n, m)."""
         return ahead(self.run.drift[lanes], steps)
 
     def position(self, lane: int, steps: Any, collector: int = 0) -> Array:
-        """Where a lane's collector is (m), (n,), after numbers of steps, (n,), which may be fractions."""
+        """Position of a lane's collector (m), (n,), after numbers of steps, (n,), not necessarily whole."""
         steps = np.atleast_1d(steps)
         steady = steps * self.time_step * self.speed[lane]
         way = steady + self.ahead(np.array([lane]), steps[None])[0]
@@ -120,7 +120,7 @@ class Plant:
         return self.model.line, self.model.wire, self.pantographs, self.actuators, self.run
 
     def check_speed(self, speed: float) -> None:
-        """Raise InputError unless a train can run at this speed (m/s) under this line."""
+        """Raise InputError unless a train can run at this speed (m/s) on this line."""
         check_speeds(self.catenary.name, self.model.wave_speed, [speed])
 
     def start(
@@ -134,10 +134,10 @@ class Plant:
     ) -> None:
         """Put lanes at the start of the line, at rest under the nominal force.
 
-        lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), not beyond the waves of the
-        wire. drawn: what is random about their lines, as ``line_condition.draw`` gives it. pantographs: the
-        lanes' own, where they are varied. static_forces: instead of the pantograph's, (n,) (N). drift: of
-        their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed.
+        lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of the
+        wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition gives
+        them. pantographs: the lanes' own, where they are varied. static_forces: instead of the pantograph's,
+        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed.
         """
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
@@ -175,7 +175,7 @@ class Plant:
         self.actuators.table[:, lanes] = 0.0
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
-        """Arrays of ``rows`` rows for kernels to record in: one more than steps are to be kept."""
+        """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""
         droppers = len(self.model.droppers) if tension else 0
         return Samples(
             rows=np.zeros((self.lanes, rows, len(self.train.collectors), SAMPLE_ROWS)),
@@ -184,7 +184,7 @@ class Plant:
         )
 
     def clear(self, samples: Samples, lanes: Array) -> None:
-        """Forget earlier runs of lanes, (n,): what lies beyond the window is not written, but at rest."""
+        """Reset the samples of lanes, (n,), to rest: kernels write only what lies within the window."""
         samples.uplift[lanes] = 0.0
         if samples.tension.shape[2]:
             for lane in lanes.tolist():
@@ -202,11 +202,11 @@ class Plant:
         self._advance(samples, command, steps, 0, self.lanes)
 
     def _check_way(self, steps: int, samples: Samples) -> None:
-        """Raise InputError unless all lanes can advance by so many steps, and these can be recorded."""
+        """Raise InputError unless all lanes can advance by ``steps``, and the samples have rows for them."""
         end, rows = self.row(Row.STEP) + steps, samples.rows.shape[1]
         if rows > 1 and end.max() >= rows:
             raise InputError(
-                f"The samples have rows for {rows - 1} steps, not for {end.max():.0f}; ask for more."
+                f"The samples have rows for {rows - 1} steps, not for {end.max():.0f}; make more rows."
             )
         drifted = self.ahead(np.arange(self.lanes), end[:, None])[:, 0]
         position = end * self.row(Row.STRIDE) + drifted

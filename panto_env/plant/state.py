@@ -1,4 +1,4 @@
-"""What moves, by name: the rows of a lane's column, and the arrays that a run of many lanes is made of."""
+"""State of a run: the named rows of its tables, and the arrays of all lanes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Row(IntEnum):
 
 
 class Scratch(IntEnum):
-    """Rows of what a kernel keeps of a collector during a step."""
+    """Rows of a collector's scratch values within a step."""
 
     IRREGULARITY = 0  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 1  # height of the wire where it is touched, at the step's start (m)
@@ -51,7 +51,7 @@ SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 
 
 class Run(NamedTuple):
-    """Where each lane's train is on its line, its pantographs' motion, and their contacts."""
+    """State of all lanes: position of each train, motion of its pantographs, contact forces."""
 
     table: Array  # (collectors, lanes, STATE + 2n): the rows above
     distance: Array  # (collectors,): behind the first collector (m)
@@ -64,7 +64,7 @@ class Run(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What a kernel call records; arrays of no columns or one row record nothing."""
+    """Arrays in which a kernel records; arrays without columns or with one row record nothing."""
 
     rows: Array  # (lanes, steps, collectors, SAMPLE_ROWS); step 0 is the start
     uplift: Array  # (lanes, steps, supports): of the contact wire at the end of the step (m)
@@ -73,5 +73,5 @@ class Samples(NamedTuple):
 
 @inlined
 def own_row(table, lane):
-    """Row of a lane in a table of one row for all lanes or one per lane."""
+    """Row of a lane in a table that has one row for all lanes or one per lane."""
     return min(lane, table.shape[0] - 1) & NOT_NEGATIVE

@@ -31,7 +31,7 @@ def irregularity(run, x, lane):
 
 @inlined
 def approach(line, wire, pantographs, actuators, run, contact, lane):
-    """Begin the step of one contact's pantograph: all but the contact force."""
+    """Begin the step of one collector: everything except the contact force."""
     own, scratch = run.table[contact, lane], run.scratch[contact, lane]
     drive(actuators, pantographs, contact, own, run.command[contact, lane], lane)
     move_freely(pantographs, contact, own, run.free_state[contact, lane], lane)
@@ -44,7 +44,7 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
 
 @inlined
 def rise_along(line, wire, run, contact, own, lane):
-    """How far the wire rises over the way of the step (m): what a damped contact feels."""
+    """Rise of the wire along the distance of the step (m), for the contact's damper."""
     x0 = position(run, contact, lane, own[ROW.STEP])
     x1 = position(run, contact, lane, own[ROW.STEP] + 1.0)
     way = mean_stride(run, contact, lane, 1.0)
@@ -54,7 +54,7 @@ def rise_along(line, wire, run, contact, own, lane):
 
 @inlined
 def meet(line, wire, pantographs, run, contact, lane):
-    """The contact force over the step, from head and wire as they would move without it."""
+    """Compute the contact force over the step, from head and wire as they would move without it."""
     own, scratch = run.table[contact, lane], run.scratch[contact, lane]
     free_head, parts = (
         run.free_state[contact, lane, 0],
@@ -87,7 +87,7 @@ def meet(line, wire, pantographs, run, contact, lane):
 
 @inlined
 def finish(pantographs, run, contact, lane):
-    """End the step of one contact's pantograph, and complete its sample by means over the step."""
+    """End the step of one collector, and complete its sample of means over the step."""
     own = run.table[contact, lane]
     frame, head_speed = ROW.STATE + pantographs.size // 2 - 1, ROW.STATE + pantographs.size // 2
     frame_speed = ROW.STATE + pantographs.size - 1
@@ -114,7 +114,7 @@ def step_lane(line, wire, pantographs, actuators, run, lane):
 
 @inlined
 def record_lane(line, wire, run, samples, lane):
-    """Write the samples of a step, the run's n-th, to row n of a lane; all to one if there is but one."""
+    """Write the sample of the run's n-th step to row n of a lane; arrays of one row keep the last one."""
     rows, uplift, tension = samples.rows, samples.uplift, samples.tension
     n = int(run.table[0, lane, ROW.STEP]) & NOT_NEGATIVE
     if rows.shape[1] > 1:

@@ -16,7 +16,7 @@ from .state import ROW
 
 @dataclass(frozen=True)
 class Collector:
-    """A pantograph of a train, with what drives it and what reads it."""
+    """A pantograph of a train, with its actuator and sensors."""
 
     pantograph: PantographData
     actuator: ActuatorSettings
@@ -57,7 +57,7 @@ class Train:
 
 @inlined
 def position(run, collector, lane, steps):
-    """Where a lane's collector is along the line (m) after a number of steps, which may be a fraction."""
+    """Position of a lane's collector along the line (m) after a number of steps, not necessarily whole."""
     x = run.table[collector, lane, ROW.STRIDE] * steps
     if run.drift.shape[1] > 0:
         x = drifted_way(run.drift[lane], x, steps)

@@ -1,4 +1,4 @@
-"""Where a run ends early: the bounds within which the plant is valid, and what is said beyond them."""
+"""Where a run ends early: the bounds within which the plant is valid, and the reason given beyond them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from enum import IntEnum
 from ..backend import constants
 
 HEAD_RANGE = 0.3
-"""Height of the head (m), either way, beyond which a run ends: outside the wire's clearance."""
+"""Height of the head (m), up or down, beyond which a run ends: outside the wire's clearance."""
 LARGEST_HEIGHT = 3.0
-"""Height of head or wire (m), either way, beyond which, ten times any real one, the computation diverged."""
+"""Height of head or wire (m), up or down, ten times any real one: beyond it the computation has diverged."""
 LOSS_TIME = 0.5
 """Time without contact (s) after which a run ends."""
 FREE_UPLIFT = 0.24
-"""Room for the contact wire's uplift at a support (m), up to the steady arm's stop, where a line does not
-say: twice the 120 mm for which lines of high speed are designed (recalled)."""
+"""Default room for the contact wire's uplift at a support (m), up to the steady arm's stop: twice the 120 mm
+for which high-speed lines are designed (recalled)."""
 
 LARGEST_SPEED = 20.0
-"""Speed of a wire (m/s) where it leaves its range, beyond which, ten times any real one, not the wire but the
-computation has."""
+"""Speed of a wire (m/s), ten times any real one: a wire that leaves its range faster has diverged in the
+computation."""
 
 
 class Ending(IntEnum):
@@ -29,7 +29,7 @@ class Ending(IntEnum):
     LOSS = 2  # contact was lost for LOSS_TIME
     STOP = 3  # the contact wire reached the steady arm's stop
     WIRES = 4  # contact wire and messenger wire touched
-    DIVERGED = 5  # the computation did: there is no result
+    DIVERGED = 5  # the computation diverged: there is no result
     STROKE = 6  # a rig's cylinder came to the end of its stroke
     LOAD_CELL = 7  # the force on a rig left the range of its load cell
 
@@ -38,7 +38,7 @@ ENDING = constants(Ending)
 
 
 def reason(ending: Ending, free_uplift: float) -> str:
-    """Why a run ended, as a clause; free_uplift: of the line (m)."""
+    """Why a run ended, as a clause; free_uplift: the line's (m)."""
     return {
         Ending.HEAD: f"the collector head left the range of ±{1e3 * HEAD_RANGE:.0f} mm about the contact "
         "wire's height at the support",

@@ -17,7 +17,7 @@ from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
-from ..plant.catenary.flexible.elasticity import elasticity, unevenness
+from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from ..plant.pantograph.schema import PantographData
 
 FOLDS = 240
@@ -160,9 +160,9 @@ class Findings:
 
     @cached_property
     def elasticity(self) -> tuple[Array, Array, float] | None:
-        """Places (m), uplift per newton (m/N) and its unevenness (%), at the mean force, if it is known."""
+        """Places (m), uplift per newton (m/N) and its non-uniformity (%), at the mean force, if known."""
         if not isinstance(self.line, FlexibleCatenaryData):
             return None
         force = self.run.nominal_force if self.figures is None else self.figures.mean
         places, lifts = elasticity(self.line, force)
-        return places, lifts, unevenness(lifts)
+        return places, lifts, non_uniformity(lifts)

@@ -10,6 +10,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.saved_run import TOLERANCE, check_made_anew, is_saved_run, load_with_settings
 from panto_env.catalog.loader import text_of
 from panto_env.cli import make_app
+from panto_env.plant.alignment import Alignment
 
 STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 CASES = {
@@ -73,7 +74,7 @@ def kept(tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"policy": "p"}, "with its settings and policy 'p' the run is another one today"),
+        ({"policy": "p"}, "with its settings and policy 'p' it comes out differently now"),
         ({"policy": "pd:gain=0.7"}, "differs by"),
         (
             {"policy": "runs/none/model.safetensors"},
@@ -88,7 +89,7 @@ def test_a_run_that_comes_out_another_is_refused(kept, change, words):
     with pytest.raises(InputError) as caught:
         check_made_anew(replace(run, **change), settings, path)
     assert words in str(caught.value)
-    assert str(caught.value).startswith(f"{path} cannot be made anew: ")
+    assert str(caught.value).startswith(f"The run of {path} cannot be repeated: ")
 
 
 @pytest.mark.parametrize(("factor", "same"), [(0.5, True), (2.0, False)])
@@ -102,9 +103,7 @@ def test_the_force_may_differ_by_rounding_alone(kept, factor, same):
             check_made_anew(other, settings, path)
 
 
-@pytest.mark.parametrize(
-    ("what", "by"), [("speed_kmh", 1e-6), ("span_length", 1e-6), ("control_interval", 1e-6)]
-)
+@pytest.mark.parametrize(("what", "by"), [("speed", 1e-6), ("spans", 1e-6), ("control_interval", 1e-6)])
 def test_passes_above_each_other_differ_by_rounding_alone(kept, what, by):
     """By a millionth, a run of 1200 m is 1 mm out of step; a tenth would be two spans."""
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
@@ -116,10 +115,13 @@ def test_passes_above_each_other_differ_by_rounding_alone(kept, what, by):
     def beside(factor):
         if what == "control_interval":
             return first._replace(settings=settings | {what: factor * first.control_interval})
-        speed = {"position": factor * run.position} if what == "speed_kmh" else {}
-        return first._replace(run=replace(run, **{what: factor * getattr(run, what)}, **speed))
+        if what == "spans":
+            line = Alignment.equal(factor * run.alignment.mean_length, run.alignment.spans)
+            return first._replace(run=replace(run, alignment=line))
+        return first._replace(run=replace(run, speed=factor * run.speed, position=factor * run.position))
 
-    check_together([first, beside(1 + 1e-12)])
+    if what != "spans":  # these are the line's own: there is no rounding
+        check_together([first, beside(1 + 1e-12)])
     with pytest.raises(InputError, match=f"must have the same {what.split('_')[0]}"):
         check_together([first, beside(1 + by)])
 
@@ -199,7 +201,7 @@ def test_a_run_of_another_policy_today_is_not_filmed(kept, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
     changed = tmp_path / "changed.parquet"
     replace(kept[0], policy="p").save(changed)
-    assert "cannot be made anew" in film(changed, "--output", tmp_path / "film.mp4")
+    assert "cannot be repeated" in film(changed, "--output", tmp_path / "film.mp4")
     assert not (tmp_path / "film.mp4").exists()
 
 

@@ -63,7 +63,7 @@ def test_an_environment_is_one_thread_s_at_a_time(name):
     told, refused = used_by_four_threads(env, action)
     assert all(np.isfinite(seen).all() for seen in told)
     assert {text.split(";")[0] for text in refused} <= {
-        "Another thread is using this environment just now, or was when this process was forked",
+        "Another thread is using this environment, or was when this process was forked",
         "The episode has not begun or has ended",
     }
     assert any(map(in_the_way, refused))
@@ -190,7 +190,7 @@ def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
 def test_a_plant_runs_neither_beyond_its_line_nor_without_rows():
     plant = Plant(load_catenary("en50318-2002"), Train.of(load_pantograph("en50318-2002")), spans=10)
     plant.start(0, 80.0)
-    with pytest.raises(InputError, match="rows for 99 steps, not for 100; ask for more"):
+    with pytest.raises(InputError, match="rows for 99 steps, not for 100; make more rows"):
         plant.advance_passively(100, plant.samples(100))
     plant.advance_passively(99, plant.samples(100))
     with pytest.raises(InputError, match="beyond the line's end at"):

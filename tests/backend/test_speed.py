@@ -143,7 +143,7 @@ def test_what_is_no_result_is_refused(tmp_path, text):
     path.write_text(text, encoding="latin-1")
     with pytest.raises(
         InputError,
-        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|.* no checksum fits)",
+        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|.* its checksum does not fit)",
     ):
         speed.speed([path])
 

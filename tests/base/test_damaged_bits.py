@@ -159,11 +159,11 @@ def test_what_has_no_checksum_is_refused(saved, tmp_path):
     del facts[CHECKSUM]
     path = tmp_path / "run.parquet"
     pq.write_table(table.replace_schema_metadata({trajectory.KEY: json.dumps(facts)}), path)
-    with pytest.raises(InputError, match="no checksum fits"):
+    with pytest.raises(InputError, match="its checksum does not fit"):
         Trajectory.load(path)
     path = tmp_path / "result.json"
     path.write_text(json.dumps({"cells": [{"asked": {"fingerprint": "ab"}}]}))
-    with pytest.raises(InputError, match="no checksum fits"):
+    with pytest.raises(InputError, match="its checksum does not fit"):
         stored.read(path)
 
 

@@ -43,20 +43,20 @@ OUTPUTS = {
 }
 """By option: the command without it, whether it names a file or a folder, and a suffix that it may have."""
 OF_FILES = {
-    "no folder": ("nowhere/out{suffix}", "there is no folder nowhere, so make it first"),
-    "a file for its folder": ("file/out{suffix}", "is no folder"),
+    "no folder": ("nowhere/out{suffix}", "there is not a folder nowhere, so make it first"),
+    "a file for its folder": ("file/out{suffix}", "is not a folder"),
     "a folder of its name": ("folder{suffix}", "it is a folder"),
-    "a pipe": ("pipe{suffix}", "it is no regular file"),
+    "a pipe": ("pipe{suffix}", "it is not a regular file"),
     "a link to itself": ("link{suffix}", "its symbolic links lead round in a circle"),
     "no suffix": ("out", "must end in "),
     "another suffix": ("out.docx", "must end in "),
-    "a name too long": ("o" * 5000 + "{suffix}", "a name has 200 bytes at most"),
+    "a name too long": ("o" * 5000 + "{suffix}", "the maximum is 200 bytes for a name"),
 }
 OF_FOLDERS = {
     "a file for it": ("file", "file"),
     "a file for the one above": ("file/out", "file/out"),
     "a pipe": ("pipe", "pipe"),
-    "a name too long": ("o" * 5000, "a name has 200 bytes at most"),
+    "a name too long": ("o" * 5000, "the maximum is 200 bytes for a name"),
 }
 CASES = [
     (option, trouble)
@@ -133,7 +133,9 @@ def test_every_output_of_every_command_is_tried():
 
 
 def test_an_argument_that_can_t_be_written_is_refused(folder):
-    assert "there is no folder nowhere" in refused(["export", "model.safetensors", "nowhere/out.safetensors"])
+    assert "there is not a folder nowhere" in refused(
+        ["export", "model.safetensors", "nowhere/out.safetensors"]
+    )
     assert "must end in .safetensors" in refused(["export", "model.safetensors", "out.onnx"])
 
 

@@ -62,7 +62,7 @@ def test_what_is_no_regular_file_is_refused_and_stays(kind, tmp_path):
 
 
 def test_a_device_is_refused_by_the_check(tmp_path):
-    with pytest.raises(InputError, match="no regular file"):
+    with pytest.raises(InputError, match="not a regular file"):
         check_output(special(tmp_path, "device"), (".json",))
 
 

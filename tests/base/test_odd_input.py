@@ -106,7 +106,11 @@ def test_a_toml_file_that_can_t_be_read_is_named(text, message, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [(f"{LONG}.toml", "can be no file: a name has 200 bytes"), ("\0.toml", "null byte"), ("\udc80", "UTF-8")],
+    [
+        (f"{LONG}.toml", "cannot be a file: the maximum is 200"),
+        ("\0.toml", "null byte"),
+        ("\udc80", "UTF-8"),
+    ],
 )
 def test_a_name_that_no_file_can_have_is_refused(name, message):
     with pytest.raises(InputError, match=message):

@@ -180,7 +180,7 @@ def test_values_of_a_policy_may_hold_commas():
 
 def test_a_sweep_of_millions_is_refused_before_it_begins(tmp_path):
     values = list(np.linspace(200.0, 300.0, 400))
-    with pytest.raises(InputError, match="This sweep has 160,000 passes; 100,000 at most"):
+    with pytest.raises(InputError, match="This sweep has 160,000 passes; the maximum is 100,000"):
         sweep({"speed_kmh": values, "pantograph.masses.0": values})
     done = panto("sweep", "speed_kmh=100:300:10000000", cwd=tmp_path)
     assert done.returncode == 2
@@ -217,8 +217,8 @@ def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypa
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("nowhere/a", "there is no folder nowhere, so make it first"),
-        ("own.py/a", "own.py is no folder"),
+        ("nowhere/a", "there is not a folder nowhere, so make it first"),
+        ("own.py/a", "own.py is not a folder"),
         ("folder", "it is a folder"),
     ],
 )
@@ -271,7 +271,7 @@ def test_the_command_says_its_version(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["simulate", "--spans", "²-3"], "--spans must read first-last, as 5-6, or all, not '²-3'"),
+        (["simulate", "--spans", "²-3"], "--spans must read first-last, e.g. 5-6, or all, not '²-3'"),
         (
             ["simulate", "--distance", "0.1"],
             "at least the 0.8333 m that a train covers in one control interval",
@@ -290,9 +290,9 @@ def test_the_command_says_its_version(tmp_path):
             ["benchmark", "--config", "d.toml"],
             r"key 'seeds' must be a whole number from 1 to 1,000, or a list",
         ),
-        (["benchmark", "--config", "e.toml"], "This benchmark has 102,000 passes; 100,000 at most"),
+        (["benchmark", "--config", "e.toml"], "This benchmark has 102,000 passes; the maximum is 100,000"),
         (["benchmark", "--config", "f.toml"], r"'seed' is not known: did you mean 'seeds'\.$"),
-        (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, as \[250\]\.$"),
+        (["benchmark", "--config", "g.toml"], r"key 'lines.0.speeds_kmh' must be a list, e\.g\. \[250\]\.$"),
         (
             ["benchmark", "--config", "none.toml"],
             "The benchmark file none.toml does not exist; give a TOML file",
@@ -301,7 +301,7 @@ def test_the_command_says_its_version(tmp_path):
         (["train", "i.toml"], r"i.toml: \[environment\]: unknown id 3: known are Pantograph-v0"),
         (["train", "j.toml"], "key 'lanes' must be less than or equal to 65536"),
         (["train", "k.toml"], r"lanes x n_steps = 200,000,000 must be at most 50,000,000"),
-        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 540,000 passes; 100,000 at most"),
+        (["evaluate", "p", "--seeds", "90000"], "This evaluation has 540,000 passes; the maximum is 100,000"),
         (["list", "p.toml"], "p.toml is not a valid entry: key 'masses' must hold at most 8 values"),
     ],
 )

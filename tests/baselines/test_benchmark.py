@@ -167,7 +167,7 @@ def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> Non
         ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
         ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
-        ({"control_interval": 0.0}, "greater than 0"),
+        ({"control_interval": 0.0}, "must be a number from 0.0001 to 10 s"),
     ],
 )
 def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], words: str) -> None:

@@ -417,7 +417,9 @@ def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.Monkey
 def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
     file = tmp_path / "o.json"
     file.write_text(text)
-    with pytest.raises(InputError, match=r"holds no oracles of this version|is not JSON|no checksum fits"):
+    with pytest.raises(
+        InputError, match=r"holds no oracles of this version|is not JSON|checksum does not fit"
+    ):
         stored.read(file)
     assert isinstance(called("--output", str(file)).exception, InputError)
     assert file.read_text() == text

@@ -37,7 +37,7 @@ def quickly():
             {"speed_kmh": 0.001},
             r"32,832,000,000 time steps .* of memory, and to compute it about \d+ days; take",
         ),
-        ({"speed_kmh": 1e-6}, r"GB, and this machine has .* about [\d,]+ years; take a shorter distance"),
+        ({"speed_kmh": 1e-6}, r"GB, but this machine has .* about [\d,]+ years; take a shorter distance"),
         ({"speed_kmh": 1e-300}, "The speed must lie above 0"),
         ({"speed_kmh": 5e-324}, "The speed must lie above 0"),
         ({"time_step": 1e-9}, "time_step must be a number from 1e-06 to 10 s"),
@@ -64,7 +64,7 @@ def test_a_run_without_an_end_is_refused_with_what_it_would_take(settings, messa
 def test_an_environment_s_episode_may_take_no_longer_either():
     """It keeps no record, so that its memory does not end it."""
     with pytest.raises(
-        InputError, match=r"time steps .* would take about \d+ days, and a run may take about 12"
+        InputError, match=r"time steps .* would take about \d+ days, but the maximum for a run is about 12"
     ):
         gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=1, speed_kmh=1e-4)
 
@@ -87,14 +87,16 @@ def test_time_is_told_in_words():
     assert in_words(LONGEST) == "about 12 hours"
     assert in_words(1e9) == "about 32 years"
     assert in_words(1e300) == "about 3.2e+292 years"
-    with pytest.raises(InputError, match="it would take about 2 days, and a run may take about 12 hours"):
+    with pytest.raises(
+        InputError, match="it would take about 2 days, but the maximum for a run is about 12 hours"
+    ):
         Cost(1e9, 0.0, 2 * 86400.0).check("it")
 
 
 @pytest.mark.parametrize("lanes", [10**6, 10**7])
 def test_lanes_that_don_t_fit_into_memory_are_refused_before_they_are_made(lanes, monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
-    with pytest.raises(InputError, match=f"{lanes:,} lanes would take .* GB, and this machine has 16.0 GB"):
+    with pytest.raises(InputError, match=f"{lanes:,} lanes would take .* GB, but this machine has 16.0 GB"):
         gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=lanes)
 
 

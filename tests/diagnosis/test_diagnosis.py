@@ -313,7 +313,7 @@ def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
 )
 def test_runs_that_cannot_be_compared_are_refused(healthy_runs, change, message):
     runs = [replace(run, **change) if "dropper_position" in change else run for run in healthy_runs]
-    faster = change.get("speed_kmh", runs[-1].speed_kmh) / runs[-1].speed_kmh
+    faster = change.get("speed", runs[-1].speed) / runs[-1].speed
     runs[-1] = replace(runs[-1], **{"position": faster * runs[-1].position} | change)
     with pytest.raises(InputError, match=message):
         diagnose(runs[:1], runs[1:])

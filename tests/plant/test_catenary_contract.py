@@ -29,7 +29,7 @@ def test_the_wire_yields_to_a_force_as_it_was_said_to(name, x):
     """The contact law solves for the force with this yield: or else gap and force would not agree."""
     data, condition = load_catenary(name), LineCondition()
     numerics = Numerics(precision="double", window=3) if data.kind == "flexible" else Numerics()
-    model = CATENARIES[data.kind].model(data, lanes=1, spans=10, numerics=numerics, runs=Runs())
+    model = CATENARIES[data.kind].model(data, lanes=1, collectors=1, spans=10, numerics=numerics, runs=Runs())
     model.settle(0, DrawnLine(condition), 150.0)
     force, seen = 90.0, np.zeros(3)
     press(model.line, model.wire, x, force, seen)

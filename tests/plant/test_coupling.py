@@ -55,7 +55,12 @@ def test_the_stiffest_explicit_contact_is_that_of_the_eigenvalues(dx, step):
 def test_the_stiffest_explicit_contact_of_modes_is_that_of_one_step_after_another():
     """On a grid of time: the free motion of all modes and a contact that reads them at mid-step."""
     line = ThreeSpan(
-        load_catenary("ohl-three-span"), lanes=1, spans=5, numerics=Numerics(time_step=1e-2), runs=Runs()
+        load_catenary("ohl-three-span"),
+        lanes=1,
+        collectors=1,
+        spans=5,
+        numerics=Numerics(time_step=1e-2),
+        runs=Runs(),
     )
     parts, limit = line.line, 1 / line.contact_gain
     shape = max(parts.shape, key=lambda row: row @ row)

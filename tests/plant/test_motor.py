@@ -322,7 +322,7 @@ def test_losses_of_the_gears_are_the_supply_s():
 def test_power_is_refused_where_it_cannot_be_told():
     with pytest.raises(InputError, match="motors with backlash does not follow"):
         motor_power(MotorActuator(backlash=0.01), np.ones(3), np.ones(3), 1e-3)
-    with pytest.raises(InputError, match=r"one length, 2 or more, not \(3,\) and \(4,\)"):
+    with pytest.raises(InputError, match=r"same length, at least 2, not \(3,\) and \(4,\)"):
         motor_power(MotorActuator(), np.ones(3), np.ones(4), 1e-3)
 
 
@@ -374,7 +374,7 @@ def test_the_preset_s_force_at_the_head():
         ("continuous_torque=0.6", "continuous_torque must not exceed peak_torque, 0.53 N m: it is 0.6 N m"),
         (
             "bandwidth=500",
-            "bandwidth must be 607.1 Hz at least, a little more than the armature has by itself",
+            "bandwidth must be at least 607.1 Hz, slightly above the armature's own",
         ),
     ],
 )

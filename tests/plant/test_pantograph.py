@@ -85,7 +85,7 @@ def swing(pantographs, run, heights):
     """Free motion of a pantograph of one mass, from where it is."""
     own, after = run.table[0, 0], run.free_state[0, 0]
     for k in range(heights.size):
-        move_freely(pantographs, own, after, 0)
+        move_freely(pantographs, 0, own, after, 0)
         own[ROW.STATE] = after[0]
         own[ROW.STATE + 1] = after[1]
         heights[k] = own[ROW.STATE]

@@ -13,7 +13,7 @@ def data():
 
 
 def built(data):
-    return three_span.ThreeSpan(data, lanes=1, spans=10, numerics=Numerics(), runs=Runs())
+    return three_span.ThreeSpan(data, lanes=1, collectors=1, spans=10, numerics=Numerics(), runs=Runs())
 
 
 def test_frequencies_are_the_closed_form_where_the_springs_vanish(data):

@@ -84,7 +84,9 @@ def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     """Mid-span the dropper is 0.741 m long: the messenger may sink by so much, and no more."""
     data = load_catenary("benchmark-2015")
     numerics = Numerics(window=5, precision=precision)
-    model = CATENARIES["flexible"].model(data, lanes=1, spans=10, numerics=numerics, runs=Runs())
+    model = CATENARIES["flexible"].model(
+        data, lanes=1, collectors=1, spans=10, numerics=numerics, runs=Runs()
+    )
     model.settle(0, DrawnLine(LineCondition()), 0.0)
     line, wire, answer = model.line, model.wire, np.zeros(1, dtype=np.int64)
     wire.increment[:] = 0.01  # m in a step: 4 m/s

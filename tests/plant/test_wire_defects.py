@@ -215,7 +215,7 @@ def test_less_tension_is_a_slower_line():
         ({"hard_spots": [(2, 1.0, 5.0, 0.0), (2, 1.0, 6.0, 0.0)]}, r"names \(2, 1.0\) twice"),
         ({"hard_spots": [(2, 1.0, 500.0, 0.0)]}, "hard_spots.0.2"),
         ({"worn_stretches": [(10, 50.0, 11.0, 0.1)]}, "ends at 601 m, but the line at 600 m"),
-        ({"worn_stretches": [(2, 5.0, 9.0, 0.1), (2, 1.0, 5.0, 0.1)]}, "must not overlap, .* 61 and 65 m"),
+        ({"worn_stretches": [(2, 5.0, 9.0, 0.1), (2, 1.0, 5.0, 0.1)]}, "must not overlap: .* 61 and 65 m"),
         ({"worn_stretches": [(2, 5.0, 1.0, 0.1)]}, "worn_stretches.0.2"),
         ({"lost_contact_tension": 0.6}, "lost_contact_tension"),
     ],
@@ -231,7 +231,7 @@ def test_wires_of_several_kinds_in_one_plant_are_refused():
 
 
 def test_a_window_that_travels_is_refused_where_the_wire_is_not_even():
-    with pytest.raises(InputError, match=r"computed whole, .* leave out window=8, or give 0"):
+    with pytest.raises(InputError, match=r"computed as a whole, .* leave out window=8, or set it to 0"):
         simulate(line_condition=WORN, window=8)
     assert simulate(line_condition=WORN, distance=200.0).settings["window"] == 10
 

@@ -1,5 +1,6 @@
-"""The rooms in CONTRIBUTING.md are those of the import contract, in its order."""
+"""CONTRIBUTING.md: its rooms are those of the import contract, and parameters take the ways that it shows."""
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -24,3 +25,36 @@ def test_every_room_is_in_the_contract():
     places = [path for path in (ROOT / "panto_env").iterdir() if not path.name.startswith("__")]
     rooms = {f"panto_env.{path.stem}" for path in places if path.suffix == ".py" or path.is_dir()}
     assert rooms == {layer for layer in layers() if layer.startswith("panto_env.")}
+
+
+def imported(file):
+    """Files of the package that a file imports, by names relative to ``panto_env``."""
+    package, found = ROOT / "panto_env", set()
+    for node in ast.walk(ast.parse((package / file).read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folder = (package / file).parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            places = [folder.with_suffix(".py"), *(folder / f"{name.name}.py" for name in node.names)]
+            found |= {place.relative_to(package).as_posix() for place in places if place.is_file()}
+    return found
+
+
+def reached(file):
+    """All files that a file imports, directly or not."""
+    found, new = set(), {file}
+    while new:
+        found |= new
+        new = set().union(*map(imported, new)) - found
+    return found - {file}
+
+
+def test_five_parameters_go_down_through_the_house_and_through_no_file_twice():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    walks = re.findall(r"^- \*\*[\w' ]+\*\*: (`\w+/(?:.|\n(?! *[-\n]))+)", text, re.MULTILINE)
+    assert len(walks) == 5
+    for walk in walks:
+        stops = re.findall(r"`([\w/]+\.py)`\s+\(`(\w+)`\)", walk)
+        files = [file for file, _ in stops]
+        assert len(files) == len(set(files)) == walk.count("→") + 1 >= 5
+        for k, (file, name) in enumerate(stops):
+            assert re.search(rf"\b{name}\b", (ROOT / "panto_env" / file).read_text()), (file, name)
+            assert not reached(file) & set(files[:k]), file

@@ -88,7 +88,8 @@ def test_each_extension_is_at_most_one_new_file_and_one_line(tmp_path, plain):
     )
     copy.new_line(
         "panto_env/control/settings.py",
-        "    # Published active pantographs are controlled at 50-100 Hz.\n",
+        "    bilateral: bool = Field(False, description="
+        '"let the contact pull, as paper 3\'s equations do")\n',
         '    comment: str = Field("", description="a remark on the run")',
     )
     shown, found = copy.run(plain)

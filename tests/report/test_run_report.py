@@ -15,7 +15,7 @@ from panto_baselines.report.command import report as report_command
 from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
-from panto_env.plant.catenary.flexible.elasticity import elasticity, unevenness
+from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.report import save
 from panto_env.report.findings import Findings
 from panto_env.report.page import page
@@ -84,7 +84,7 @@ def test_a_dropper_that_goes_slack_lets_the_wire_rise_further():
     assert (large >= small - 1e-9).all()
     dropper = np.abs(places - line.droppers.positions[0]).argmin()
     assert large[dropper] > 1.1 * small[dropper]
-    assert unevenness(np.array([0.2, 0.6])) == pytest.approx(50.0)
+    assert non_uniformity(np.array([0.2, 0.6])) == pytest.approx(50.0)
 
 
 def test_what_is_found_is_what_the_run_says(run, found):

@@ -28,12 +28,11 @@ KINDS = [
     "lagged",
     "motor",
 ]
-"""Words that a table of an actuator may have under ``kind``: the names of the modules. Where a table
-has none, the first is meant."""
+"""Values of ``kind`` in a table of an actuator: the names of the modules. The first is the default."""
 ACTUATORS: dict[str, type[ActuatorSettings]] = {
     name: import_module(f".{name}", __name__).KIND for name in KINDS
 }
-"""Kinds by name."""
+"""Settings class of each kind, by name."""
 
 ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": LaggedActuator(),

@@ -1,4 +1,4 @@
-"""What every kind of actuator has, and what it does in a kernel."""
+"""The interface of an actuator: its settings, its arrays, and its operation in a kernel."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class ActuatorArrays(Protocol):
 
     @property
     def table(self) -> Array:
-        """All that changes, (collectors, lanes, rows); zero at rest."""
+        """Everything that changes, (collectors, lanes, rows); zero at rest."""
 
 
 class ActuatorSettings(Settings, ABC):
-    """An actuator as a user asks for it; one on the frame and one on the head have the same data."""
+    """Settings of an actuator, on the frame, on the head, or one of the same kind on each."""
 
     place: Literal["frame", "head", "both"] = Field("frame", description="where the force acts")
     force_limit: Annotated[float, Between(1e-3, 1e5, "N")] = Field(
-        100.0, description="largest force either way (N)"
+        100.0, description="maximum force in either direction (N)"
     )
 
     @property
@@ -37,10 +37,10 @@ class ActuatorSettings(Settings, ABC):
 
     @property
     def reflected_masses(self) -> tuple[float, float]:
-        """Mass (kg) of what moves inside the actuator, as a mass of the pantograph, by ``Place``.
+        """Moving mass (kg) of the actuator, reflected to the pantograph, by ``Place``.
 
-        On the frame it goes with the lowest mass; on the head it resists that the head moves apart from the
-        mass below it.
+        On the frame it moves with the lowest mass; on the head it resists the relative acceleration of the
+        head and the mass below it.
         """
         return 0.0, 0.0
 
@@ -51,10 +51,10 @@ class ActuatorSettings(Settings, ABC):
 
 @operation
 def drive(actuators: Any, pantographs: Any, collector: int, own: Any, command: Any, lane: int) -> None:
-    """Move the forces on one collector's pantograph in one lane by a step towards their commands.
+    """Advance the actuators of one collector in one lane by a step, under a command.
 
-    own: the lane's rows of ``Row``, of which FRAME_FORCE and HEAD_FORCE are to be the means over the step.
-    command: (places,) (N). pantographs: for actuators that are moved by what they press on (``move_apart`` of
-    ``pantograph.step``).
+    own: the lane's rows of ``Row``; FRAME_FORCE and HEAD_FORCE are set to the mean forces over the step.
+    command: (places,) (N). pantographs: for actuators whose force depends on the motion of the masses that
+    they act on (``move_apart`` of ``pantograph.step``).
     """
     raise NotImplementedError

@@ -17,7 +17,7 @@ _PLACES = len(Place)
 
 
 class LaggedActuator(ActuatorSettings):
-    """Force that follows its command late."""
+    """Actuator whose force follows the command with a delay, a lag and a limited rate."""
 
     kind: Literal["lagged"] = "lagged"
     delay: Annotated[float, Between(0, 1, "s")] = Field(0.0, description="pure delay (s)")
@@ -25,7 +25,7 @@ class LaggedActuator(ActuatorSettings):
         0.0, description="time constant of the first-order lag (s)"
     )
     rate_limit: Annotated[float, Between(1, 1e8, "N/s")] | None = Field(
-        None, description="largest change of force (N/s)"
+        None, description="maximum rate of change of the force (N/s)"
     )
 
     def arrays(self, time_step: float, lanes: int, collectors: int) -> LaggedArrays:
@@ -51,23 +51,25 @@ KIND = LaggedActuator
 
 
 class LaggedArrays(NamedTuple):
-    """Actuators of all lanes. Rows of the table: the force at the step's end, one row per place; then
-    commands on their way, the next to arrive first, likewise (N).
+    """Actuators of all lanes.
+
+    Rows of the table, one per place each: the force at the step's end (N); then the commands in the delay
+    line, the next to arrive first (N).
     """
 
     table: Array  # (collectors, lanes, places (1 + delay))
-    late: float  # share of a step before the next one arrives: the delay's part that is no whole step
-    share: float  # of the way to the command that is gone in one step
-    mean: float  # share of the way gone that the step's mean force has gone
-    ramp: float  # how much less of it the mean has gone where the rate alone limits, over that rate (1/N)
-    rate: float  # largest change of force in one step (N)
-    limit: float  # largest force (N)
-    places: Index  # (used,): where there is one, a ``Place``
+    late: float  # fractional part of the delay (steps)
+    share: float  # of the distance to the command, covered in one step
+    mean: float  # mean change of the force over the step, as a share of the whole change
+    ramp: float  # reduction of that share where the rate limits the force, over the rate (1/N)
+    rate: float  # maximum change of force in one step (N)
+    limit: float  # maximum force (N)
+    places: Index  # (used,): the ``Place`` of each actuator
 
 
 @inlined
 def arriving(actuators, pending, command, place):
-    """The command (N) that arrives at one place in this step, the mean over it; send off the one of now."""
+    """Command (N) that arrives at one place, mean over the step; the present one joins the delay line."""
     rows, late, here = actuators.table.shape[2] - _PLACES, actuators.late, pending[place]
     if late > 0.0:  # the command changes within the step: its mean counts
         after = pending[place + _PLACES] if rows > _PLACES else command[place]
@@ -82,12 +84,12 @@ def arriving(actuators, pending, command, place):
 def _drive(actuators, pantographs, collector, own, command, lane):
     reached = actuators.table[collector, lane]
     for place in actuators.places:
-        asked = command[place]
+        requested = command[place]
         if actuators.table.shape[2] > _PLACES:
-            asked = arriving(actuators, reached[_PLACES:], command, place)
-        target = min(actuators.limit, max(-actuators.limit, asked))
-        wanted = actuators.share * (target - reached[place])
-        change = min(actuators.rate, max(-actuators.rate, wanted))
-        gone = 0.5 if abs(wanted) > actuators.rate else actuators.mean - actuators.ramp * abs(change)
+            requested = arriving(actuators, reached[_PLACES:], command, place)
+        target = min(actuators.limit, max(-actuators.limit, requested))
+        unlimited = actuators.share * (target - reached[place])
+        change = min(actuators.rate, max(-actuators.rate, unlimited))
+        gone = 0.5 if abs(unlimited) > actuators.rate else actuators.mean - actuators.ramp * abs(change)
         own[ROW.FRAME_FORCE + place] = reached[place] + gone * change
         reached[place] += change

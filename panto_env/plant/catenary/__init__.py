@@ -1,4 +1,4 @@
-"""The catenaries: one folder per kind, with what it is made of, how it is built, and its step.
+"""The catenaries: one folder per kind, with its data, its construction and its step.
 
 A new kind is a module or folder here, with a schema, a ``CatenaryModel``, its sources of the operations of
 ``protocol`` and a ``KIND``; and its name in ``KINDS``.
@@ -19,11 +19,11 @@ KINDS = [
     "periodic_stiffness",
     "rig",
 ]
-"""Words that a line's TOML file may have under ``kind``: the names of the modules."""
+"""Values of ``kind`` in a line's TOML file: the names of the modules."""
 CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
-"""Kinds by name."""
+"""Each kind, by name."""
 
 
 def check_line(line: CatenaryData) -> None:
-    """Raise InputError where a line of these values cannot exist, such as one whose droppers would push."""
+    """Raise InputError where a line with these values cannot exist, for example with droppers that push."""
     CATENARIES[line.kind].check(line)

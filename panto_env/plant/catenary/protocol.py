@@ -1,14 +1,13 @@
 """What a kind of catenary provides: a class for Python, and its operations for kernels.
 
-A step of a lane goes: ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
-point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. What a run may end by is asked once a
+A step of a lane calls ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
+point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. ``ending_by_wire`` is called once per
 control step. A class of line constants has its own sources of ``place_contact`` and ``look_at_contact``, and
-of those other operations that find something to do; without a source of its own, an operation does what is
-written here: nothing moves.
+of the other operations that it needs; the default of an operation is written here: nothing moves.
 
 A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
-the step is read there by the same weights by which the force acts there, so that the work that the force
-does on the wire is force times the change of that height, exactly, and no contact is too stiff to be stable.
+the step is read there with the weights with which the force acts there, so the work of the force on the wire
+is exactly force times change of that height, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ from .schema import CatenaryData
 from .view import LineView
 
 SLOWEST = 1e-9
-"""Speed (m/s) below which a train is as good as at rest."""
+"""Minimum speed of a train (m/s); below it the train counts as at rest."""
 
 
 class StartPoint(NamedTuple):
-    """The line where a run starts, at rest."""
+    """The line at rest at the point where a run starts."""
 
     height: float  # of the contact wire (m)
     wire_compliance: float  # m/N
@@ -40,17 +39,17 @@ class StartPoint(NamedTuple):
 
 
 class CatenaryModel(Protocol):
-    """A line, ready to be run under by a number of lanes."""
+    """A line that is built for a number of lanes."""
 
     time_step: float  # s
     line: Any  # named tuple of constants, whose class picks the sources of the operations
-    wire: Any  # named tuple of arrays: what moves, in all lanes
+    wire: Any  # named tuple of arrays: the wire's state in all lanes
     massless: bool  # whether the contact wire has no mass of its own
-    contact_gain: float  # stiffness at which an explicit contact law gets unstable, inverted (m/N)
+    contact_gain: float  # inverse of the stiffness at which an explicit contact law is unstable (m/N)
     grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
-    length: float  # how far a run can go (m)
-    usual_end: float  # how far a run goes unless told otherwise (m)
+    length: float  # maximum distance of a run (m)
+    usual_end: float  # default distance of a run (m)
     supports: Array  # (supports,): positions whose uplift is recorded (m)
     droppers: Array  # (droppers,): positions (m)
     start_point: StartPoint
@@ -65,26 +64,27 @@ class CatenaryModel(Protocol):
         numerics: Numerics,
         runs: Runs,
     ) -> None:
-        """Build the line; runs: what it is to be good for.
+        """Build the line for these runs.
 
-        Raises InputError where it cannot be computed so, or has not what is said to be defective.
+        Raises InputError where it cannot be computed with these numerics, or a defect is given at a dropper,
+        support or place that it does not have.
         """
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
-        """Put one lane's wire at rest, as ``drawn`` has it, under a force (N) at the starting point.
+        """Put one lane's wire at rest, on the line ``drawn``, under a force (N) at the starting point.
 
-        A massless wire, which has nothing to settle, is not asked to.
+        Not called for a massless wire, which has no state.
         """
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
-        """What can be seen of one lane's line now, from begin to end (m) as far as it is computed there."""
+        """Present shape of one lane's line from begin to end (m), as far as it is computed there."""
 
 
 def accept(data: Any) -> None:
-    """Accept every line whose values its schema accepts."""
+    """Accept every line that the schema accepts."""
 
 
 class CatenaryKind(NamedTuple):
@@ -92,11 +92,11 @@ class CatenaryKind(NamedTuple):
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
-    check: Callable[[Any], Any] = accept  # raises InputError where a line of such values cannot exist
+    check: Callable[[Any], Any] = accept  # raises InputError where a line with these values cannot exist
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
-    """Raise InputError unless trains at these speeds (m/s) are slower than the waves of a line (m/s)."""
+    """Raise InputError unless all speeds (m/s) are below the wave speed (m/s) of a line."""
     for speed in speeds:
         if not (math.isfinite(speed) and SLOWEST <= speed < wave_speed):
             bound = (
@@ -110,42 +110,44 @@ def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
 
 
 def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> None:
-    """Raise InputError where a line without droppers and supports is to have defects."""
+    """Raise InputError where a condition has defects: for lines without droppers and supports."""
     if any(condition.defective for condition in conditions):
         raise InputError(
             "Only a flexible catenary has droppers and supports that can be defective or scatter, and line "
-            f"'{data.name}' is none; take another line_condition, such as 'fair'."
+            f"'{data.name}' is not one; use another line_condition, such as 'fair'."
         )
 
 
 @operation
 def advance_wire(line: Any, wire: Any, lane: int) -> None:
-    """Move one lane's wire over a step, without the contact forces of this step."""
+    """Advance one lane's wire by a step, without the contact forces of this step."""
 
 
 @operation
 def place_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
-    """Place a contact point at x (m), where it is at mid-step; returns the wire's height there (m) now, and
-    at mid-step as far as the forces of this step don't count.
+    """Place a contact point at x (m), its position at mid-step.
+
+    Returns the wire's height there (m) at the step's start, and at mid-step without the forces of this step.
     """
     raise NotImplementedError
 
 
 @operation
 def rise_at_contact(line: Any, wire: Any, lane: int, contact: int, x0: float, x1: float) -> Any:
-    """How much higher the wire is at x1 than at x0 (m) at mid-step, between ``advance_wire`` and
-    ``apply_force``; x0, x1: where the contact point is at the step's ends.
+    """Height of the wire at x1 minus that at x0 (m) at mid-step, after ``advance_wire``.
+
+    x0, x1: position of the contact point at the step's start and end (m).
     """
     return 0.0
 
 
 @operation
 def look_at_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
-    """One contact point, between ``advance_wire`` and ``apply_force``, where it was placed.
+    """Read the wire where a contact point was placed, between ``advance_wire`` and ``apply_force``.
 
-    Returns the wire's height at the step's end, were there no contact force in this step (m), its yield to
-    1 N of contact force at the step's end and at mid-step (m/N), and the compliance of a massless spring in
-    series (m/N, 0 if none).
+    Returns the wire's height at the step's end without a contact force in this step (m), its displacement
+    per newton of contact force at the step's end and at mid-step (m/N), and the compliance of a massless
+    spring in series (m/N, 0 if none).
     """
     raise NotImplementedError
 
@@ -162,10 +164,10 @@ def end_step(line: Any, wire: Any, lane: int) -> None:
 
 @operation
 def ending_by_wire(line: Any, wire: Any, lane: int) -> Any:
-    """The ``Ending`` of one lane's run by what its wire does, ``Ending.NONE`` within the valid range."""
+    """The ``Ending`` of one lane's run because of its wire, ``Ending.NONE`` within the valid range."""
     return ENDING.NONE
 
 
 @operation
 def record_wire(line: Any, wire: Any, lane: int, uplift: Array, tension: Array) -> None:
-    """Write uplift at the supports (m) and dropper tensions (N) of one lane, as far as asked for."""
+    """Write uplift at supports (m) and dropper tensions (N) of one lane, where the arrays have columns."""

@@ -1,4 +1,4 @@
-"""What every line has, whatever its kind. All values in SI units, up is positive."""
+"""Data that lines of every kind have. All values in SI units, up is positive."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 LONGEST_SPAN = 200.0  # m
-"""Two and a half times the longest of usual lines."""
+"""Two and a half times the longest span of usual lines."""
 
 
 def check_span_count(spans: Any) -> int:
-    """Number of spans of a line. Raises InputError where it is none."""
+    """A valid number of spans of a line. Raises InputError for any other value."""
     if not (isinstance(spans, int) and FEWEST_SPANS <= spans <= MOST_SPANS):
         raise InputError(
             f"A line's spans must be a whole number from {FEWEST_SPANS} to {MOST_SPANS}, not {shown(spans)}."
@@ -29,7 +29,7 @@ def check_span_count(spans: Any) -> int:
 
 
 class CatenaryData(Settings):
-    """What every line has."""
+    """Data that lines of every kind have."""
 
     kind: str = Field(description="which of CATENARIES it is")
     name: str = Field(description="name in the catalogue")
@@ -44,13 +44,11 @@ class CatenaryData(Settings):
         FREE_UPLIFT,
         description="room for the contact wire's uplift at a support, up to the steady arm's stop (m)",
     )
-    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(
-        description="number of spans unless told otherwise"
-    )
+    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     def __hash__(self) -> int:
-        """Of all that a line is made of: what is computed from it can be kept."""
+        """Hash of all values except the sources, by which results for a line are cached."""
         return hash(tuple(getattr(self, name) for name in type(self).model_fields if name != "sources"))
 
     def alignment(self, spans: int | None = None) -> Alignment:
@@ -58,14 +56,14 @@ class CatenaryData(Settings):
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
-        """Share of a wave of this frequency (Hz) that a dropper and a support send back; nan if none does."""
+        """Reflection coefficients of a dropper and of a support at a frequency (Hz); nan for none."""
         return math.nan, math.nan
 
 
 class Wire(Settings):
     """A tensioned wire with bending stiffness."""
 
-    # Twin wires, and one equivalent wire for all, are up to five times those of one wire.
+    # Twin wires, and one equivalent wire for all, have up to five times the values of one wire.
     mass: Annotated[float, Between(0.05, 20, "kg/m")] = Field(description="mass per length (kg/m)")
     tension: Annotated[float, Between(500, 200e3, "N")] = Field(description="tension (N)")
     bending_stiffness: Annotated[float, Between(0, 1e5, "N m^2")] = Field(
@@ -74,5 +72,5 @@ class Wire(Settings):
 
     @property
     def impedance(self) -> float:
-        """Force over velocity of a wave that runs along it (N s/m), bending left out."""
+        """Wave impedance, force over velocity (N s/m), without bending."""
         return math.sqrt(self.tension * self.mass)

@@ -1,4 +1,4 @@
-"""What can be seen of a line at one moment, for pictures."""
+"""Shape of a line at one moment, for pictures."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from ...base.arrays import Array
 
 
 class LineView(NamedTuple):
-    """A stretch of one lane's line. Arrays are empty where a line has no such thing."""
+    """Part of one lane's line. Arrays are empty for what a line does not have."""
 
-    x: Array  # (n,): places along the line (m)
+    x: Array  # (n,): positions along the line (m)
     contact: Array  # (n,): height of the contact wire there (m)
     messenger: Array  # (n,): height of the messenger wire there (m), or (0,)
-    supports: Array  # (supports,): where they stand (m)
-    droppers: Array  # (droppers,): where they hang (m)
-    slack: NDArray[np.bool_]  # (droppers,): which of them carry nothing
+    supports: Array  # (supports,): positions (m)
+    droppers: Array  # (droppers,): positions (m)
+    slack: NDArray[np.bool_]  # (droppers,): whether each dropper is slack
 
 
 NONE = np.zeros(0)
 NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, slack=np.zeros(0, dtype=np.bool_))
-"""Of a line that has neither wires nor supports."""
+"""View of a line that has neither wires nor supports."""

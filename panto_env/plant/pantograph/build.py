@@ -16,11 +16,11 @@ from .schema import PantographData
 from .step import Part
 
 STRIP_STIFFNESS = 50e3
-"""Contact spring (N/m) of a 'rigid' collector strip on a wire that has mass of its own: EN 50318's."""
+"""Contact spring (N/m) of a 'rigid' collector strip on a wire with mass: EN 50318's."""
 LARGEST_PART, TERMS, TINY = 0.25, 11, 1e-300
-"""Norm up to which so many terms of the exponential's series are enough: the next one is 1e-16."""
+"""Norm up to which this number of terms of the exponential's series is enough: the next one is 1e-16."""
 STABILITY_MARGIN = 0.3
-"""Share of the stiffest contact that an explicit contact law could bear, which is used."""
+"""Contact stiffness with the explicit contact law, as a share of the stiffness at which it gets unstable."""
 
 
 ReflectedMasses = tuple[float, float]
@@ -29,9 +29,9 @@ NONE_REFLECTED: ReflectedMasses = (0.0, 0.0)
 
 
 class Pantographs(NamedTuple):
-    """What the pantographs of all lanes are made of: all lanes' alike, or each its own.
+    """Constants of the pantographs: the same in all lanes, or each lane's own.
 
-    n masses: the state is n displacements, then n velocities.
+    With n masses the state is n displacements, then n velocities.
     """
 
     size: int  # 2n: entries of the state
@@ -45,14 +45,14 @@ class Pantographs(NamedTuple):
         catenary: CatenaryModel,
         reflected: ReflectedMasses = NONE_REFLECTED,
     ) -> None:
-        """Make this one the pantograph of a collector in some lanes."""
+        """Set the pantograph of a collector in some lanes."""
         self.table[collector, lanes] = parts(pantograph, catenary, reflected)
 
 
 def parts(
     pantograph: PantographData, catenary: CatenaryModel, reflected: ReflectedMasses = NONE_REFLECTED
 ) -> Array:
-    """What a pantograph is made of, as rows of ``Part``; under a massless wire a strip can be rigid."""
+    """Constants of a pantograph, as rows of ``Part``; under a massless wire a strip can be rigid."""
     time_step = catenary.time_step
     transition, inputs = discretise(pantograph, time_step, reflected)
     rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
@@ -66,7 +66,7 @@ def parts(
 
 
 def pantographs(size: int, collectors: int, lanes: int) -> Pantographs:
-    """Arrays for the pantographs of ``lanes`` lanes, of ``size`` entries of state each, all zero."""
+    """Arrays for the pantographs of ``lanes`` lanes, with ``size`` state entries each, all zero."""
     return Pantographs(size, aligned_zeros((collectors, lanes, Part.CONTACT_INPUT + 3 * size + size**2)))
 
 
@@ -98,7 +98,7 @@ def _chain(values: tuple[float, ...]) -> Array:
 
 
 def _between_ends(n: int, reflected: ReflectedMasses) -> Array:
-    """Mass matrix, (n, n), of what resists that the ends of each ``Place`` move apart."""
+    """Mass matrix, (n, n), of the reflected masses between the two ends of each ``Place``."""
     frame, head = np.zeros(n), np.zeros(n)
     frame[-1] = head[0] = 1.0
     if n > 1:
@@ -120,9 +120,9 @@ def discretise(
 
 
 def exponential(matrix: Array) -> Array:
-    """Exp of a square matrix: Taylor's series of a small part of it, squared as often as that takes.
+    """Exp of a square matrix by scaling and squaring, with Taylor's series.
 
-    SciPy's takes a hundred times as long for such small ones, and longer still to import.
+    SciPy's takes a hundred times as long for such small matrices, and even longer to import.
     """
     halvings = max(0, math.ceil(math.log2(max(np.abs(matrix).sum(axis=1).max(), TINY) / LARGEST_PART)))
     part = matrix / 2.0**halvings
@@ -151,9 +151,9 @@ def rest_state(
     wire_heights: Array,
     compliance: float,
 ) -> Array:
-    """States, (lanes, 2n), in static equilibrium under nominal forces (N) against points of the wire.
+    """States, (lanes, 2n), in static equilibrium between nominal forces (N) and the wire.
 
-    The points stand at ``wire_heights`` (m) and yield ``compliance`` (m/N), contact spring included.
+    wire_heights: where the wire is without contact (m). compliance: of wire and contact spring (m/N).
     pantographs: one for all lanes, or each lane's own.
     """
     if isinstance(pantographs, PantographData):
@@ -167,7 +167,7 @@ def rest_state(
 
 @lru_cache(maxsize=64)
 def _flexibility(stiffnesses: tuple[float, ...], compliance: float) -> Array:
-    """Displacement of each mass (m) by 1 N on each, (n, n), the head held by ``compliance`` (m/N)."""
+    """Flexibility matrix (m/N), (n, n), of the chain with its head held by ``compliance`` (m/N)."""
     stiffness = _chain(stiffnesses)
     stiffness[0, 0] += 1 / compliance
     return np.linalg.inv(stiffness)

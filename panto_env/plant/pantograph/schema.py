@@ -1,4 +1,4 @@
-"""What a pantograph is made of. All values in SI units, up is positive."""
+"""Data of a pantograph. All values in SI units, up is positive."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ Spring = Annotated[float, Between(0, 1e7, "N/m")]
 Damper = Annotated[float, Between(0, 1e5, "N s/m")]
 
 HARD_STIFFNESS, HARD_DAMPING = 100e3, 300.0
-"""Of a contact (N/m, N s/m) beyond which it needs a finer grid: see ``PantographData.hard_contact``."""
+"""Stiffness and damping of a contact (N/m, N s/m) beyond which it needs a finer grid: see
+``PantographData.hard_contact``."""
 STIFFEST_CONTACT = 1e6
-"""Contact spring (N/m): beyond it, rounding and a moving point of contact can make a force that grows."""
+"""Maximum contact spring (N/m): beyond it, rounding and a moving contact point can make the force grow."""
 SOFTEST_SPRING = 1.0
-"""Spring between two masses (N/m): with less the frame's lift does not reach the head."""
+"""Minimum spring between two masses (N/m): with less the frame's lift does not reach the head."""
 Contact = Annotated[float, Between(1e3, STIFFEST_CONTACT, "N/m")]
 
 
@@ -50,9 +51,9 @@ class PantographData(Settings):
     contact_stiffness: Contact | Literal["rigid"] = Field(
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
-    contact_damping: Damper = Field(0.0, description="damper beside the contact spring (N s/m)")
+    contact_damping: Damper = Field(0.0, description="damper parallel to the contact spring (N s/m)")
     frame_friction: Annotated[float, Between(0, 100, "N")] = Field(
-        0.0, description="dry friction on the lowest mass, either way (N)"
+        0.0, description="dry friction on the lowest mass, in either direction (N)"
     )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
@@ -61,13 +62,13 @@ class PantographData(Settings):
         for key in ("stiffnesses", "dampings"):
             if len(getattr(self, key)) != len(self.masses):
                 raise ValueError(
-                    f"{key} must hold one value a mass: {len(self.masses)} masses are given, "
+                    f"{key} must hold one value per mass: {len(self.masses)} masses are given, "
                     f"but {len(getattr(self, key))} {key}"
                 )
         for number, spring in enumerate(self.stiffnesses[:-1], start=1):
             if spring < SOFTEST_SPRING:
                 raise ValueError(
-                    f"stiffnesses must be at least {SOFTEST_SPRING:g} N/m but for the last, to the ground: "
+                    f"stiffnesses must be at least {SOFTEST_SPRING:g} N/m, except the last, to the ground: "
                     f"nothing holds mass {number} up with {spring:g} N/m below it"
                 )
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
@@ -76,7 +77,7 @@ class PantographData(Settings):
 
     @property
     def hard_contact(self) -> bool:
-        """Whether the contact is stiffer, or more damped, than any that strips are computed with."""
+        """Whether the contact is stiffer or more damped than that of a collector strip."""
         stiffness = 0.0 if self.contact_stiffness == "rigid" else self.contact_stiffness
         return stiffness > HARD_STIFFNESS or self.contact_damping > HARD_DAMPING
 

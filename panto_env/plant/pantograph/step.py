@@ -1,4 +1,4 @@
-"""The step of a pantograph, in a kernel: its free motion, and what the contact force adds to it."""
+"""The step of a pantograph, in a kernel: its motion without contact force, then with it."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from ..state import PLACE, ROW, own_row
 
 
 class Part(IntEnum):
-    """Rows of the table of what pantographs are made of; n: entries of the state.
+    """Rows of the table of pantograph constants; n: entries of the state.
 
-    Behind the change of the state by 1 N of contact force over a step, n rows, come those by 1 N up on the
-    frame (the lowest mass) and by 1 N up on the head and down on the mass below it; then the transition of
-    the state exp(A dt), row by row.
+    The n rows with the change of the state by 1 N of contact force over a step are followed by the same for
+    1 N up on the frame (the lowest mass), and for 1 N up on the head and down on the mass below it; then by
+    the transition matrix of the state, exp(A dt), row by row.
     """
 
     STRIP_COMPLIANCE = 0  # of the contact spring (m/N)
-    STRIP_DAMPING = 1  # of the damper beside it, divided by the time step (N/m)
+    STRIP_DAMPING = 1  # of the damper parallel to it, divided by the time step (N/m)
     IMPLICIT_SHARE = 2  # of the wire's height in the contact law, 0 explicit, 1 implicit
-    FRAME_FRICTION = 3  # largest dry friction of the frame (N)
+    FRAME_FRICTION = 3  # maximum dry friction of the frame (N)
     CONTACT_INPUT = 4  # n rows
 
 
@@ -28,7 +28,7 @@ PART = constants(Part)
 
 @inlined
 def rub(frame_input, friction, free_state, size):
-    """Hold the frame by dry friction (N): at rest by as much as that takes, in motion by all of it."""
+    """Apply the frame's dry friction (N): as much as stops the motion, up to the maximum."""
     stopping = free_state[size - 1] / frame_input[size - 1]
     force = -min(friction, max(-friction, stopping))
     for r in range(size):
@@ -37,7 +37,7 @@ def rub(frame_input, friction, free_state, size):
 
 @inlined
 def free_value(pantographs, own, parts, r, on_frame, on_head):
-    """Entry ``r`` of a lane's state after a step, the contact force as in the step before."""
+    """Entry ``r`` of a lane's state after a step with the contact force of the previous step."""
     size, state = pantographs.size, own[ROW.STATE :]
     row = parts[PART.CONTACT_INPUT + 3 * size + r * size :]
     total = parts[PART.CONTACT_INPUT + r] * own[ROW.CONTACT_FORCE]
@@ -50,11 +50,11 @@ def free_value(pantographs, own, parts, r, on_frame, on_head):
 
 @inlined
 def move_apart(pantographs, collector, own, place, first, lane):
-    """How the ends that an actuator at ``place`` stands between move apart over a step without its force.
+    """Distance (m) or relative speed (m/s) of the two ends of an actuator, over a step without its force.
 
-    first: 0 for the way between them (m), or half the entries of the state for its speed (m/s). Returns it at
-    the step's start; at its end, the contact force as in the step before; and what 1 N of the actuator, held
-    over the step, adds to it at the end.
+    first: 0 for the distance, or half the entries of the state for the speed. Returns the value at the step's
+    start; the value at its end, with the contact force of the previous step; and the change at the end by
+    1 N of the actuator, held over the step.
     """
     size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     on_frame, on_head = own[ROW.NOMINAL_FORCE], 0.0
@@ -75,13 +75,13 @@ def move_apart(pantographs, collector, own, place, first, lane):
 
 @inlined
 def move_freely(pantographs, collector, own, free_state, lane):
-    """State of a lane's pantograph after a step without contact force, into ``free_state``."""
+    """Write the state of a lane's pantograph after a step without contact force to ``free_state``."""
     size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
     on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
-    for r in range(0, size, 2):  # in pairs, that a processor has more to do at once
+    for r in range(0, size, 2):  # in pairs, which a processor computes side by side
         total = frame_input[r] * on_frame + head_input[r] * on_head
         other = frame_input[r + 1] * on_frame + head_input[r + 1] * on_head
         first, second = transition[r * size :], transition[(r + 1) * size :]
@@ -96,7 +96,7 @@ def move_freely(pantographs, collector, own, free_state, lane):
 
 @inlined
 def add_contact_force(pantographs, collector, own, free_state, lane):
-    """End the step: the free motion and what the contact force adds to it."""
+    """End the step: add the effect of the contact force to the free motion."""
     parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     state, force = own[ROW.STATE :], own[ROW.CONTACT_FORCE]
     contact_input = parts[PART.CONTACT_INPUT :]

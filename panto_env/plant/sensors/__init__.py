@@ -35,10 +35,9 @@ __all__ = [
 KINDS = [
     "delayed",
 ]
-"""Words that a table of sensors may have under ``kind``: the names of the modules. Where a table has
-none, the first is meant."""
+"""Values of ``kind`` in a table of sensors: the names of the modules. The first is the default."""
 SENSORS: dict[str, type[SensorSettings]] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
-"""Kinds by name."""
+"""Settings class of each kind, by name."""
 
 # Force and displacement as published; the velocity's is an own choice: an accelerometer of 0.01 m/s^2
 # integrated over some seconds. An odometer's bounds in ETCS (Subset-041) are 5 m and 5 % of the way

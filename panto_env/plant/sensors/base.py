@@ -1,4 +1,4 @@
-"""What every kind of sensors has, and what they do in a kernel."""
+"""The interface of sensors: their settings, their arrays, and their operations in a kernel."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class SensorArrays(Protocol):
 
     @property
     def noise_used(self) -> Index:
-        """How many of them each lane has used, (lanes,)."""
+        """Number of prepared noise values that each lane has used, (lanes,)."""
 
     def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Let the past of some lanes have been as these samples, (collectors, lanes, SAMPLE_ROWS)."""
+        """Fill the past of some lanes with these samples, (collectors, lanes, SAMPLE_ROWS)."""
 
 
 class SensorSettings(Settings, ABC):
-    """Sensors as a user asks for them."""
+    """Settings of a train's sensors."""
 
     @property
     @abstractmethod
@@ -50,7 +50,7 @@ class SensorSettings(Settings, ABC):
 
     @property
     def odometer(self) -> OdometerErrors:
-        """How wrong position and speed are read; exact unless a kind says otherwise."""
+        """Errors of the position and speed readings; by default none."""
         return OdometerErrors()
 
     @abstractmethod
@@ -60,7 +60,7 @@ class SensorSettings(Settings, ABC):
 
 @operation
 def take_readings(sensors: Any, collector: int, step: int, own: Any, readings: Any, lane: int) -> None:
-    """What the sensors of a lane's collector read after a plant step, without noise.
+    """Write what the sensors of a lane's collector read after a plant step, without noise.
 
     step: number of the plant step within its control step, counted from 1. own: the collector's rows of
     ``Row``, at the end of the step. readings: its rows of ``Reading``, written to at least once in each
@@ -71,5 +71,5 @@ def take_readings(sensors: Any, collector: int, step: int, own: Any, readings: A
 
 @operation
 def take_first_readings(sensors: Any, collector: int, own: Any, readings: Any, lane: int) -> None:
-    """What the sensors read at the start of a run; arguments as above."""
+    """Write what the sensors read at the start of a run; arguments as in ``take_readings``."""
     raise NotImplementedError

@@ -22,7 +22,7 @@ _READINGS = len(Reading)
 
 
 class DelayedSensors(SensorSettings):
-    """What is added to readings: of contact force, displacement, velocity, and of an odometer."""
+    """Delay and noise of readings (contact force, displacement, velocity), and errors of an odometer."""
 
     kind: Literal["delayed"] = "delayed"
     force_noise: Annotated[float, Between(0, 1000, "N")] = Field(
@@ -39,13 +39,13 @@ class DelayedSensors(SensorSettings):
     )
 
     odometer_scale: Annotated[float, Between(0, 0.1)] = Field(
-        0.0, description="rms share by which an odometer's way and speed are wrong, drawn per run (-)"
+        0.0, description="rms relative error of an odometer's distance and speed, drawn per run (-)"
     )
     odometer_walk: Annotated[float, Between(0, 10, "m")] = Field(
-        0.0, description="rms random walk of its way after 100 m (m)"
+        0.0, description="rms random walk of its distance after 100 m (m)"
     )
     mast_jitter: Annotated[float, Between(0, 10, "m")] = Field(
-        0.0, description="rms error of where it detects a mast, at each of which its count begins anew (m)"
+        0.0, description="rms error of the position at which it detects a mast; it is reset at each mast (m)"
     )
     speed_noise: Annotated[float, Between(0, 10, "m/s")] = Field(
         0.0, description="rms noise of the train's speed (m/s)"
@@ -56,7 +56,7 @@ class DelayedSensors(SensorSettings):
 
     @property
     def odometer(self) -> OdometerErrors:
-        """How wrong position and speed are read."""
+        """Errors of the position and speed readings."""
         errors = self.odometer_scale, self.odometer_walk, self.mast_jitter, self.speed_noise
         return OdometerErrors(*errors, self.blind)
 
@@ -69,7 +69,7 @@ class DelayedSensors(SensorSettings):
 
     def arrays(self, time_step: float, control_steps: int, lanes: int, collectors: int) -> DelayedArrays:
         """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
-        # A sample is a mean over its step, so half a step old when that ends; between two it is interpolated.
+        # A sample is a mean over its step, so it is half a step old at the step's end.
         age = max(self.delay / time_step - 0.5, 0.0)
         late = age - int(age + 1e-6)
         whole, rest = divmod(int(age + 1e-6), control_steps)
@@ -88,25 +88,27 @@ KIND = DelayedSensors
 
 
 class DelayedArrays(NamedTuple):
-    """Sensors of all lanes. Rows of the table: the older sample, one row per reading; then readings on their
-    way, the next to arrive first, one control step after the other.
+    """Sensors of all lanes.
+
+    Rows of the table: the older sample, one row per reading; then the readings in the delay line, one block
+    per control step, the next to arrive first.
     """
 
     table: Array  # (collectors, lanes, readings (1 + control steps))
     read_at: int  # plant step of a control step whose sample is read, counted from 1
-    older_at: int  # plant step whose sample, the one before, is read too
-    older_share: float  # weight of that
-    noise: Array  # (lanes, collectors, times, readings): of the next readings; no times for none
-    noise_used: Index  # (lanes,): how many of them have been used
+    older_at: int  # plant step of the previous sample, between which and the read one is interpolated
+    older_share: float  # weight of the previous sample
+    noise: Array  # (lanes, collectors, times, readings): of the next readings; 0 times without noise
+    noise_used: Index  # (lanes,): number of times that have been used
 
     def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Let the past of some lanes have been as these samples, (collectors, lanes, SAMPLE_ROWS)."""
+        """Fill the past of some lanes with these samples, (collectors, lanes, SAMPLE_ROWS)."""
         self.table[:, lanes] = np.tile(samples[..., list(SENSED)], self.table.shape[2] // _READINGS)
 
 
 @inlined
 def read(sensors, collector, own, readings, lane):
-    """Take the reading that arrives in this control step, and send off the one taken now."""
+    """Write the readings that arrive in this control step; the present ones join the delay line."""
     rows, share = sensors.table.shape[2] - _READINGS, sensors.older_share
     older = sensors.table[collector, lane]
     past = older[_READINGS:]

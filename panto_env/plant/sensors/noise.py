@@ -1,4 +1,4 @@
-"""Noise of the sensors, each lane's from its own generator."""
+"""Noise of the sensors, from a random generator for each lane."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 AHEAD = 64
-"""Readings drawn at a time: a call of a generator takes as long as some fifty numbers."""
+"""Readings drawn at a time: a call of a generator takes about as long as fifty numbers."""
 
 
 class Noise:
@@ -17,7 +17,7 @@ class Noise:
         """rms: of each reading, in its unit. Each lane must be started."""
         self._rms = np.array(rms)
         self._random = [np.random.default_rng(0)] * lanes
-        self._enough = 0  # readings that every lane has, at least
+        self._enough = 0  # minimum number of readings that are prepared in every lane
 
     def start(self, sensors: Any, lane: int, random: np.random.Generator) -> None:
         """Draw a lane's numbers from this generator from now on, those of its first reading at once."""
@@ -26,7 +26,7 @@ class Noise:
         self._enough = 0
 
     def prepare(self, sensors: Any, skip: Any = None) -> None:
-        """See to it that all lanes, but those to skip, have the numbers of their next reading."""
+        """Make sure that all lanes, except those to skip, have the numbers of their next reading."""
         if self._enough == 0:
             spent = sensors.noise_used >= AHEAD
             for lane in np.flatnonzero(spent if skip is None else spent & ~skip).tolist():

@@ -1,8 +1,8 @@
-"""A train's odometer: where in the span it takes itself to be, and how fast.
+"""A train's odometer: its estimate of the position in the span and of the speed.
 
-It counts a wheel's turns. A wheel that is not of the diameter that it is taken for makes way and speed wrong
-by one share, which is drawn per run; slip adds a random walk of the way. At each mast, which is detected with
-an error of its own, the count begins anew, so that the error is a saw-tooth. Neither reading is late.
+It counts a wheel's turns. An error of the wheel's diameter gives distance and speed the same relative error,
+which is drawn per run; slip adds a random walk of the distance. At each mast, which is detected with an error
+of its own, the count is reset, so that the error is a saw-tooth. The readings have no delay.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ from ..alignment import Alignment, mean_over_own_length
 from .noise import AHEAD, Noise
 
 WALK = 100.0
-"""Way (m) after which a random walk has the rms that it is given by."""
+"""Distance (m) after which the random walk reaches its given rms."""
 
 
 class OdometerErrors(NamedTuple):
-    """How wrong an odometer is; all zero for an exact one."""
+    """Errors of an odometer; all zero for an exact one."""
 
-    scale: float = 0.0  # rms share by which way and speed are wrong
-    walk: float = 0.0  # rms random walk of the way, after WALK (m)
-    mast: float = 0.0  # rms error of where a mast is detected (m)
+    scale: float = 0.0  # rms relative error of distance and speed
+    walk: float = 0.0  # rms random walk of the distance, after WALK (m)
+    mast: float = 0.0  # rms error of the position at which a mast is detected (m)
     speed: float = 0.0  # rms noise of the speed (m/s)
     blind: bool = False  # whether the position within the span is not known at all
 
     @property
     def drawn(self) -> bool:
-        """Whether anything of it is random."""
+        """Whether any of the errors is random."""
         return any(self[:4])
 
 
 class OdometerRow(IntEnum):
-    """Rows of what is kept of each lane."""
+    """Rows of each lane's odometer."""
 
-    SPANS = 0  # from the line's start to where it was read last
-    MAST = 1  # spans to the last mast that was detected
+    SPANS = 0  # true position at the last reading (spans)
+    MAST = 1  # position of the last mast that was detected (spans)
     ERROR = 2  # of the position (spans as long as the present one)
-    SCALE = 3  # share by which way and speed are wrong
+    SCALE = 3  # relative error of distance and speed
 
 
 class OdometerNoise(IntEnum):
-    """Numbers that a reading takes."""
+    """Random numbers of one reading."""
 
-    WALK = 0  # over a span of mean length (such spans)
-    MAST = 1  # of the detection, where there was one (spans of mean length)
+    WALK = 0  # random walk over a span of mean length (spans of mean length)
+    MAST = 1  # error of the detection of a mast (spans of mean length)
     SPEED = 2  # m/s
 
 
@@ -58,11 +58,11 @@ ROW, NOISE = constants(OdometerRow), constants(OdometerNoise)
 
 
 class OdometerArrays(NamedTuple):
-    """Odometers of all lanes; no rows and no times where they are exact."""
+    """Odometers of all lanes; tables without rows and times where they are exact."""
 
     table: Array  # (lanes, rows of ``OdometerRow``)
     noise: Array  # (lanes, times, numbers of ``OdometerNoise``): of the next readings
-    noise_used: Index  # (lanes,): how many of them have been used
+    noise_used: Index  # (lanes,): number of times that have been used
     sight: float  # 0 where the position is not known, else 1
 
 
@@ -77,7 +77,7 @@ class Odometers:
         self._noise = Noise((walk, errors.mast / length, errors.speed), lanes)
 
     def arrays(self) -> OdometerArrays:
-        """Of all lanes."""
+        """Odometers of all lanes, for kernels."""
         return OdometerArrays(
             table=np.zeros((self._lanes, len(OdometerRow) if self.drawn else 0)),
             noise=np.zeros((self._lanes, AHEAD if self.drawn else 0, len(OdometerNoise))),
@@ -88,8 +88,8 @@ class Odometers:
     def start(self, arrays: OdometerArrays, lane: int, random: np.random.Generator, shared: bool) -> None:
         """Begin a lane's run at a mast.
 
-        random: the lane's generator. shared: whether it is drawn from besides: then this takes nothing out of
-        it, so that what else is drawn stays as it was.
+        random: the lane's generator. shared: whether others draw from it too; then its state is restored, so
+        that their numbers do not change.
         """
         before = random.bit_generator.state
         own = np.random.default_rng(random.integers(0, 2**63, 4))
@@ -101,13 +101,13 @@ class Odometers:
         self._noise.start(arrays, lane, own)
 
     def prepare(self, arrays: OdometerArrays, skip: Any = None) -> None:
-        """See to it that all lanes, but those to skip, have the numbers of their next reading."""
+        """Make sure that all lanes, except those to skip, have the numbers of their next reading."""
         self._noise.prepare(arrays, skip)
 
 
 @inlined
 def read_odometer(odometer, alignment, true, speed, lane):
-    """What a lane's odometer reads at a true position (spans) and speed (m/s): position and speed."""
+    """Position (spans) and speed (m/s) that a lane's odometer reads, from the true ones."""
     ratio = mean_over_own_length(alignment, true)
     own = odometer.table[lane]
     noise = odometer.noise[lane, odometer.noise_used[lane] & NOT_NEGATIVE]

@@ -1,4 +1,4 @@
-"""The arrays of the motors: their constants, and what moves in all lanes."""
+"""Arrays of the motors: their constants and the state of all lanes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class MotorRow(IntEnum):
 
     FORCE = 0  # e = K i at the step's end (N)
     HEAT = 1  # mean square of e over the winding's time constant (N^2)
-    SUPPLIED = 2  # energy from the supply since the start (J); what comes back to it is taken off
+    SUPPLIED = 2  # net energy from the supply since the start (J)
     COPPER = 3  # energy lost in the armatures since the start (J)
     GAP = 4  # of loose rotors ahead of the ends, from the middle of the play (m)
     SPEED = 5  # of loose rotors (m/s)
@@ -28,7 +28,7 @@ MOTOR_ROWS = len(MotorRow)
 
 
 class MotorArrays(NamedTuple):
-    """Motors of all lanes, seen from where they press."""
+    """Motors of all lanes, reflected to the point where they act."""
 
     table: Array  # (collectors, lanes, places of ``MotorRow``)
     places: Index  # (used,): where there are motors, each a ``Place``
@@ -36,13 +36,13 @@ class MotorArrays(NamedTuple):
     command_limit: float  # maximum force that is requested (N)
     peak_force: float  # N
     continuous_force: float  # N
-    heat_share: float  # of the way to the present square of the force that HEAT goes in a step
+    heat_share: float  # weight of the present square of the force in HEAT, per step
     largest_speed: float  # maximum speed (m/s)
     stall_force: float  # N
     shorted_damping: float  # N s/m
     armature_time: float  # L / R (s)
-    armature_left: float  # share of a change left after a step at the same voltage
-    armature_mean: float  # share of it left in the mean over the step
+    armature_left: float  # share of a deviation that remains after a step at constant voltage
+    armature_mean: float  # mean of that share over the step
     bandwidth: float  # of the current loop (1/s)
     lead: float  # bandwidth * armature_time
     decay_halvings: int

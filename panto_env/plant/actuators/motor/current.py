@@ -1,16 +1,16 @@
 """The armature and its current loop over one step, in closed form.
 
 L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by a PI law whose zero cancels
-the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i),
-a being the bandwidth. Where that needs more than the largest voltage, the drive gives this; the reference i*
-is never beyond what this voltage can hold at the present speed, so that the integrator does not wind up. In
-force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the stall force and T =
-L / R:
+the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i)
+with the bandwidth a. Where that exceeds the maximum voltage, the drive gives the maximum; the reference i*
+never exceeds the current that this voltage can hold at the present speed, so the integrator does not wind
+up. In terms of the force e = K i (N), with D the damping of shorted motors, w the speed at mid-step, U the
+stall force and T = L / R:
 
-    at the largest voltage  T de/dt = b - e,  b = +-U - D w        below it  de/dt = a (e* - e)
+    at the maximum voltage  T de/dt = b - e,  b = +-U - D w        below it  de/dt = a (e* - e)
 
-A change of the reference begins at the largest voltage, if at all, and ends below it: b is the bound on the
-side of the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
+After a change of the reference the voltage is at its maximum first, if at all, and then below it: b is the
+bound on the side of the reference, and the phases meet at e_s = (a T e* - b) / (a T - 1).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ import math
 from ....backend import inlined
 
 SMALL = 1e-9
-"""Force (N) below which a difference from the bound is none."""
+"""Difference from the bound (N) that counts as zero."""
 
 
 @inlined
 def decay(x, halvings):
-    """Exp(-x) of x of 0 or more: Pade's approximant at x over 2^halvings, up to 1/4, squared so often."""
+    """Exp(-x) for x >= 0: Pade's approximant at x / 2^halvings, which is at most 1/4, squared repeatedly."""
     y = x * 0.5**halvings
     half, twelfth = 0.5 * y, y * y * (1.0 / 12.0)
     result = (1.0 - half + twelfth) / (1.0 + half + twelfth)
@@ -36,7 +36,7 @@ def decay(x, halvings):
 
 @inlined
 def age(left, halvings):
-    """-log(left) of a share left, above 0: the series of atanh at its 2^halvings-th root."""
+    """-log(left) for a remaining share above 0: the series of atanh at its 2^halvings-th root."""
     y = left
     for _ in range(halvings):
         y = math.sqrt(y)
@@ -48,15 +48,15 @@ def age(left, halvings):
 
 @inlined
 def clip(x, lowest, highest):
-    """The value within two bounds."""
+    """X limited to [lowest, highest]."""
     return min(highest, max(lowest, x))
 
 
 @inlined
-def follow(motors, force, wanted, coasting, gain):
-    """Force of the motors (N) under a reference, from ``force`` at the step's start.
+def follow(motors, force, requested, coasting, gain):
+    """Force of the motors (N) over a step under a requested force, from ``force`` at the step's start.
 
-    coasting: speed at mid-step if they did not press (m/s), to which a steady 1 N adds ``gain`` (m/s/N).
+    coasting: speed at mid-step without the motors' force (m/s), to which a steady 1 N adds ``gain`` (m/s/N).
     Each bound holds at the speed that a step at its voltage leads to, so that light rotors with a strong
     back-EMF are stable at any time step. Returns the force at the step's end, its mean, and the mean of its
     square (N^2).
@@ -66,11 +66,11 @@ def follow(motors, force, wanted, coasting, gain):
     drop, yielding = motors.shorted_damping * coasting, 1.0 / (1.0 + damping * (1.0 - old))
     drop = drop + damping * old * force
     highest, lowest = (motors.stall_force - drop) * yielding, (-motors.stall_force - drop) * yielding
-    target = clip(wanted, lowest, highest)
+    target = clip(requested, lowest, highest)
     bound = highest if target >= force else lowest
     turn = (lead * target - bound) * (1.0 / (lead - 1.0))
     turn = max(force, turn) if target >= force else min(force, turn)
-    # At the largest voltage, towards the bound, until the turn or the end of the step.
+    # At the maximum voltage, towards the bound, until the turn or the end of the step.
     away = force - bound
     left = 1.0 if abs(away) < SMALL else (turn - bound) / away
     saturated = step

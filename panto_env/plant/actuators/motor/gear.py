@@ -1,4 +1,4 @@
-"""What lies between armature and arm: friction, and teeth that may be loose."""
+"""The gearbox between armature and arm: friction, and backlash of the teeth."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from .current import clip
 
 @inlined
 def friction(motors, load, stopping):
-    """Friction (N) of motors and gears against a force that would bring their motion to rest in this step.
+    """Dry friction (N) of motors and gears.
 
-    Dry, of the shaft and of a share of the load on the teeth, so that a motor that drives passes on the
-    efficiency's share of its torque, and a load that drives it has as much more to overcome. It sticks where
-    it is larger than what would stop the motion.
+    stopping: force that would bring the motion to rest in this step (N); where the friction can provide it,
+    the gear sticks. Part of the friction is proportional to the load on the teeth (N): a driving motor passes
+    on its torque times the efficiency, and a load that drives the motor has the same loss to overcome.
     """
-    most = motors.dry_friction + motors.lost_share * abs(load)
-    return clip(stopping, -most, most)
+    maximum = motors.dry_friction + motors.lost_share * abs(load)
+    return clip(stopping, -maximum, maximum)
 
 
 @inlined
 def tooth_force(motors, gap, way, gain):
-    """Mean force of the teeth over a step (N): of a spring and a damper beyond either end of the play.
+    """Mean force of the teeth over a step (N): a spring and a damper at either end of the play.
 
-    gap: of the rotors ahead of the ends, from the middle of the play, at the step's start; way: by which it
-    would grow in the step without this force, of which 1 N takes ``gain`` (m, m, m/N).
+    gap: lead of the rotors over the ends, from the middle of the play, at the step's start (m). way: its
+    growth over the step without this force (m), which 1 N reduces by ``gain`` (m/N).
     """
     compliance, damping, half = motors.tooth_compliance, motors.tooth_damping, 0.5 * motors.play
     middle = gap + 0.5 * way

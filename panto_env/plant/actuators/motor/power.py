@@ -1,4 +1,4 @@
-"""Current, voltage and watts of motors, from what a run has recorded."""
+"""Current, voltage and power of motors, from the force and speed that a run has recorded."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from .schema import MotorActuator
 
 
 class MotorPower(NamedTuple):
-    """Motors of one place over a run, means of each time step, (n,)."""
+    """Power of the motors of one place over a run, means of each time step, (n,)."""
 
     current: Array  # of each motor (A)
     voltage: Array  # of each motor (V)
-    copper: Array  # lost in all armatures (W)
-    mechanical: Array  # that all arms give to what they press on (W)
-    electrical: Array  # that all motors take from the supply (W), below 0 where they give some back
+    copper: Array  # loss in all armatures (W)
+    mechanical: Array  # output of all arms (W)
+    electrical: Array  # input of all motors (W), negative where they feed power back
 
 
 def motor_power(motor: MotorActuator, force: Array, speed: Array, time_step: float) -> MotorPower:
-    """What motors took for a recorded ``force`` (N) while their ends moved apart at a ``speed`` (m/s).
+    """Power of motors from a recorded ``force`` (N) and the ``speed`` (m/s) at which their ends moved apart.
 
     Both are means over time steps of ``time_step`` (s), (n,): a run's ``head_force``, and the velocity of the
-    head less that of the mass below it; or ``frame_force``, and ``frame_velocity``. The motors' equations are
-    turned round: friction goes by the sense of the speed, so that a step in which they stick or turn back is
-    told only roughly; what the kernel itself has booked, without such steps, is ``MotorArrays.energy``.
+    head minus that of the mass below it; or ``frame_force``, and ``frame_velocity``. The motors' equations
+    are inverted: friction follows the sign of the speed, so a step in which they stick or reverse is only
+    approximate. ``MotorArrays.energy`` has the exact energy, as the kernel counts it.
 
-    Raises InputError where backlash lets the rotors move otherwise than what they press on, and where force
-    and speed are not of one length of two or more.
+    Raises InputError for motors with backlash, whose rotors move relative to the arms, and unless force and
+    speed have the same length of at least 2.
     """
     if motor.backlash > 0:
         raise InputError(
             "The power of motors with backlash does not follow from force and speed, because their rotors "
-            "are loose at times; take the energy that the plant books, MotorArrays.energy."
+            "are loose at times; use MotorArrays.energy, which the plant counts."
         )
     if force.ndim != 1 or force.shape != speed.shape or len(force) < 2:
         raise InputError(
-            f"force and speed must be of one length, 2 or more, not {force.shape} and {speed.shape}."
+            f"force and speed must have the same length, at least 2, not {force.shape} and {speed.shape}."
         )
     sense, inertia = np.sign(speed), motor.reflected_mass * np.gradient(speed, time_step)
     # The teeth bear X = e - inertia, and pass on X - sense (dry friction + lost share of |X|) = force -

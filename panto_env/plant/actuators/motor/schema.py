@@ -1,4 +1,4 @@
-"""What a drive of motors, gearboxes and arms is made of, and what it does where it presses."""
+"""Data of a drive of motors, gearboxes and arms, and its constants at the point where it acts."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ...state import Place
 from ..base import ActuatorSettings
 from .arrays import MOTOR_ROWS, MotorArrays
 
-LEAST_LEAD = 1.05
-"""Bandwidth of a current loop over the armature's own, at least: at 1 it has nothing to hasten."""
+MINIMUM_LEAD = 1.05
+"""Minimum bandwidth of a current loop over the armature's own: at 1 the loop would add nothing."""
 
 
 class MotorActuator(ActuatorSettings):
     """DC servomotors in force mode, with gearboxes, on arms.
 
     The motor is a maxon RE 40, 150 W, 24 V (148867), the gearbox a maxon GP 42 C, 26:1, two stages (203119):
-    of brushed servomotors with ironless rotor, which have the small time constants that paper 2 names, one
-    that fits into a joint (40 mm, 0.84 kg with its gearbox). *seen*: in public copies of the data sheets (the
+    a brushed servomotor with ironless rotor, with the small time constants that paper 2 names, which fits
+    into a joint (40 mm, 0.84 kg with its gearbox). *seen*: in public copies of the data sheets (the
     motor's current edition; older ones have 0.317 ohm and 138 g cm^2). *recalled*: from memory of the data
     sheet. Paper 2 prints no constants.
     """
@@ -31,9 +31,9 @@ class MotorActuator(ActuatorSettings):
     kind: Literal["motor"] = "motor"
     place: Literal["frame", "head", "both"] = Field("head", description="where the force acts")
     # Own choice: one in each arm of the collector head, as paper 2's Fig. 13 has it.
-    motors: Annotated[int, Between(1, 8)] = Field(2, description="motors that press together at one place")
+    motors: Annotated[int, Between(1, 8)] = Field(2, description="motors that act together at one place")
     voltage: Annotated[float, Between(1, 1000, "V")] = Field(  # seen
-        24.0, description="largest voltage of the drive either way (V)"
+        24.0, description="maximum voltage of the drive in either direction (V)"
     )
     resistance: Annotated[float, Between(1e-3, 1e3, "ohm")] = Field(  # seen
         0.299, description="resistance R of a motor's armature (ohm)"
@@ -54,25 +54,25 @@ class MotorActuator(ActuatorSettings):
     )
     continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = (
         Field(  # of the nominal current, 6 A: seen
-            0.181, description="largest rms torque of a motor for as long as one likes (N m)"
+            0.181, description="maximum continuous rms torque of a motor (N m)"
         )
     )
     # What the gearbox bears for a moment, 11.3 N m (recalled), through ratio and efficiency; the motor bears
     # more.
     peak_torque: Annotated[float, Between(1e-4, 100, "N m")] = Field(
-        0.53, description="largest torque of a motor (N m)"
+        0.53, description="maximum torque of a motor (N m)"
     )
     thermal_time: Annotated[float, Between(0.1, 1e5, "s")] = Field(  # seen
-        42.8, description="thermal time constant of a motor's winding, over which the rms counts (s)"
+        42.8, description="thermal time constant of a motor's winding, for the rms torque (s)"
     )
     largest_speed: Annotated[float, Between(1, 1e5, "rad/s")] = Field(  # of the gearbox, 8000 rpm: seen
-        838.0, description="speed of a motor's shaft up to which the drive pushes on (rad/s)"
+        838.0, description="maximum speed to which the drive accelerates a motor's shaft (rad/s)"
     )
     bandwidth: Annotated[float, Between(1, 1e5, "Hz")] = Field(  # own choice: of the size of servo drives'
         1000.0, description="bandwidth of the current loop (Hz)"
     )
     gear_ratio: Annotated[float, Between(1, 1000)] = Field(  # seen
-        26.0, description="turns of a motor's shaft for one of the arm (-)"
+        26.0, description="turns of a motor's shaft per turn of the arm (-)"
     )
     gear_efficiency: Annotated[float, Between(0.3, 1)] = Field(  # seen, of two stages
         0.81, description="share of a motor's torque that goes through its gearbox (-)"
@@ -83,7 +83,7 @@ class MotorActuator(ActuatorSettings):
     # The data sheet has 0.8 degrees, 0.014 rad (recalled): 2.8 mm at the head. Own choice: none, as of a
     # tensed gear.
     backlash: Annotated[float, Between(0, 0.2, "rad")] = Field(
-        0.0, description="angle by which a gearbox's output is loose, from flank to flank (rad)"
+        0.0, description="backlash at a gearbox's output, from flank to flank (rad)"
     )
     gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = (
         Field(  # own choice: of the size of such gears
@@ -94,7 +94,7 @@ class MotorActuator(ActuatorSettings):
     gear_damping: Annotated[float, Between(0, 1e5, "N m s/rad")] = Field(  # own choice: a tenth of critical
         1.1, description="damping of a gearbox, at its output; counts where there is backlash (N m s/rad)"
     )
-    # Own choice: with it two motors press by as much, 100 N, as published actuators do.
+    # Own choice: with it two motors reach 100 N, as published actuators do.
     arm_length: Annotated[float, Between(0.01, 5, "m")] = Field(
         0.2, description="length of the arm that a gearbox turns (m)"
     )
@@ -111,37 +111,37 @@ class MotorActuator(ActuatorSettings):
                 f"force_limit must not exceed {self.peak_force:.4g} N, which the motors have at their "
                 f"peak_torque: it is {self.force_limit:g} N; take a smaller one, or other motors or gears"
             )
-        least = LEAST_LEAD * self.resistance / (2 * math.pi * self.inductance)
-        if self.bandwidth < least:
+        minimum = MINIMUM_LEAD * self.resistance / (2 * math.pi * self.inductance)
+        if self.bandwidth < minimum:
             raise ValueError(
-                f"bandwidth must be {least:.4g} Hz at least, a little more than the armature has by itself, "
+                f"bandwidth must be at least {minimum:.4g} Hz, slightly above the armature's own, "
                 f"R / (2 pi L): it is {self.bandwidth:g} Hz"
             )
         return self
 
     @property
     def shaft_per_metre(self) -> float:
-        """Angle of a motor's shaft by the way that the ends move apart (rad/m)."""
+        """Angle of a motor's shaft per distance that the ends move apart (rad/m)."""
         return self.gear_ratio / self.arm_length
 
     @property
     def force_per_ampere(self) -> float:
-        """K: force of all motors by the current of each, before friction (N/A)."""
+        """K: force of all motors per ampere in each, before friction (N/A)."""
         return self.motors * self.shaft_per_metre * self.torque_constant
 
     @property
     def shorted_damping(self) -> float:
-        """K^2 / (motors R): force by speed of motors whose armatures are shorted (N s/m)."""
+        """K^2 / (motors R): damping of motors with shorted armatures (N s/m)."""
         return self.force_per_ampere**2 / (self.motors * self.resistance)
 
     @property
     def stall_force(self) -> float:
-        """Force at standstill under the largest voltage, before friction (N)."""
+        """Force at standstill under the maximum voltage, before friction (N)."""
         return self.force_per_ampere * self.voltage / self.resistance
 
     @property
     def peak_force(self) -> float:
-        """Force at the largest torque, before friction (N)."""
+        """Force at the maximum torque, before friction (N)."""
         return self.motors * self.shaft_per_metre * self.peak_torque
 
     @property
@@ -156,12 +156,12 @@ class MotorActuator(ActuatorSettings):
 
     @property
     def reflected_mass(self) -> float:
-        """Mass that rotors and gearboxes are where they press (kg)."""
+        """Inertia of rotors and gearboxes as a mass at the point where they act (kg)."""
         return self.motors * self.shaft_per_metre**2 * (self.rotor_inertia + self.gear_inertia)
 
     @property
     def reflected_masses(self) -> tuple[float, float]:
-        """Mass (kg) that turns with each ``Place``; none where rotors can be loose."""
+        """Mass (kg) that moves with each ``Place``; 0 with backlash, where rotors move on their own."""
         fixed = 0.0 if self.backlash > 0 else self.reflected_mass
         return tuple(fixed if place in self.places else 0.0 for place in (0, 1))  # type: ignore[return-value]
 

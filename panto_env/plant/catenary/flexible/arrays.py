@@ -1,4 +1,4 @@
-"""Arrays of the flexible catenary: the constants of a line on its grid, and what moves.
+"""Arrays of the flexible catenary: the constants of a line on its grid, and the state of its wires.
 
 Wires lie in segments abreast: the window is cut into ``WIDTH`` equal segments, and row r of a wire holds node
 r of each. So one vector computes a node of all segments at once, along the wires as at the droppers. Rows
@@ -14,7 +14,7 @@ from ...alignment import AlignmentArrays
 
 PAD = 2  # rows beyond each end of the segments, for the five-point stencil
 CONTACT, MESSENGER = 0, 1
-"""The wires of today's lines; the pantograph touches the first."""
+"""Indices of the wires; the pantograph touches the first."""
 LOWER, UPPER = 0, 1
 """The two ends of a link."""
 
@@ -23,11 +23,11 @@ class FlexibleLine(NamedTuple):
     """Constants of a line on its grid: wires, springs that hold them, and links between them.
 
     The grid covers a window of the line that travels with the train, or all of it. Droppers are links.
-    Springs and links whose nodes are in the same rows go abreast, one per segment at most: they are a set,
-    which has constants that do nothing where a segment has none.
+    Springs and links whose nodes are in the same rows form a set, at most one per segment, and are computed
+    side by side; for a segment without one, the constants have no effect.
 
-    What defects change about links has one row for all lanes or one per lane, for the whole line; intact
-    spans are alike, and there one window does. What tension changes has one row likewise, or one per lane.
+    Tables that depend on defects cover the whole line, with one row for all lanes or one per lane; intact
+    lines have one window of them. Tables that depend on tension have one row for all lanes or one per lane.
     """
 
     spacing: float  # of the grid (m)
@@ -35,10 +35,10 @@ class FlexibleLine(NamedTuple):
     window: int  # spans that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # (rows, n): static height of the contact wire over a span, every span/(n - 1) m (m)
-    rise: Array  # (rows, pieces, 5): what defects add to it: a, b, c, d, e of each piece of the line
+    rise: Array  # (rows, pieces, 5): its change by defects: a, b, c, d, e of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
     rise_decay: Array  # (rows,): kappa: of exponentials along a piece (1/m)
-    stencil: Array  # (rows, wires, 5): weights of neighbours and of theirs; b; lag; quieting step (m)
+    stencil: Array  # (rows, wires, 5): weights of nearest and second nearest nodes; b; lag; tiny load (m)
     absorbing: Array  # (rows, wires): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
     inertia: (
         Array  # (wires, rows, WIDTH): mass of the bare wire over that of the node; no rows where all are 1
@@ -47,7 +47,7 @@ class FlexibleLine(NamedTuple):
     mast_row: Index  # (supports,): row of the node where uplift is recorded
     mast_segment: Index  # (supports,): its segment
     free_uplift: float  # room for it up to the steady arm's stop (m)
-    largest_move: float  # in a step, beyond which the computation has diverged (m)
+    largest_move: float  # maximum displacement in a step; beyond it the computation has diverged (m)
     spring_wire: Index  # (sets,): which wire springs to the ground hold
     spring_row: Index  # (sets,): in which row
     spring_pull: Array  # (sets, 3, WIDTH): their step by displacement at three times, newest first (-)
@@ -57,16 +57,18 @@ class FlexibleLine(NamedTuple):
     link_move: Array  # (sets, ends times 4, WIDTH): displacement of the nodes in a step by 1 N (m/N)
     link_linear: Array  # (sets, 2, WIDTH): change of tension by mean extension before and after (N/m)
     link_yield: Array  # (sets, WIDTH): mean relative displacement of the ends over a step by 1 N (m/N)
-    link_stiffness: Array  # (sets, WIDTH): in tension, with what the grid's wires yield too little (N/m)
-    link_room: Array  # (sets, WIDTH): by which its ends may approach, as designed, until the wires touch (m)
-    link_set: Index  # (links,): set of each of the window's links, in their order along the line
-    link_segment: Index  # (links,): its place there
+    link_stiffness: Array  # (sets, WIDTH): in tension, with the grid's missing compliance (N/m)
+    link_room: (
+        Array  # (sets, WIDTH): designed distance of its ends; the wires touch once they approach by it (m)
+    )
+    link_set: Index  # (links,): set of each of the window's links, in the order along the line
+    link_segment: Index  # (links,): its segment
     link_static: Array  # (rows, links of the window or the line): static tension (N)
-    link_gap: Array  # likewise: how far the ends of a slack one must part before it pulls (m)
+    link_gap: Array  # (rows, links of the window or the line): extension before a slack one pulls (m)
 
 
 class FlexibleWire(NamedTuple):
-    """What moves, in all lanes."""
+    """State of the wires in all lanes."""
 
     displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, about the static shape (m)
     increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
@@ -76,9 +78,9 @@ class FlexibleWire(NamedTuple):
     contact_weight: Array  # (lanes, collectors, 4): of the four
     unmoved_height: Array  # (lanes, collectors): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
-    # Extensions are about static, less the gap of a link that is slack there.
+    # Extensions are relative to the static ones, minus the gap of a link that is slack there.
     past_extension: Array  # (lanes, sets, WIDTH): before the step (m)
     extension: Array  # (lanes, sets, WIDTH): at its start (m)
-    change: Array  # (lanes, sets, WIDTH): of the tension about the static one, over the last step (N)
+    change: Array  # (lanes, sets, WIDTH): tension minus the static one, mean over the last step (N)
     static: Array  # (lanes, sets, WIDTH): ``link_static`` of the window's links (N)
-    gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of them (m)
+    gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of the window's links (m)

@@ -53,9 +53,9 @@ class Beams:
         tilt = np.array([no, half, no, half]) + rate * lean
         even = -1 / (self.decay * gone) * np.array([no, half, no, -half])
         level = np.array([half, no, half, no]) - (1 + far) * even
-        self._shapes = np.moveaxis(
-            np.array([level - tilt * lengths / 2, tilt, even + lean, even - lean]), -1, 0
-        )
+        # Contiguous, as a pickled copy is: products would otherwise add up in another order there.
+        shapes = np.array([level - tilt * lengths / 2, tilt, even + lean, even - lean])
+        self._shapes = np.ascontiguousarray(np.moveaxis(shapes, -1, 0))
         # The ends are held by T y' - EI y''' = T b and EI y'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
         one = np.ones(len(lengths))
         held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])

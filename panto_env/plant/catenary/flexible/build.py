@@ -24,9 +24,9 @@ from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 STIFFEST = 1e8
-"""Of a link on the grid (N/m), in tension."""
+"""Maximum stiffness of a link on the grid (N/m), in tension."""
 MOST_NODES = 1_000_000
-"""Of a wire on its grid: more would take the memory of a machine, and a run of them days."""
+"""Maximum number of nodes of a wire: more would fill the memory, and a run would take days."""
 QUIET = 1e-25
 """Load (m per step) that keeps wires at rest away from subnormal numbers, which are slow; it moves a wire by
 less than 1e-15 m."""
@@ -41,9 +41,9 @@ def constants(
     resolution: Resolution,
     own: WireDefects = NO_DEFECTS,
 ) -> FlexibleLine:
-    """Constants of a line of ``spans`` spans, each of a static shape, at a stable resolution.
+    """Constants of a line of ``spans`` spans with the same static shape, at a stable resolution.
 
-    own: defects of the contact wire itself, at positions along the whole line; a window that travels cannot
+    own: defects of the contact wire itself, at positions along the whole line; a travelling window cannot
     have any. Raises InputError for more nodes than ``MOST_NODES``.
     """
     window = min(resolution.window or spans, spans)
@@ -53,8 +53,8 @@ def constants(
     nodes = window * per_span + 1 + 2 * PAD
     if nodes > MOST_NODES:
         raise InputError(
-            f"A grid of {dx:g} m over {window} spans of line '{data.name}' has {nodes:,} nodes a wire; "
-            f"{MOST_NODES:,} at most can be computed, so take a coarser spacing or a smaller window."
+            f"A grid of {dx:g} m over {window} spans of line '{data.name}' has {nodes:,} nodes per wire; "
+            f"the maximum is {MOST_NODES:,}, so take a coarser spacing or a smaller window."
         )
     wires = (data.contact_wire, data.messenger_wire)
     masts = PAD + per_span * np.arange(1, window)
@@ -64,8 +64,8 @@ def constants(
     first, weights = stencil(links.position, dx)
     four = (first + PAD)[:, None] + np.arange(4)
 
-    # Masses hang on the two nearest nodes: the cubic weights would make some nodes lighter than bare wire,
-    # or of negative mass, and waves grow there.
+    # Masses hang on the two nearest nodes: with cubic weights some nodes would be lighter than bare wire, or
+    # have negative mass, and be unstable.
     right = (links.position / dx - (first + 1))[:, None]
     shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)
     bare = np.array([[wire.mass * dx] for wire in wires])
@@ -80,7 +80,7 @@ def constants(
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
     inertia = bare / mass
 
-    # What the wires yield too little on the grid, a link yields instead.
+    # The compliance that the wires lack on the grid is added to the links.
     ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
     missing = sum(
         count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
@@ -137,7 +137,7 @@ def constants(
 
 
 class Tensioned(NamedTuple):
-    """Constants of a line that depend on the wires' tension: a row of those in ``FlexibleLine``."""
+    """Constants of a line that depend on the wires' tension: one row of each in ``FlexibleLine``."""
 
     shape: Array  # (n,)
     stencil: Array  # (wires, 5)

@@ -1,7 +1,7 @@
-"""How far a line yields to a force that stands still: EN 50119's elasticity along a span.
+"""Elasticity of a line along a span (EN 50119): static uplift of the contact wire per newton.
 
-A whole line of some spans is solved at rest for a force at each of many places of the middle one. Droppers
-whose tension the force would turn into a push go slack.
+A line of a few spans is solved at rest for a force at many places of its middle span. Droppers that the force
+would compress go slack.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from .defects import DefectiveLine
 from .schema import FlexibleCatenaryData
 
 SPANS = 5
-"""Computed, of which the middle one is looked at; its neighbours count, further ones hardly do."""
+"""Number of spans in the computation: the neighbours of the middle one count, further ones hardly do."""
 PLACES = 48
-"""Of a span, at which the force stands."""
+"""Number of intervals between the places of the force in a span."""
 
 
 def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
     """Places in a span (m) and the uplift of the contact wire there per newton (m/N), (places,) each.
 
-    force: that stands there (N). The more of it, the more droppers go slack.
+    force: at the place (N). The larger it is, the more droppers go slack.
     """
     places = line.span_length / PLACES * np.arange(PLACES + 1)
     whole = DefectiveLine(line, SPANS, NEW, nodes=places.tolist())
@@ -34,7 +34,7 @@ def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
     return places, np.array(lifts)
 
 
-def unevenness(elasticities: Array) -> float:
+def non_uniformity(elasticities: Array) -> float:
     """EN 50119's degree of non-uniformity (%): (maximum - minimum) / (maximum + minimum)."""
-    largest, smallest = float(elasticities.max()), float(elasticities.min())
-    return 100 * (largest - smallest) / (largest + smallest)
+    maximum, minimum = float(elasticities.max()), float(elasticities.min())
+    return 100 * (maximum - minimum) / (maximum + minimum)

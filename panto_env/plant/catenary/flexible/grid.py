@@ -1,4 +1,4 @@
-"""Finite differences of a flexible catenary: their weights, and with which grid and step they are stable."""
+"""Finite differences of a flexible catenary: their weights, stability, and error at a point force."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .schema import FlexibleCatenaryData
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
-    """Nodes in a span of a grid at most this coarse (m): as many in each segment of any window."""
+    """Nodes per span for a maximum spacing (m): a multiple of ``WIDTH``, for segments of equal size."""
     return WIDTH * int(np.ceil(data.span_length / spacing / WIDTH - 1e-9))
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> bool:
-    """Whether no wave of the grid (m) grows: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4.
+    """Whether the leapfrog is stable: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4.
 
-    lightest: mass of the contact wire where it is most worn, as a share of that when new.
+    dx: spacing (m). step: s. lightest: mass of the most worn contact wire, as a share of a new one's.
     """
     angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
     for wire, share in ((data.contact_wire, lightest), (data.messenger_wire, 1.0)):
@@ -30,11 +30,12 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float =
 
 
 def contact_gain(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> float:
-    """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
+    """Inverse of the stiffness (m/N) from which a contact law that reads the wire at mid-step is unstable.
 
-    With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W': the
-    larger of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1 there, an integral over
-    the waves of the grid. Waves at the grid's own limit make it infinite. lightest: as ``stable`` takes it.
+    With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W'. At the
+    limit the maximum of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1; it is an
+    integral over the waves of the grid. Infinite where the grid is at its own limit. lightest: as in
+    ``stable``.
     """
     angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
     squared = _response(stencil_weights(data.contact_wire, dx, step), angle) / lightest
@@ -48,12 +49,12 @@ def contact_gain(data: FlexibleCatenaryData, dx: float, step: float, lightest: f
 
 
 def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:
-    """What a wire on a grid yields too little to a force at a point (m/N), (points,).
+    """Missing compliance (m/N), (points,), of a wire on a grid at points between its nodes.
 
-    weights: (points, 4), by which the force acts on the nodes about each point, and by which the wire is read
-    there. The kink under a force is narrower than the grid: the wire itself yields by the integral over all
-    its waves k of 1 / (2 pi (T k^2 + EI k^4)), the grid by that of W W* / (2 pi K) over the waves that it
-    carries. The difference is of first order in the grid and changes from point to point between two nodes.
+    weights: (points, 4), with which a force at a point acts on the four nodes, and with which the wire is
+    read there. The kink under a force is narrower than the grid. The wire's compliance is the integral of
+    1 / (2 pi (T k^2 + EI k^4)) over all wavenumbers k, the grid's that of W W* / (2 pi K) over the waves that
+    it resolves. The difference is of first order in the spacing and depends on the place between two nodes.
     """
     count = 512
     angle = (np.arange(count) + 0.5) * np.pi / count  # of a wave from node to node
@@ -66,13 +67,13 @@ def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:
 
 
 def _response(weights: Array, angle: Array) -> Array:
-    """What a stencil of such weights answers to a wave, by its angle from node to node, for 1 of it."""
+    """Response of a stencil to a wave of amplitude 1, by the wave's angle from node to node."""
     near, far = weights
     return np.asarray(2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle)))
 
 
 def _seen(weights: Array, angle: Array) -> Array:
-    """Power of each wave that points among four nodes see, by their weights (points, 4): (points, waves)."""
+    """Power of each wave at points among four nodes, from their weights (points, 4): (points, waves)."""
     return np.asarray(np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2)
 
 
@@ -83,7 +84,7 @@ def spring_levels(stiffness: float, damping: float, step: float) -> Array:
 
 
 def stencil_weights(wire: Wire, dx: float, step: float) -> Array:
-    """Weights of the neighbours and of theirs in the wire's force, as a displacement in a step."""
+    """Weights of the nearest and second nearest nodes in the wire's force, as a displacement in a step."""
     courant = np.sqrt(wire.tension / wire.mass) * step / dx
     second = wire.tension / dx**2
     fourth = -second * (1 - courant**2) / 12 - wire.bending_stiffness / dx**4

@@ -1,4 +1,4 @@
-"""Links between wires in a kernel: droppers, which pull and go slack, those of a set side by side."""
+"""Links between wires in a kernel: droppers, which pull and go slack, a set of them side by side."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .segments import move, read
 
 @inlined
 def first_link(line, first_span):
-    """Where the window's links begin in the tables of static tension and gap."""
+    """Index of the window's first link in the tables of static tension and gap."""
     count = line.link_set.size
     return min(first_span * (count // line.window), line.link_static.shape[1] - count) & NOT_NEGATIVE
 
 
 @inlined
 def difference(lower, upper, row, weight, rows):
-    """How far the upper wire stands over the lower one at the links of a set (m)."""
+    """Displacement of the upper wire minus that of the lower one at the links of a set (m)."""
     total = load_row(weight, 0) * (read(upper, row, rows) - read(lower, row, rows))
     for k in range(1, 4):
         total += load_row(weight, k) * (read(upper, row + k, rows) - read(lower, row + k, rows))
@@ -25,7 +25,7 @@ def difference(lower, upper, row, weight, rows):
 
 @inlined
 def measure_extensions(line, u, past, now, gap):
-    """Extensions (m) before the step and at its start, from displacements at its start."""
+    """Store extensions (m) of the previous step, and compute those at the step's start."""
     for s in range(line.link_row.size):
         lower, upper = u[line.link_wire[s, LOWER] & NOT_NEGATIVE], u[line.link_wire[s, UPPER] & NOT_NEGATIVE]
         apart = difference(lower, upper, line.link_row[s], line.link_weight[s], line.rows)
@@ -55,7 +55,7 @@ def slackening(stiffness, static, past, free, yielding):
 
 @inlined
 def pull_links(line, u, d, past, now, static, change):
-    """Links: each one scalar equation for its tension, which is never negative."""
+    """Apply the links: a scalar equation for the tension of each, which is never negative."""
     rows = line.rows
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
@@ -63,10 +63,10 @@ def pull_links(line, u, d, past, now, static, change):
         step = difference(d[lower], d[upper], row, line.link_weight[s], rows)
         stiffness, yielding = load_row(line.link_stiffness, s), load_row(line.link_yield, s)
         before = 0.5 * (load_row(past, s) + load_row(now, s))
-        free, least = load_row(now, s) + 0.5 * step, -load_row(static, s)
+        free, minimum = load_row(now, s) + 0.5 * step, -load_row(static, s)
         taut = load_row(linear, 0) * before + load_row(linear, 1) * free  # the mean spring force
-        pull = larger(taut, least)
-        slack = stiffness * smaller(before, free - yielding * taut) < least
+        pull = larger(taut, minimum)
+        slack = stiffness * smaller(before, free - yielding * taut) < minimum
         if any_of(slack):
             pull = choose(slack, slackening(stiffness, load_row(static, s), before, free, yielding), pull)
         store_row(change, s, pull)
@@ -77,7 +77,7 @@ def pull_links(line, u, d, past, now, static, change):
 
 @inlined
 def follow_links(line, row, first_span, now, static, gap):
-    """Let the window have travelled by a span, to ``first_span``: links of fresh wire are at rest."""
+    """Move the links with the window by a span, to ``first_span``; those of the new span are at rest."""
     links, number, segment = line.link_set.size, line.link_set, line.link_segment
     per_span, first = links // line.window, first_link(line, first_span)
     for k in range(links):

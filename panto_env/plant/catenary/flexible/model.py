@@ -27,10 +27,10 @@ from .tension import shape_left, with_tension_left
 from .wire_defects import locate
 
 DESIGNED = -1
-"""Instead of a lane's number: the shape of all lanes that have none of their own."""
+"""Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
 
 VIEW_POINTS = 401
-"""Of a span, at which the messenger's height is kept for pictures."""
+"""Number of points of a span at which the messenger's height is kept for pictures."""
 
 
 class FlexibleCatenary:
@@ -50,8 +50,8 @@ class FlexibleCatenary:
     ) -> None:
         """Build the line.
 
-        Raises InputError where the line can't hang so, grid and time step are not stable together, or the
-        line has not what a condition says is defective.
+        Raises InputError where the line cannot hang with its values, grid and time step are not stable
+        together, or a condition has a defect at a dropper, support or place that the line does not have.
         """
         designed, condition = data, of_wires(runs.conditions)
         data = with_tension_left(designed, condition)
@@ -66,7 +66,7 @@ class FlexibleCatenary:
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
-        self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; for pictures alone
+        self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self._alignment = alignment = data.alignment(spans)
@@ -87,7 +87,7 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        """Give the line its defects, or tables for them where each lane draws its own."""
+        """Write the defects into the line, or tables for them where each lane draws its own."""
         self._defective = {condition: DefectiveLine(data, spans, condition) for condition in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
@@ -114,7 +114,7 @@ class FlexibleCatenary:
         self._tension[row] = state.tension
 
     def _write_tension(self, row: int, drawn: DrawnLine) -> None:
-        """Give a lane the wires of its own tension, and the shape that they would be hung in."""
+        """Write the stencil and the static shape for a lane's own tensions."""
         assert self._designed is not None
         own = with_tension_left(self._designed, drawn.condition, drawn.tensions)
         shape = shape_left(self._designed, own)
@@ -125,7 +125,7 @@ class FlexibleCatenary:
         self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
-        """Put one lane's wires at rest, as ``drawn`` has them; a force (N) at the anchor moves no wire."""
+        """Put one lane's wires at rest, on the line ``drawn``; a force (N) at the anchor moves no wire."""
         if self._lines_differ:
             self._write_defects(lane, drawn)
         settle(self.line, self.wire, lane)
@@ -136,10 +136,10 @@ class FlexibleCatenary:
         return tension
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
-        """As far as the window about the train.
+        """Present shape of one lane's line within the window about the train.
 
-        Heights of the messenger are those of a line without defects of droppers and supports, as tensioned;
-        the contact wire's are what the pantograph feels.
+        The contact wire's height is the one that the pantograph feels. The messenger's is without the static
+        effect of defective droppers and supports.
         """
         line, wire = self.line, self.wire
         first_span = int(wire.first_span[lane])
@@ -168,7 +168,7 @@ class FlexibleCatenary:
         )
 
     def _rise(self, lane: int, x: Array) -> Array:
-        """What defects add to the contact wire's height at rest (m): ``rise_by_defects`` at many places."""
+        """Static change of the contact wire's height by defects (m), (n,), as ``rise_by_defects``."""
         line = self.line
         if not line.rise.shape[1]:
             return np.zeros(len(x))
@@ -183,10 +183,10 @@ def messenger_heights(shape: StaticShape) -> Array:
 
 
 def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
-    """A condition that has the wires of them all. Raises InputError where they differ."""
+    """A condition with the wire defects that all conditions share. Raises InputError where they differ."""
     if len({condition.of_wires for condition in conditions}) > 1:
         raise InputError(
             "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
-            "worn_stretches, lost_contact_tension or lost_messenger_tension; take one run for each."
+            "worn_stretches, lost_contact_tension or lost_messenger_tension; make a separate run for each."
         )
     return conditions[0]

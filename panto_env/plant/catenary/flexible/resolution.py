@@ -1,10 +1,10 @@
-"""Grid, time step and window of a flexible catenary: what is enough for the runs that it is built for.
+"""Grid, time step and window of a flexible catenary: fine enough for the runs that it is built for.
 
-A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: what happens at
-f Hz runs ahead as waves of (c - v) / f. A slow train passes a node every dx / v, and the force has a ripple
-of this period, which the filter of 20 Hz hides only while it is short. And droppers that go slack and taut
-again want a time step well below the milliseconds in which they do so: slow trains excite this most.
-docs/validation.md shows the figures at every speed, on every line, beside converged ones.
+A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: a force at f Hz
+sends waves of length (c - v) / f ahead. A slow train passes a node every dx / v, and the force has a ripple
+of this period, which the 20 Hz filter removes only while it is short. And droppers that go slack and taut
+again need a time step well below the milliseconds in which they do so: slow trains excite this most.
+docs/validation.md compares the figures at every speed, on every line, with converged ones.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ GRIDS = (
     (0.87, 0.15, 1e-3),
     (1.0, 0.125, 1e-3),
 )
-"""Up to which share of the wave speed a grid (m) is fine and a time step (s) is short enough."""
+"""Up to a share of the wave speed: a grid (m) that is fine enough, a time step (s) that is short enough."""
 NODES_HZ = 60.0
-"""How often a train must pass a node (Hz): well beyond the 20 Hz to which forces are filtered."""
+"""Minimum rate at which a train passes nodes (Hz): well above the 20 Hz to which forces are filtered."""
 SLOWEST_HZ = 22.0
-"""Below which (Hz) a ripple is in the filtered force."""
+"""Rate of nodes (Hz) below which their ripple is in the filtered force."""
 FINEST_GRID = 0.1
-"""Grid (m) that the slowest trains get."""
+"""Grid (m) for the slowest trains."""
 SLOW = (
     (from_kmh(50), 0.12, 0.125e-3),
     (from_kmh(100), 0.2, 0.25e-3),
@@ -44,36 +44,36 @@ SLOW = (
     (from_kmh(200), 0.3, 1e-3),
     (np.inf, np.inf, np.inf),
 )
-"""Below which speed (m/s) a grid (m) is fine and a time step (s) is short enough."""
+"""Below a speed (m/s): a grid (m) that is fine enough, a time step (s) that is short enough."""
 HARD_CONTACT_GRID = 0.15
-"""Grid (m) that a hard contact wants."""
+"""Grid (m) for a hard contact."""
 HARD_CONTACT_ERROR = 20
-"""Of the standard deviation (%) where a hard contact is lost and the grid is ``HARD_CONTACT_GRID``."""
+"""Error of the standard deviation (%) where a hard contact is lost, on ``HARD_CONTACT_GRID``."""
 HARD_CONTACT_MEAN_ERROR = 5
-"""Likewise of the mean (%), over a few spans: where contact is lost for half of the time, a run bounces in
-another order on another grid."""
+"""Error of the mean (%) there, over a few spans: where contact is lost for half of the time, the bounces come
+in a different order on a different grid."""
 DEEP = 0.5e-3
-"""Depth of wear waves (m) from which on the grid must carry what they make the wire do."""
+"""Depth of wear waves (m) above which the grid must resolve the waves that they excite."""
 NODES_PER_WAVE = 4
-"""Nodes in a wave that runs ahead of the train at the rate at which it passes deep waves. With two, what is
-lost of contact at every wave was wrong by up to 6 points of 29."""
+"""Nodes per wave that runs ahead of the train at the rate at which it passes deep wear waves. With two, the
+contact loss at every wear wave was wrong by up to 6 points of 29."""
 CLAMPS = ((0.3, np.inf, np.inf), (1.0, 0.15, 5e-4), (np.inf, 0.125, 2.5e-4))
-"""Up to which mass of a clamp (kg) a grid (m) is fine and a time step (s) is short enough: a grid hangs it on
-two nodes."""
+"""Up to a mass of a clamp (kg), which hangs on two nodes: a grid (m) that is fine enough, a time step (s)
+that is short enough."""
 HEAVY_CLAMP = 1.0
-"""Mass of a clamp on the contact wire (kg) that wants the finest grid where waves are deep."""
+"""Mass of a clamp on the contact wire (kg) above which deep wear waves need the finest grid."""
 FAST_GRIDS = ((0.6, 0.5), (0.72, 0.4), (1.0, 1 / 3))
-"""Up to which share of the wave speed a grid (m) is taken for ``accuracy="fast"``."""
+"""Up to a share of the wave speed: the grid (m) for ``accuracy="fast"``."""
 FAST_NODES_HZ = 40.0
-"""How often a train must pass a node then (Hz)."""
+"""Minimum rate at which a train passes nodes for ``accuracy="fast"`` (Hz)."""
 FAST_STEPS = (2.5e-3, 2e-3)
-"""Time steps (s) for it: the longer one where that is stable on the grid, else the shorter, on a coarser grid
-if need be."""
+"""Time steps (s) for ``accuracy="fast"``: the longer one where it is stable on the grid, else the shorter
+one, on a coarser grid if necessary."""
 FAST_SAMPLES_PER_WAVE = 3
 
 
 class Resolution(NamedTuple):
-    """How finely a line is computed."""
+    """Discretisation of a line."""
 
     spacing: float  # of the grid (m)
     time_step: float  # s
@@ -81,33 +81,32 @@ class Resolution(NamedTuple):
 
 
 def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Resolution:
-    """Grid, time step and window: those asked for, or those that the accuracy asks for, stable together.
+    """Grid, time step and window: the given ones, or those for the accuracy, stable together.
 
-    Warns where what is asked for is coarser than figures within 1 % want. Raises InputError where grid and
-    step are not stable together, or waves of the wire are too short for the step.
+    Warns where they are coarser than required for figures within 1 %. Raises InputError where grid and step
+    are not stable together, or waves of the wire are too short for the step.
     """
     fast = numerics.accuracy == "fast"
-    wanted = _fast(data, runs) if fast else fine_enough(data, runs)
-    found = _stable(data, numerics, runs, wanted)
+    required = _fast(data, runs) if fast else fine_enough(data, runs)
+    found = _stable(data, numerics, runs, required)
     runs.check_wave(found.time_step)
     if not fast:
-        _warn_if_coarse(data, found, wanted, runs)
+        _warn_if_coarse(data, found, required, runs)
     if runs.hard_contact:
         warnings.warn(
             f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
-            f"N s/m, bounces in waves shorter than a grid of {found.spacing:.3g} m carries: where contact is "
+            f"N s/m, excites waves too short for a grid of {found.spacing:.3g} m: where contact is "
             f"lost, the mean may be wrong by up to about {HARD_CONTACT_MEAN_ERROR} %, the standard deviation "
-            f"by {HARD_CONTACT_ERROR} %, and the contact-loss ratio be several times too large; see what "
-            "half the spacing gives.",
+            f"by {HARD_CONTACT_ERROR} %, and the contact-loss ratio may be several times too large; compare "
+            "with half the spacing.",
             AccuracyWarning,
             stacklevel=2,
         )
     passed = runs.speeds[0] / found.spacing
     if passed < SLOWEST_HZ:
         warnings.warn(
-            f"At {to_kmh(runs.speeds[0]):.3g} km/h a train passes the nodes of a grid of "
-            f"{found.spacing:.3g} m {passed:.2g} times a second: a ripple of about 1 N at this frequency, "
-            "which no line has, is in the contact force.",
+            f"At {to_kmh(runs.speeds[0]):.3g} km/h a train passes {passed:.2g} nodes per second of a grid of "
+            f"{found.spacing:.3g} m: the contact force has a numerical ripple of about 1 N at this rate.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -136,7 +135,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
-    """Grid (m) and time step (s) that the heaviest of the droppers' clamps wants."""
+    """Grid (m) and time step (s) that the heaviest of the droppers' clamps requires."""
     heaviest = max(data.droppers.contact_clamp_mass, data.droppers.messenger_clamp_mass)
     grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
     return grid, step
@@ -161,8 +160,8 @@ def _window(numerics: Numerics, runs: Runs, usual: int) -> int:
     whole = any(condition.hard_spots or condition.worn_stretches for condition in runs.conditions)
     if whole and numerics.window:
         raise InputError(
-            "A line with hard_spots or worn_stretches is computed whole, not in a window that travels along "
-            f"an even wire: leave out window={numerics.window}, or give 0."
+            "A line with hard_spots or worn_stretches is computed as a whole, not in a window that travels "
+            f"with the train: leave out window={numerics.window}, or set it to 0."
         )
     if numerics.window is not None:
         return numerics.window
@@ -170,22 +169,22 @@ def _window(numerics: Numerics, runs: Runs, usual: int) -> int:
 
 
 def _lightest(runs: Runs) -> float:
-    """Mass of the contact wire where it is most worn, as a share of that when new."""
+    """Mass of the most worn contact wire, as a share of a new one's."""
     worn = [share for condition in runs.conditions for *_, share in condition.worn_stretches]
     return 1 - max(worn, default=0.0)
 
 
-def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: Resolution) -> Resolution:
-    """Nodes evenly over a span, and a step of which the control interval is a whole number."""
+def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Resolution) -> Resolution:
+    """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.span_length, numerics.spacing
-    window, lightest = _window(numerics, runs, wanted.window), _lightest(runs)
-    finest = nodes_per_span(data, given or wanted.spacing)
+    window, lightest = _window(numerics, runs, required.window), _lightest(runs)
+    finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
-        step = runs.whole_part(wanted.time_step)
+        step = runs.whole_part(required.time_step)
         while not stable(data, span / finest, step, lightest):
             step = runs.whole_part(0.95 * step)
         return Resolution(span / finest, step, window)
-    step = numerics.time_step or runs.whole_part(wanted.time_step)
+    step = numerics.time_step or runs.whole_part(required.time_step)
     if given is not None and not stable(data, span / finest, step, lightest):
         raise InputError(
             f"A time step of {1e3 * step:g} ms is unstable on a grid of {span / finest:g} m "
@@ -197,9 +196,9 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, wanted: 
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
-def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, wanted: Resolution, runs: Runs) -> None:
-    """Say which error to expect: of third order in the grid and of second order in the step, from 1 % on."""
-    grid, step = found.spacing / wanted.spacing, found.time_step / wanted.time_step
+def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Resolution, runs: Runs) -> None:
+    """Warn of the expected error: third order in the grid and second order in the step, from 1 % on."""
+    grid, step = found.spacing / required.spacing, found.time_step / required.time_step
     if max(grid, step) < 1.01:
         return
     error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
@@ -207,7 +206,8 @@ def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, wanted: Resol
     speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
     warnings.warn(
         f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
-        f"line '{data.name}' needs at {speeds} ({wanted.spacing:.3g} m, {1e3 * wanted.time_step:.3g} ms): "
+        f"line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
+        f"{1e3 * required.time_step:.3g} ms): "
         f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
         AccuracyWarning,
         stacklevel=2,

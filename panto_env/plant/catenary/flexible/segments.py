@@ -1,7 +1,7 @@
-"""Where the nodes of a wire lie: row r holds node r of each of the window's segments.
+"""Layout of the nodes of a wire: row r holds node r of each of the window's segments.
 
-Nodes count from 0 at the window's start to rows * WIDTH at its end, both ends included; two further ones lie
-beyond its start and one beyond its end. A node's row counts from ``PAD`` at a segment's start.
+Nodes are numbered from 0 at the window's start to rows * WIDTH at its end, both included; two further ones
+lie before its start and one beyond its end. A node's row counts from ``PAD`` at a segment's start.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def row_of(node, segment, rows):
 
 @inlined
 def node_after(row, segment, count, all_rows):
-    """Row and segment of the node so many after one; not beyond the next segment."""
+    """Row and segment of the node ``count`` after one; not beyond the next segment."""
     row += count
     if row >= all_rows - PAD and segment < WIDTH - 1:
         row, segment = row - (all_rows - 2 * PAD), segment + 1
@@ -45,7 +45,7 @@ def node_after(row, segment, count, all_rows):
 
 @inlined
 def share_ends(x, rows):
-    """Bring the rows beyond the segments' ends up to date; at the window's own ends they stay as they are."""
+    """Update the rows beyond the segments' ends; at the window's own ends they stay as they are."""
     for k in range(PAD):
         store_row(x, k, shift_up(load_row(x, k + rows), load_row(x, k)))
         store_row(x, k + rows + PAD, shift_down(load_row(x, k + PAD), load_row(x, k + rows + PAD)))
@@ -53,9 +53,9 @@ def share_ends(x, rows):
 
 @inlined
 def read(x, row, rows):
-    """A row of nodes, of which those of the next segment follow a segment's last: up to three of them.
+    """A row of nodes; up to three rows beyond a segment's end, those of the next segment.
 
-    Beyond the window, where nothing hangs, is what its last row has.
+    Beyond the window, where nothing hangs, the values of its last row.
     """
     if row < rows + PAD:
         return load_row(x, row)
@@ -64,7 +64,7 @@ def read(x, row, rows):
 
 @inlined
 def move(u, d, row, rows, step):
-    """Add a step to a row of nodes, as ``read`` gives it; beyond the window's end nothing moves."""
+    """Add a step to a row of nodes, numbered as in ``read``; beyond the window's end nothing moves."""
     if row >= rows + PAD:
         row -= rows
         step = shift_up(step, 0.0 * step)
@@ -74,7 +74,7 @@ def move(u, d, row, rows, step):
 
 @inlined
 def shift_nodes(x, rows, count):
-    """Let the window travel by so many nodes: fresh wire, at rest, comes in ahead."""
+    """Move the window by ``count`` nodes; new wire, at rest, enters ahead."""
     segment = segment_of(count - PAD, rows)
     row = row_of(count - PAD, segment, rows)
     for to in range(WIDTH):
@@ -96,20 +96,20 @@ def places(nodes: Index, rows: int) -> tuple[Index, Index]:
 
 
 def window_nodes(rows: int) -> Index:
-    """All nodes that there is a place for, in their order."""
+    """Numbers of all nodes that are stored, in the order along the wire."""
     return np.arange(-PAD, rows * WIDTH + PAD)
 
 
 def lay_out(values: Array, rows: int, kind: type) -> Array:
-    """Values by node, (..., nodes) as of ``window_nodes``, by row and segment: (..., rows + 2 PAD, WIDTH).
+    """Arrange values by node, (..., nodes) as in ``window_nodes``, by row and segment.
 
-    Rows beyond the segments' ends hold the values of their neighbours.
+    Returns (..., rows + 2 PAD, WIDTH); rows beyond the segments' ends hold the values of their neighbours.
     """
     node = np.arange(-PAD, rows + PAD)[:, None] + rows * np.arange(WIDTH)
     return np.ascontiguousarray(values[..., node + PAD], dtype=kind)
 
 
 def along(array: Array) -> Array:
-    """The reverse: values by node of an array (..., rows + 2 PAD, WIDTH)."""
+    """Values by node of an array (..., rows + 2 PAD, WIDTH): the inverse of ``lay_out``."""
     rows = array.shape[-2] - 2 * PAD
     return array[(..., *places(window_nodes(rows), rows))]

@@ -1,10 +1,10 @@
-"""The step of a flexible catenary: the wires and all that hangs on them.
+"""The step of a flexible catenary: the wires and everything attached to them.
 
 The state of a wire is its displacement u and its increment over the last step d. A step is
 d <- b d + S (u + lag d), u <- u + d: the leapfrog, with the stencil S, damping b in proportion to the
-mass and lag in proportion to the stiffness. Forces at points then move both by mobility times force.
+mass and lag in proportion to the stiffness. Forces at points then change u and d by mobility times force.
 
-u is known at the middle of the pantograph's time steps: there the contact force, constant over such a step,
+u is known at the middle of the pantograph's time steps, where the contact force, constant over such a step,
 acts on it. So the wire's displacement at the ends of a step is the mean of u before and after, u - d / 2.
 """
 
@@ -49,7 +49,7 @@ def window_start(line, wire, lane):
 
 @inlined
 def follow(line, wire, lane, x):
-    """Let the window travel on by a span once the contact point at x (m) is past its middle."""
+    """Move the window by a span once the contact point at x (m) is past its middle."""
     ahead = span_index(line.alignment, x) - wire.first_span[lane]
     if 2 * ahead > line.window - 1 and wire.first_span[lane] + line.window < spans_of(line.alignment):
         wire.first_span[lane] += 1
@@ -147,7 +147,7 @@ def _ending(line, wire, lane):
         i, j = line.mast_row[s] & NOT_NEGATIVE, line.mast_segment[s] & NOT_NEGATIVE
         if u[CONTACT, i, j] > line.free_uplift:
             return ENDING.STOP if abs(d[CONTACT, i, j]) < line.largest_move else ENDING.DIVERGED
-    # The wires are nearest to each other at a dropper: between two, the contact wire hangs.
+    # The wires are nearest to each other at a dropper: between two, the contact wire sags.
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
         row, weight = line.link_row[s], line.link_weight[s]

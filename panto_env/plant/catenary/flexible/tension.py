@@ -1,7 +1,7 @@
 """A line under another tension than the one it was designed for.
 
-Its droppers and steady arms were cut and set for the design's tension. A line designed for the tension
-that is left would have other droppers: the real ones are too long or too short by the difference.
+Its droppers and steady arms were cut and set for the design's tension. A line designed for the remaining
+tension would have other droppers: the real ones are too long or too short by the difference.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from .static import StaticShape, solve
 
 
 class Misfit(NamedTuple):
-    """Differences of a line that has lost tension from one that was designed for the tension left."""
+    """Differences of a line that has lost tension from one that was designed for the remaining tension."""
 
-    too_long: Array  # (droppers of a span,): by which droppers are too long (m)
-    lighter: Array  # (droppers of a span,): by which each half of a dropper weighs less (N)
+    too_long: Array  # (droppers of a span,): excess length of the droppers (m)
+    lighter: Array  # (droppers of a span,): missing weight of each half of a dropper (N)
     lift: float  # additional upward force of each steady arm (N)
 
 
 def with_tension_left(
     data: FlexibleCatenaryData, condition: LineCondition, errors: tuple[float, float] = (1.0, 1.0)
 ) -> FlexibleCatenaryData:
-    """The line designed for the tension that a condition leaves; the same object where none is lost.
+    """A line designed for the tension that remains in a condition; the same object where none is lost.
 
-    errors: tension of the contact wire and of the messenger wire, as shares of that.
+    errors: tension of contact and messenger wire, relative to the remaining one.
     """
     contact, messenger = errors
     left = {
@@ -49,7 +49,7 @@ def with_tension_left(
 
 @remembered
 def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
-    """Static shape of a line designed for the tension left, with the mass and stiffness of real droppers."""
+    """Static shape of a line for its remaining tension, with the mass and stiffness of the real droppers."""
     was = solve(designed)
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 

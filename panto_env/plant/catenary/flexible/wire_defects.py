@@ -1,8 +1,8 @@
 """Defects of the contact wire at places of their own, in metres along the line: hard spots, worn stretches.
 
-A hard spot is a mass on the wire, a spring to the ground that is at rest where the wire rests, or both. Worn
-wire is lighter, and its running surface is higher by what has been worn off. It keeps tension and bending
-stiffness: bending counts for a tenth of a metre only.
+A hard spot is a mass on the wire, a spring to the ground that is unstressed at rest, or both. Worn wire is
+lighter, and its running surface is higher by the depth of wear. Its tension and bending stiffness are kept:
+bending acts over a tenth of a metre only.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from .schema import FlexibleCatenaryData
 RAMP = 1.0
 """Length over which the running surface rises at either end of a worn stretch (m), own choice."""
 COPPER = 8900.0
-"""Density of a contact wire (kg/m^3), by which its mass gives its diameter."""
+"""Density of a contact wire (kg/m^3), for its diameter from its mass."""
 NEAREST = 0.02
 """Minimum distance of two nodes (m): nearer places share one."""
 
 
 class Spot(NamedTuple):
-    """A hard spot."""
+    """A mass or a spring to the ground at one place of the contact wire."""
 
     position: float  # m
     mass: float  # kg
@@ -36,12 +36,12 @@ class Spot(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A worn stretch."""
+    """A part of the contact wire that is worn."""
 
     begin: float  # m
     end: float  # m
-    share: float  # of the section that is gone
-    depth: float  # of what is worn off (m)
+    share: float  # worn share of the cross-section
+    depth: float  # of wear (m)
 
 
 class WireDefects(NamedTuple):
@@ -59,20 +59,18 @@ class WireDefects(NamedTuple):
         return 1 - max((stretch.share for stretch in self.stretches), default=0.0)
 
     def breaks(self, span: float, own: Sequence[float], further: Sequence[float] = ()) -> Array:
-        """Where pieces of a span begin and end (m): at its own and further places, and where any span has a
-        defect.
-        """
-        wanted = [*further, *(spot.position for spot in self.spots)]
+        """Limits of the pieces of a span (m): its own and further places, and the defects of all spans."""
+        positions = [*further, *(spot.position for spot in self.spots)]
         for begin, end, _, _ in self.stretches:
-            wanted += [begin, begin + RAMP, end - RAMP, end]
+            positions += [begin, begin + RAMP, end - RAMP, end]
         breaks = list(own)
-        for place in wanted:
+        for place in positions:
             if min(abs(place % span - each) for each in breaks) > NEAREST:
                 breaks.append(place % span)
         return np.array(sorted(breaks))
 
     def mass_of_nodes(self, x: Array, spacing: float, wire: Wire) -> Array:
-        """Mass (kg) that the nodes of a grid at x (m), (n,), have more than those of a new wire.
+        """Additional mass (kg) of the nodes of a grid at x (m), (n,), relative to a new wire.
 
         A spot hangs on the two nearest nodes.
         """
@@ -85,21 +83,21 @@ class WireDefects(NamedTuple):
         return mass
 
     def springs_of_nodes(self, x: Array, spacing: float) -> Array:
-        """Stiffness (N/m), (n,), by which spots hold the nodes of a grid at x (m)."""
+        """Stiffness (N/m), (n,), with which spots hold the nodes of a grid at x (m)."""
         stiffness = np.zeros(len(x))
         for spot in self.spots:
             stiffness += spot.stiffness * _shares(x, spacing, spot.position)
         return stiffness
 
     def lightening(self, x: Array) -> Array:
-        """Share of the wire's weight that is gone at places x (m), (n,)."""
+        """Missing share of the wire's weight at places x (m), (n,)."""
         gone = np.zeros(len(x))
         for stretch in self.stretches:
             gone += stretch.share * ((x > stretch.begin) & (x < stretch.end))
         return gone
 
     def surface(self, x: Array) -> Array:
-        """How much higher the running surface is at places x (m), (n,), where the wire's axis is (m)."""
+        """Rise of the running surface over the axis of the wire by wear (m), (n,), at places x (m)."""
         height = np.zeros(len(x))
         for begin, end, _, depth in self.stretches:
             height += np.interp(x, [begin, begin + RAMP, end - RAMP, end], [0.0, depth, depth, 0.0])
@@ -129,8 +127,8 @@ def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> 
         begin = position(span, offset)
         if stretches and begin < stretches[-1].end:
             raise InputError(
-                f"Worn stretches must not overlap, as those do that begin at {stretches[-1].begin:g} and "
-                f"{begin:g} m along the line."
+                "Worn stretches must not overlap: those that begin at "
+                f"{stretches[-1].begin:g} and {begin:g} m along the line do."
             )
         stretches.append(Stretch(begin, begin + length, share, worn_depth(data.contact_wire, share)))
     whole = spans * data.span_length
@@ -143,7 +141,7 @@ def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> 
 
 
 def worn_depth(wire: Wire, share: float) -> float:
-    """Height (m) of the segment of a round wire that is a share of its section."""
+    """Height (m) of the circular segment that is a given share of the section of a round wire."""
     angle = np.linspace(0.0, 2 * math.pi, 20_001)
     radius = math.sqrt(wire.mass / COPPER / math.pi)
     heights = radius * (1 - np.cos(angle / 2))
@@ -151,5 +149,5 @@ def worn_depth(wire: Wire, share: float) -> float:
 
 
 def _shares(x: Array, spacing: float, position: float) -> Array:
-    """Shares, (n,), of a load at a position (m) that act on nodes at x (m): on the two nearest ones."""
+    """Shares, (n,), of a load at a position (m) on nodes at x (m): it acts on the two nearest ones."""
     return np.asarray(np.maximum(1 - np.abs(x - position) / spacing, 0.0))

@@ -38,7 +38,7 @@ def rise_by_defects(pieces, breaks, decay, x):
 
 @inlined
 def locate(x, spacing, rows):
-    """Row and segment of the first of the four nodes around x (m from the window's start); their weights."""
+    """Row and segment of the first of four nodes around x (m from the window's start), and their weights."""
     ratio = x / spacing
     left = min(max(math.floor(ratio), 0), rows * WIDTH - 1)
     segment = segment_of(left - 1, rows)
@@ -47,7 +47,7 @@ def locate(x, spacing, rows):
 
 @inlined
 def deflection(u, d, row, segment, weight, ago):
-    """Displacement (m) of a wire at a place among four nodes, by a share of a step ago."""
+    """Displacement (m) of a wire at a place among four nodes; ago: how long ago (steps, 0 to 1)."""
     total = 0.0
     for k in range(4):
         i, j = node_after(row, segment, k, u.shape[0])
@@ -57,7 +57,7 @@ def deflection(u, d, row, segment, weight, ago):
 
 @inlined
 def move_place(u, d, mobility, row, segment, weight, force):
-    """Move a wire by a force (N), spread over four nodes."""
+    """Apply a force (N) to a wire at a place among four nodes."""
     for k in range(4):
         i, j = node_after(row, segment, k, u.shape[0])
         step = mobility[i, j] * weight[k] * force
@@ -83,7 +83,7 @@ def leapfrog(u, d, inertia, stencil):
     that only nearly add up to 0 would be a spring, in single precision.
     """
     near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
-    # The least of loads on every node keeps wires at rest away from subnormal numbers, which are slow.
+    # A tiny load on every node keeps wires at rest away from subnormal numbers, which are slow.
     quiet, middle = stencil[4], near + far + far
     before = load_row(u, 1) + lag * load_row(d, 1)
     here = load_row(u, 2) + lag * load_row(d, 2)
@@ -106,7 +106,7 @@ def leapfrog(u, d, inertia, stencil):
 
 @inlined
 def keep_spring_past(wire, row, d, past):
-    """Keep what the leapfrog overwrites: increments where springs hold the wires."""
+    """Save the increments of nodes with springs, which the leapfrog overwrites."""
     for s in range(row.size):
         store_row(past, s, load_row(d[wire[s] & NOT_NEGATIVE], row[s]))
 
@@ -130,7 +130,7 @@ def apply_springs(wire, row, pull, u, d, past):
 
 @inlined
 def anchor(x, row, segment, inward, beyond):
-    """No displacement, no moment (odd continuation by so many nodes) at one end of a wire."""
+    """Anchor one end of a wire: no displacement and no moment, by odd continuation over ``beyond`` nodes."""
     x[row, segment] = 0.0
     for k in range(1, beyond + 1):
         x[row - k * inward, segment] = -x[row + k * inward, segment]

@@ -17,6 +17,6 @@ class PeriodicLine(NamedTuple):
 
 
 class PeriodicWire(NamedTuple):
-    """A massless wire has no state; Numba wants a field."""
+    """A massless wire has no state, but Numba requires a field."""
 
     nothing: Array

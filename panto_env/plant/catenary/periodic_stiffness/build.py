@@ -16,11 +16,11 @@ from .arrays import PeriodicLine, PeriodicWire
 from .schema import PeriodicStiffnessData
 
 TIME_STEP = 5e-3
-"""Unless told otherwise (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
+"""Default time step (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
 
 
 class PeriodicStiffness:
-    """A massless spring, which any grid and any time step can carry."""
+    """A massless spring with a stiffness that varies along the span; it needs no grid."""
 
     massless: bool = True
     contact_gain: float = 0.0
@@ -38,7 +38,7 @@ class PeriodicStiffness:
         numerics: Numerics,
         runs: Runs,
     ) -> None:
-        """Build the line. Raises InputError where it is said to have defects."""
+        """Build the line. Raises InputError for conditions with defects."""
         refuse_defects(data, runs.conditions)
         check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
@@ -53,12 +53,12 @@ class PeriodicStiffness:
         self.start_point = StartPoint(0.0, 0.0, 1.0 / stiffness)
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
-        """Nothing: the wire has no state."""
+        """Do nothing: the wire has no state."""
 
     def rest_tension(self, lane: int) -> Array:
         """No tension: there are no droppers."""
         return np.zeros(0)
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
-        """Nothing: a spring has no shape along the line."""
+        """An empty view: a spring has no shape along the line."""
         return NOTHING

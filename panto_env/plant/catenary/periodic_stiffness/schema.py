@@ -1,4 +1,4 @@
-"""What a line of periodic stiffness is made of."""
+"""Data of a line of periodic stiffness."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ class PeriodicStiffnessData(CatenaryData):
     kind: Literal["periodic_stiffness"] = "periodic_stiffness"
     mean_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(description="mean stiffness k_m (N/m)")
     stiffness_variation: Annotated[float, Between(0, 0.99)] = Field(
-        description="share epsilon by which the stiffness varies (-)"
+        description="relative amplitude epsilon of the stiffness (-)"
     )

@@ -1,4 +1,4 @@
-"""The step of a line of periodic stiffness: there is but a spring to look at."""
+"""The step of a line of periodic stiffness: nothing moves, the contact feels a spring."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Hardware-in-the-loop rig (paper 2, section 2): a pantograph on a cylinder that follows a computed line.
 
 To the pantograph the cylinder is a wire. Its load cell samples the force; a line of any other kind that has
-mass is computed under that force, from sample to sample; and the cylinder is told to be where the line's
-contact point is, in time for its own lag and the delays about it. All else, from the contact to a policy, is
-as under a line.
+mass is computed under that force, from sample to sample; and the cylinder is commanded to the height of the
+line's contact point, early enough to compensate its own lag and the delays. Everything else, from the
+contact to a policy, is as on a line.
 """
 
 from ..protocol import CatenaryKind

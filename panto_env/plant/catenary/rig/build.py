@@ -1,4 +1,4 @@
-"""A rig for a number of lanes: the line that is computed, and the constants of all that stands about it."""
+"""A rig for a number of lanes: the computed line, and the constants of cylinder, load cell and computer."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from .schema import Computer, RigData
 
 LINES = {"flexible": FLEXIBLE, "three_span": THREE_SPAN}
 STEPS = 4
-"""Time steps between two samples at least, which the load cell's filter and the cylinder want."""
+"""Minimum number of time steps between two samples, for the load cell's filter and the cylinder."""
 NOISE_SAMPLES = 1 << 16
 ORDER = 3
-"""Of the polynomial of "prediction": the one that Horiuchi et al. take."""
+"""Order of the polynomial of "prediction", as in Horiuchi et al."""
 FIT_FREQUENCY, FIT_MEMORY = 25.0, 1.0
-"""Of "adaptive": corner (Hz) of the low-pass of both signals, and time (s) after which a sample counts
-exp(-1)."""
+"""For "adaptive": corner (Hz) of the low-pass of both signals, and time (s) after which a sample has the
+weight exp(-1)."""
 FIT_AMPLITUDE, FIT_OMEGA = 5e-3, 2 * np.pi * 10
-"""Usual motion of the contact point, to scale its terms by (m, rad/s)."""
+"""Usual amplitude and angular frequency of the contact point, which scale its terms (m, rad/s)."""
 FIT_DOUBT, FIT_ERROR = 0.1, 2e-5
-"""What is not known of a coefficient at the start, as its share, and rms error of a fitted command (m)."""
+"""Initial relative uncertainty of a coefficient, and rms error of a fitted command (m)."""
 FIT_BOUNDS = ((0.9, 0.4, 0.2), (1.1, 2.5, 5.0))
-"""Least and largest coefficients, as shares of those that are assumed."""
+"""Minimum and maximum coefficients, relative to the assumed ones."""
 
 
 def check(data: RigData) -> None:
-    """Raise InputError where the line that is computed cannot exist."""
+    """Raise InputError where the computed line cannot exist."""
     LINES[data.line.kind].check(data.line)
 
 
@@ -46,7 +46,7 @@ class Rig:
     """A pantograph on a cylinder that follows a line's computed contact point."""
 
     massless = False
-    contact_gain = 0.0  # the cylinder does not give way within a step
+    contact_gain = 0.0  # the cylinder does not respond to the force within a step
 
     def __init__(
         self,
@@ -58,15 +58,15 @@ class Rig:
         numerics: Numerics,
         runs: Runs,
     ) -> None:
-        """Build the line that is computed, and what stands about it.
+        """Build the computed line, and the rig around it.
 
-        Raises InputError where the line cannot be computed so, or is to be uneven: irregularity is no part
-        of the motion that the cylinder follows.
+        Raises InputError where the line cannot be computed with these numerics, and for conditions with
+        irregularity, which the cylinder does not follow.
         """
         if any(condition.waves for condition in runs.conditions):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
-                "wire; take a line_condition without irregularity and wear, such as 'new'."
+                "wire; use a line_condition without irregularity and wear, such as 'new'."
             )
         computer = data.computer
         interval = runs.whole_part(computer.interval)
@@ -85,7 +85,7 @@ class Rig:
         self.time_step = model.time_step
         self.grid: Mapping[str, float] = model.grid
         self.wave_speed, self.supports, self.droppers = model.wave_speed, model.supports, model.droppers
-        ahead = runs.speeds[1] * (computer.interval + self.time_step)  # the computer is so far ahead
+        ahead = runs.speeds[1] * (computer.interval + self.time_step)  # the computer's lead
         self.length = model.length - ahead
         self.usual_end = min(model.usual_end, self.length)
         self.line = constants(data, model.line, self.time_step)
@@ -114,12 +114,12 @@ class Rig:
         return self.model.rest_tension(lane)
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
-        """The line that is computed."""
+        """Present shape of the computed line."""
         return self.model.view(lane, begin, end)
 
 
 def constants(data: RigData, line: Any, time_step: float) -> RigLine:
-    """Constants of a rig about a computed line, whose time step (s) is the rig's."""
+    """Constants of a rig with a computed line; time_step: of both (s)."""
     cylinder, cell, computer = data.cylinder, data.load_cell, data.computer
     omega = 2 * np.pi * cylinder.natural_frequency
     corner, ratio = 2 * np.pi * cell.filter_frequency, math.sqrt(0.5)
@@ -157,34 +157,34 @@ def constants(data: RigData, line: Any, time_step: float) -> RigLine:
 
 
 def second_order(omega: float, ratio: float, time_step: float) -> Array:
-    """Exact step, (2, 3), of y'' + 2 ratio omega y' + omega^2 y = omega^2 u for an input u that is held."""
+    """Exact step, (2, 3), of y'' + 2 ratio omega y' + omega^2 y = omega^2 u for a constant input u."""
     system = np.zeros((3, 3))
     system[0, 1], system[1] = 1.0, (-(omega**2), -2 * ratio * omega, omega**2)
     return exponential(system * time_step)[:2].copy()
 
 
 def other_delays(computer: Computer) -> float:
-    """Delays (s) between command and cylinder besides its own lag: the computer's, and the held output's."""
+    """Delay (s) between command and cylinder without its own lag: the computer's, and the held output's."""
     delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
     return delay + computer.interval / 2
 
 
 def force_age(data: RigData) -> float:
-    """How late (s) a sample of the force is: by its filter, and by half an interval, as it is held."""
+    """Delay of a sample of the force (s): by its filter, and by half an interval, since it is held."""
     return math.sqrt(2) / (2 * np.pi * data.load_cell.filter_frequency) + data.computer.interval / 2
 
 
 def outer_lead(data: RigData) -> float:
-    """Lead (s) that is wanted besides that of the cylinder: the line is computed an interval ahead, but under
-    a force that is late.
+    """Required lead (s) without the cylinder's: the line is computed an interval ahead, but under a force
+    that is late.
     """
     return force_age(data) - data.computer.interval
 
 
 def assumed(data: RigData) -> Array:
-    """Coefficients, (terms,), of height, velocity (s) and acceleration (s^2) that lead to a command.
+    """Coefficients, (terms,), by which a command is formed from height, velocity (s), acceleration (s^2).
 
-    The inverse of the assumed transfer function and of the delay before it, up to the square of frequency.
+    The inverse of the assumed transfer function and of its delay, to second order in frequency.
     """
     computer, cylinder = data.computer, data.cylinder
     omega = 2 * np.pi * (computer.assumed_frequency or cylinder.natural_frequency)
@@ -209,10 +209,10 @@ def bank(data: RigData) -> Array:
         return np.array([[1, 0, 0, 0], np.array([3, -4, 1, 0]) / (2 * h), np.array([2, -5, 4, -1]) / h**2])
     weights = np.zeros((TERMS, 1))
     if computer.compensation == "prediction":
-        wanted = assumed(data)[1] + outer_lead(data)
-        apart = max(1, round(wanted / h))
+        total_lead = assumed(data)[1] + outer_lead(data)
+        apart = max(1, round(total_lead / h))
         weights = np.zeros((TERMS, ORDER * apart + 1))
-        nodes, at = -np.arange(ORDER + 1.0), wanted / (apart * h)
+        nodes, at = -np.arange(ORDER + 1.0), total_lead / (apart * h)
         for k in range(ORDER + 1):
             others = np.delete(nodes, k)
             weights[0, k * apart] = np.prod((at - others) / (nodes[k] - others))
@@ -222,7 +222,7 @@ def bank(data: RigData) -> Array:
 
 
 def at_rest(data: RigData, wire: Any, lanes: int, time_step: float) -> RigWire:
-    """What moves, in all lanes, at rest."""
+    """State of the rig in all lanes, at rest."""
     whole = math.floor(data.computer.delay / time_step + 1e-9)
     past = bank(data).shape[1]
     return RigWire(

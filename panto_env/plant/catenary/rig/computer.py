@@ -1,4 +1,4 @@
-"""What the rig's computer does with a sample of the force: the line's motion, and the command for it."""
+"""The rig's computer: from a sample of the force to the line's motion and the cylinder's command."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from .arrays import FIT_ROW, RIG_ROW, TERMS
 
 @inlined
 def advance_line(rig, wire, lane, contact, force):
-    """Move the computed line over an interval under a force (N) that is held, where that was measured.
+    """Advance the computed line by an interval under a constant force (N), at the place of measurement.
 
-    Returns the height (m) of the contact point at its end.
+    Returns the height (m) of the contact point at the interval's end.
     """
     own = wire.table[lane]
     height = 0.0
@@ -35,7 +35,7 @@ def advance_line(rig, wire, lane, contact, force):
 
 @inlined
 def term_of(bank, past, k):
-    """Term k of a row of past heights."""
+    """Term k (height, velocity or acceleration) from past heights."""
     total = 0.0
     for j in range(past.size):
         total += bank[k, j] * past[j]
@@ -44,7 +44,7 @@ def term_of(bank, past, k):
 
 @inlined
 def keep(past, value):
-    """Take a value in as the last one."""
+    """Insert a value as the latest of the past ones."""
     for k in range(past.size - 1):
         place = past.size - 2 - k
         past[place + 1] = past[place]
@@ -53,13 +53,13 @@ def keep(past, value):
 
 @inlined
 def moved(matrix, k, value, rate, force):
-    """Row k of a matrix (2, 3) times value, rate and input."""
+    """Row k of a (2, 3) matrix times value, rate and input."""
     return matrix[k, 0] * value + matrix[k, 1] * rate + matrix[k, 2] * force
 
 
 @inlined
 def low_pass(rig, fit, value_before, rate_row, value):
-    """Value and rate behind the filter of the fit; the rate stands in its row."""
+    """Value behind the low-pass of the fit; its rate is kept in ``rate_row``."""
     rate = fit[rate_row]
     fit[rate_row] = moved(rig.fit_filter, 1, value_before, rate, value)
     return moved(rig.fit_filter, 0, value_before, rate, value)
@@ -67,10 +67,10 @@ def low_pass(rig, fit, value_before, rate_row, value):
 
 @inlined
 def fit_cylinder(rig, wire, lane, measured):
-    """Fit the cylinder's coefficients to its measured displacement (m) and the command that led to it.
+    """Fit the cylinder's coefficients to its measured displacement (m) and the command before it.
 
-    Recursive least squares with a fading memory. Both signals go through the same low-pass, so that the
-    differences are not those of noise.
+    Recursive least squares with exponential forgetting. Both signals go through the same low-pass, so that
+    noise does not dominate their differences.
     """
     fit, past, coefficients = wire.fit[lane], wire.fit_past[lane], wire.coefficients[lane]
     covariance, term, gain = wire.covariance[lane], wire.scratch[lane, 0], wire.scratch[lane, 1]
@@ -97,7 +97,7 @@ def fit_cylinder(rig, wire, lane, measured):
 
 @inlined
 def command_for(rig, wire, lane, target):
-    """The command (m) by which the cylinder is at the contact point's height (m) in time."""
+    """Command (m) that brings the cylinder to the contact point's height (m) in time."""
     past, coefficients = wire.past[lane], wire.coefficients[lane]
     keep(past, target)
     command = 0.0
@@ -111,7 +111,7 @@ def command_for(rig, wire, lane, target):
 
 @inlined
 def take_sample(rig, wire, lane, contact, force, measured):
-    """From a sample of the force (N) and the cylinder's measured displacement (m) to the next command (m)."""
+    """Compute the next command (m) from samples of the force (N) and of the cylinder's displacement (m)."""
     own = wire.table[lane]
     if rig.fit_memory > 0.0:
         fit_cylinder(rig, wire, lane, measured)
@@ -124,7 +124,7 @@ def take_sample(rig, wire, lane, contact, force, measured):
 
 @kernel
 def sample(packed, force, measured):
-    """``take_sample`` by itself, of lane 0, for a computer that drives a real rig. packed: rig and wire."""
+    """``take_sample`` for lane 0, for a computer that drives a real rig; packed: rig and wire."""
     rig, wire = open_packed(packed)
     take_sample(rig, wire, 0, 0, force, measured)
     own = wire.table[0]

@@ -1,8 +1,8 @@
 """The step of a rig: the cylinder follows commands, the load cell reads, and at each sample the line moves.
 
-The cylinder does not yield to the force by itself, but through the oil; so the contact sees a height that is
-known beforehand and a massless spring. Up is positive; the load cell reads the force with which the
-collectors press up, less what the mass between takes to be accelerated.
+The cylinder yields to the force only through the oil, so the contact sees a height that is known beforehand
+and a massless spring. Up is positive; the load cell reads the collectors' upward force minus the inertial
+force of the mass between.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .computer import moved, take_sample
 
 @inlined
 def arrived(line, wire, lane):
-    """The command (m) that holds in this step: the mean over it."""
+    """Command (m) that arrives at the cylinder in this step, its mean."""
     return (1.0 - line.late_share) * wire.late[lane, 1] + line.late_share * wire.late[lane, 0]
 
 
@@ -75,7 +75,7 @@ def _apply(line, wire, lane, contact, x, force):
 
 @inlined
 def rounded(value, unit):
-    """What a converter makes of a value."""
+    """A value at the resolution of a converter."""
     return unit * int(value / unit + (0.5 if value > 0.0 else -0.5))
 
 

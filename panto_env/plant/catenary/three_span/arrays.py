@@ -1,4 +1,4 @@
-"""The arrays of a three-span catenary: its constants, and what moves in all lanes."""
+"""Arrays of a three-span catenary: its constants and the state of all lanes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class ThreeSpanLine(NamedTuple):
 
 
 class ThreeSpanWire(NamedTuple):
-    """What moves, in all lanes."""
+    """State of the wire in all lanes."""
 
     modal: Array  # (lanes, 2, modes): coordinates and their rates
-    contact_shape: Array  # (lanes, collectors, modes): mode shapes where the contact points are
+    contact_shape: Array  # (lanes, collectors, modes): mode shapes at the contact points
     scratch: Array  # (lanes, 2, modes)
     central_span: Index  # (lanes,): number of the central span along the line

@@ -1,4 +1,4 @@
-"""A three-span catenary for a number of lanes: modes, their exact step, and what moves."""
+"""A three-span catenary for a number of lanes: modes, their exact step, and its state."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .schema import ThreeSpanData
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 VIEW_POINTS = 361
-"""Of the three spans, in a picture."""
+"""Number of points of the three spans in a picture."""
 TIME_STEP = 2.5e-3
-"""Unless told otherwise (s): tests/plant/test_three_span.py shows how figures converge."""
+"""Default time step (s): tests/plant/test_three_span.py shows how figures converge."""
 
 
 class ThreeSpan:
@@ -43,7 +43,7 @@ class ThreeSpan:
     ) -> None:
         """Build the line; there is no grid, and modes propagate exactly over any time step.
 
-        Raises InputError where it is said to have defects.
+        Raises InputError for conditions with defects.
         """
         refuse_defects(data, runs.conditions)
         self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
@@ -75,13 +75,13 @@ class ThreeSpan:
 
     @cached_property
     def _view_shapes(self) -> Array:
-        """Mode shapes of a picture, (points, modes)."""
+        """Mode shapes at the points of a picture, (points, modes)."""
         places = np.linspace(0.0, 3 * self._data.span_length, VIEW_POINTS)
         with one_thread():
             return mode_shapes(self._data, self._vectors, places)
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
-        """As far as the three spans about the train; the wire's own sag is no part of this model."""
+        """Present shape of the three spans about the train; the model has no sag of the wire."""
         span, before = self.line.span, float(self.wire.central_span[lane] - 1)
         x = before * span + np.linspace(0.0, 3 * span, VIEW_POINTS)
         inside = (x >= begin) & (x <= end)
@@ -94,7 +94,7 @@ class ThreeSpan:
 def modes(data: ThreeSpanData) -> tuple[Array, Array]:
     """Angular frequencies (rad/s), (modes,), and the modes in the basis of sines, (sines, modes).
 
-    The basis sin(k pi xi / 3L), scaled to unit mass, is twice as large as the modes kept.
+    The basis sin(k pi xi / 3L), scaled to unit mass, has twice as many functions as modes are kept.
     """
     length = 3 * data.span_length
     k = np.arange(1, 2 * data.modes + 1)
@@ -105,7 +105,7 @@ def modes(data: ThreeSpanData) -> tuple[Array, Array]:
     for position in (data.span_length, 2 * data.span_length):
         sines = scale * np.sin(wavenumber * position)
         stiffness += data.suspension_stiffness * np.outer(sines, sines)
-    with one_thread():  # several may turn the sign of a mode
+    with one_thread():  # several threads may change the sign of a mode
         squared, vectors = np.linalg.eigh(stiffness)
     return np.sqrt(squared[: data.modes]), vectors[:, : data.modes]
 
@@ -146,7 +146,7 @@ def _constants(data: ThreeSpanData, frequency: Array, vectors: Array, time_step:
 
 
 def _propagation(frequency: Array, ratio: float, time_step: float) -> tuple[Array, Array]:
-    """Exact step of q'' + 2 ratio omega q' + omega^2 q = f, f held: (4, modes) and (2, modes)."""
+    """Exact step of q'' + 2 ratio omega q' + omega^2 q = f with constant f: (4, modes) and (2, modes)."""
     damped = frequency * np.sqrt(1 - ratio**2)
     decay = np.exp(-ratio * frequency * time_step)
     cosine, sine = decay * np.cos(damped * time_step), decay * np.sin(damped * time_step)
@@ -158,10 +158,10 @@ def _propagation(frequency: Array, ratio: float, time_step: float) -> tuple[Arra
 
 
 def contact_gain(line: ThreeSpanLine) -> float:
-    """Inverse of the contact stiffness (m/N) at which a contact that reads the wire at mid-step grows.
+    """Inverse of the stiffness (m/N) from which a contact law that reads the wire at mid-step is unstable.
 
-    It grows first in a motion that changes its sign in each step, z = -1: there a mode's height at mid-step
-    follows from a force as half_step (z - A)^-1 impulse, with A the mode's exact step.
+    The first unstable motion changes its sign in each step, z = -1: there a force gives a mode the height
+    half_step (z - A)^-1 impulse at mid-step, with A the mode's exact step.
     """
     steps = np.moveaxis(line.propagate.reshape(2, 2, -1), -1, 0)
     moved = np.linalg.solve(-np.eye(2) - steps, line.impulse.T[:, :, None])[:, :, 0]

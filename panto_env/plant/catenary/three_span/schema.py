@@ -1,4 +1,4 @@
-"""What a three-span catenary is made of."""
+"""Data of a three-span catenary."""
 
 from __future__ import annotations
 
@@ -19,6 +19,4 @@ class ThreeSpanData(CatenaryData):
         description="spring K_S at each support (N/m)"
     )
     modes: Annotated[int, Between(3, 400)] = Field(description="number of vibration modes kept")
-    damping_ratio: Annotated[float, Between(0, 0.99)] = Field(
-        description="share of critical damping of each mode (-)"
-    )
+    damping_ratio: Annotated[float, Between(0, 0.99)] = Field(description="damping ratio of each mode (-)")

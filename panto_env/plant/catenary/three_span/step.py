@@ -18,7 +18,7 @@ from .arrays import MARGIN, ThreeSpanLine
 
 @inlined
 def read_shape(line, wire, lane, x, shape):
-    """Mode shapes at x (m along the line), seen from the central span, into ``shape``, (modes,)."""
+    """Write the mode shapes at x (m along the line), about the central span, to ``shape``, (modes,)."""
     local = x - wire.central_span[lane] * line.span + MARGIN
     ratio = min(max(local / line.spacing, 0.0), line.shape.shape[0] - 1.001)
     k = int(ratio)
@@ -46,7 +46,7 @@ def deflection(shape, q):
 
 @inlined
 def project(line, wire, lane):
-    """Take over the wire's shape and rates into the three spans about the next one."""
+    """Project the wire's shape and rates onto the three spans about the next one."""
     modal, before = wire.modal[lane], wire.scratch[lane]
     size = modal.shape[1]
     for k in range(2):
