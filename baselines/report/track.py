@@ -107,17 +107,17 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     """Heat map of changes of σ; the strongest colour is the maximum change, up to ``FAR_OFF``."""
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
-    largest = min(max([1.0, *sizes]), FAR_OFF)
+    maximum = min(max([1.0, *sizes]), FAR_OFF)
     return {
-        policy: [_shade(cells.get((policy, place)), largest) for place in result.places]
+        policy: [_shade(cells.get((policy, place)), maximum) for place in result.places]
         for policy in result.policies
     }
 
 
-def _shade(cell: StoredCell | None, largest: float) -> Shade | None:
+def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
     if cell is None:
         return None
-    strength = cell.change / largest if isfinite(cell.change) else 0.0
+    strength = cell.change / maximum if isfinite(cell.change) else 0.0
     return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
 
 
