@@ -154,7 +154,7 @@ def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path
     second = policy_pass("passive", first.settings, first.seed)
     check_together([first, second])
     assert first.title == "pd (run.parquet)"
-    change = figures_in_words(second, first)["σ beside pd (run.parquet)"]
+    change = figures_in_words(second, first)["σ relative to pd (run.parquet)"]
     ratio = second.run.summary().std / first.run.summary().std
     assert float(change.removesuffix(" %")) == pytest.approx(100 * (ratio - 1), abs=0.06)
     told = film(kept[2], "passive", "--output", output, "--size", 320, 320)
