@@ -71,9 +71,7 @@ def film(
         given = [f"--{RENAMED.get(name, name).replace('_', '-')}" for name in settings]
         given += [] if seed is None else ["--seed"]
         if given:
-            raise InputError(
-                f"All settings of the film are those of {first.file}; leave out {', '.join(given)}."
-            )
+            raise InputError(f"The film takes all settings from {first.file}; leave out {', '.join(given)}.")
         settings, seed = first.settings, first.seed
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal

@@ -190,7 +190,7 @@ def test_what_cannot_stand_above_each_other_is_refused(kept, tmp_path):
     )
     assert "the same control_interval (s)" in film(run, finer, "--output", output)
     told = film(run, "--output", output, "--speed", 250, "--line-spans", 30, "--seed", 1)
-    assert f"are those of {run}; leave out --speed, --line-spans, --seed" in told
+    assert f"takes all settings from {run}; leave out --speed, --line-spans, --seed" in told
     assert "nowhere.parquet does not exist" in film(tmp_path / "nowhere.parquet", "--output", output)
     assert not output.exists()
 
