@@ -1,4 +1,4 @@
-"""What a policy is, how it is found by name, and how one is run whose code may be anyone's."""
+"""Policies: their interface, how they are found by name, and how errors in their code are reported."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .control.observation import OBSERVATION_SETTINGS
 
 
 class Policy(Protocol):
-    """Anything with these two methods. It sees observations, never the environment.
+    """Any object with these two methods. It gets observations, never the environment.
 
-    It may have attributes ``observation``, ``harmonics``, ``history`` and ``normalise``: what it sees, unless
-    a run is told another.
+    It may have attributes ``observation``, ``harmonics``, ``history`` and ``normalise``: settings of its
+    observation, unless a run is given others.
     """
 
     def reset(self, context: Context) -> None:
@@ -39,12 +39,12 @@ class Policy(Protocol):
 
 
 def find_policy(source: Any) -> Policy:
-    """Policy from an object, a name, a model file, or a class in a file of yours.
+    """Policy from an object, a name, a model file, or a class in a Python file.
 
     A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5". A file is
-    run once in a process, and anew when it has changed.
+    run once in a process, and again after it has changed.
 
-    Raises InputError where there is none such.
+    Raises InputError where the policy does not exist.
     """
     if not isinstance(source, str | Path):
         if hasattr(source, "reset") and hasattr(source, "act"):
@@ -72,15 +72,15 @@ def find_policy(source: Any) -> Policy:
 
 
 def wishes(policy: Any) -> dict[str, Any]:
-    """Settings that a policy asks for, by name, where a run is not told others."""
-    asked = {name: getattr(policy, name, None) for name in OBSERVATION_SETTINGS}
-    return {name: value for name, value in asked.items() if value is not None}
+    """Settings of the observation that a policy requests by its attributes, by name."""
+    requested = {name: getattr(policy, name, None) for name in OBSERVATION_SETTINGS}
+    return {name: value for name, value in requested.items() if value is not None}
 
 
 def with_parameters(source: str, parameters: str) -> str:
-    """A policy's name with more parameters, "key=value,...", behind those that it may have."""
+    """A policy's name with parameters, "key=value,...", added to those that it may have."""
     name = source.partition(":")[0]
-    colons = 2 if name.endswith(".py") else 1  # of which the last is before the parameters
+    colons = 2 if name.endswith(".py") else 1  # the last one is before the parameters
     return f"{source}{',' if source.count(':') >= colons else ':'}{parameters}"
 
 
@@ -90,13 +90,13 @@ def policy_names() -> list[str]:
 
 
 def maker_of(name: str) -> Callable[..., Policy]:
-    """What makes the installed policy of this name, from its parameters."""
+    """The class or function that makes an installed policy from its parameters."""
     maker: Callable[..., Policy] = plugins.load(plugins.installed(plugins.POLICIES)[name])
     return maker
 
 
 def parameters_of(maker: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """The parameters that a policy can be made with, by name."""
+    """The parameters of a policy, by name."""
     return inspect.signature(maker).parameters
 
 
@@ -107,12 +107,12 @@ def errors_name(policy: str, method: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"The policy '{policy}' failed in {method}: {error}") from error
-    except Exception as error:  # the policy may be anyone's code
-        raise InputError(f"The policy '{policy}' failed in {method}, {_told(error)}.") from error
+    except Exception as error:  # a policy is foreign code
+        raise InputError(f"The policy '{policy}' failed in {method}, {_failure(error)}.") from error
 
 
-def _told(error: BaseException) -> str:
-    """Where an error was raised, its kind and what it says."""
+def _failure(error: BaseException) -> str:
+    """Place, class and message of an error."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     words = " ".join(str(error).split()).removesuffix(".")
     return f"at {place.filename}:{place.lineno}: {type(error).__name__}{f': {words}' if words else ''}"
@@ -134,7 +134,7 @@ def _make(maker: Any, source: str, text: str) -> Policy:
     except (TypeError, ValueError) as error:
         raise InputError(f"Policy '{source}' cannot be made: {str(error).removesuffix('.')}.") from error
     except Exception as error:
-        raise InputError(f"Policy '{source}' cannot be made, {_told(error)}.") from error
+        raise InputError(f"Policy '{source}' cannot be made, {_failure(error)}.") from error
     return policy
 
 
@@ -158,4 +158,4 @@ def _run_file(path: Path, _modified: int) -> dict[str, Any]:
     try:
         return runpy.run_path(str(path))
     except (Exception, SystemExit) as error:
-        raise InputError(f"{path} cannot be run, {_told(error)}.") from error
+        raise InputError(f"{path} cannot be run, {_failure(error)}.") from error

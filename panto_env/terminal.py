@@ -1,4 +1,4 @@
-"""What commands share: tables and progress for people, JSON for machines."""
+"""Output of commands: tables, progress, JSON."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines inst
 
 
 def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[str | None], str | None]:
-    """What checks an option that names a file to write, before the command begins its work.
+    """Callback that checks an option for an output file before the command begins its work.
 
-    announced: whether it is said there, too, that a file of this name will be overwritten.
+    announced: whether it also announces that an existing file will be overwritten.
     """
 
     def check(path: str | None) -> str | None:
@@ -45,20 +45,20 @@ def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[st
 
 
 def announce_overwriting(path: str | Path) -> None:
-    """Say, in a line on standard error, that a file which is there will be overwritten."""
+    """Announce on standard error that an existing file will be overwritten."""
     if Path(path).is_file():
         say(f"{path} exists already and will be overwritten.")
 
 
 def refuse_overwriting(path: str | Path, force: bool) -> None:
-    """Raise InputError where a file is there that may have taken hours; with ``force`` only say so."""
+    """Raise InputError where a file exists, which may have taken hours; with ``force`` only announce it."""
     if force:
         announce_overwriting(path)
     elif Path(path).is_file():
         raise InputError(f"{path} exists already; give another --output, or --force to overwrite it.")
 
 
-Force = Annotated[bool, typer.Option("--force", help="Overwrite results of before in the output.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite earlier results in the output.")]
 Plot = Annotated[
     str | None,
     typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
@@ -66,20 +66,20 @@ Plot = Annotated[
 
 
 class PlainConsole(Console):
-    """A console for names and descriptions, which are a user's, or anyone's whose file is read.
+    """A console for names and descriptions from users' files.
 
-    Brackets in them are no markup, and what would tell the terminal to do something is escaped.
+    Brackets in them are not markup, and characters that control the terminal are escaped.
     """
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(markup=False, **settings)
 
     def render_str(self, text: str, **settings: Any) -> Text:
-        """Of strings and cells, before they are measured, so that none is cut."""
+        """Escape strings and cells before they are measured, so that none is cut."""
         return super().render_str(harmless(text), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Of whatever is printed."""
+        """Escape everything that is printed."""
         for segment in super().render(renderable, options):
             text, style, control = segment
             yield segment if control else Segment(harmless(text), style)
@@ -88,22 +88,22 @@ class PlainConsole(Console):
 console = PlainConsole()
 progress_console = PlainConsole(stderr=True)
 ALARM = "bold red"
-"""Style of what is wrong."""
+"""Style of errors and warnings."""
 
 
 def alert(words: str, rest: str = "", to: Console | None = None) -> None:
-    """Print a line whose first words say that something is wrong, by default to standard output."""
+    """Print a line with its first words in the style of an alarm, by default to standard output."""
     text = Text.assemble((words, ALARM), f" {rest}" if rest else "")
     (to or console).print(text, soft_wrap=True)
 
 
 def print_json(value: Any) -> None:
-    """Print JSON to standard output; figures that are not numbers become null."""
+    """Print JSON to standard output; numbers that are not finite become null."""
     print(json.dumps(finite(value), indent=2, ensure_ascii=not shows_all(sys.stdout)))
 
 
 def this_command() -> str:
-    """The command that is running, as it is noted beside what it makes."""
+    """The running command, as recorded with its results."""
     return shlex.join(["panto", *sys.argv[1:]])
 
 
@@ -119,16 +119,16 @@ def print_table(table: Table) -> None:
 
 
 def number(value: float, digits: int = 1) -> str:
-    """A figure for a table; a dash where there is none."""
+    """A number for a table; a dash where it is not finite."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
 
 
 @contextmanager
 def written_last() -> Iterator[Callable[..., None]]:
-    """Within the body: ``later(save, path)`` calls for a file that is written once the body has ended.
+    """Within the body, ``later(save, path)`` schedules a file that is written when the body has ended.
 
-    So what was computed is printed, whether it can be written or not, and written, whether it can be printed
-    or not. Where several files can't be written, the first one's InputError is raised.
+    So results are printed even if they cannot be written, and written even if they cannot be printed. Where
+    several files cannot be written, the first one's InputError is raised.
     """
     errors: list[InputError] = []
 
@@ -150,7 +150,7 @@ def written_last() -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def counting(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar while the body runs; the body calls what it gets with the number done and of all.
+    """Show a progress bar while the body runs; yields a function of the finished number and the total.
 
     The bar is on standard error, and only where that is a terminal.
     """
@@ -169,7 +169,7 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def counting_on(what: str, folder: Path) -> Iterator[Callable[[int, int], None]]:
-    """The same of work that keeps its parts in a folder: one that is interrupted says how it goes on."""
+    """``counting`` for work that keeps its parts in a folder: an interrupt prints how to continue it."""
     try:
         with counting(what) as progress:
             yield progress

@@ -124,7 +124,7 @@ def _one_thread_of_linear_algebra() -> Iterator[None]:
 
     The matrices are small: threads would wait for one another, on a busy machine a hundred times longer
     than they compute. The libraries read their number of threads when they are loaded, so it is set in
-    the environment that the processes start with, and put back at the end.
+    the environment that the processes inherit, and restored at the end.
     """
     before = {name: os.environ.get(name) for name in LINEAR_ALGEBRA_THREADS}
     os.environ.update(dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1"))

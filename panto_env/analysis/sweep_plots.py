@@ -98,7 +98,7 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
 
 
 def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) -> None:
-    """No contact, and EN 50367's largest force and σ, the latter at the mean force of the first policy."""
+    """Draw the line of no contact, and EN 50367's maximum force and σ; σ at the first policy's mean force."""
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
     limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]

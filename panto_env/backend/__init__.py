@@ -1,10 +1,10 @@
-"""All that touches Numba's and llvmlite's insides; the rest of the house writes plain functions.
+"""All code that uses internals of Numba and llvmlite; the rest of the package writes plain functions.
 
-``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` let a
-function differ by the type of what it works on; ``constants`` gives kernels the names of rows.
+``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` select a
+function by the type of its first argument; ``constants`` gives kernels the names of rows.
 ``load_row`` and the rest of ``vectors`` and ``mathematics`` compute with eight numbers at once. ``pack`` and
-``bind`` take a kernel's arguments apart only once; ``LaneThreads`` shares lanes among cores;
-``aligned_zeros`` is memory that vector instructions like, which ``copy_whole`` keeps in copies.
+``bind`` convert a kernel's arguments only once; ``LaneThreads`` distributes lanes among cores;
+``aligned_zeros`` gives memory aligned for vector instructions, which ``copy_whole`` preserves in copies.
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 

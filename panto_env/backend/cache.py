@@ -1,8 +1,8 @@
-"""Where compiled kernels are kept.
+"""The cache folder of compiled kernels.
 
 Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the cache folder is named by a hash of all sources that kernels call: an edit of any opens a new one.
-What lies there is run: so a folder is used only if it is this user's own and no other can write to it.
+So the folder is named by a hash of all sources that kernels call: after an edit a new folder is used.
+Its content is executed, so a folder is used only if it belongs to this user and no other can write to it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ import numba
 
 PACKAGE = Path(__file__).resolve().parents[1]
 KERNEL_ROOMS = ("backend", "plant", "control", "estimation")
-"""Rooms that kernels are made of. A kernel elsewhere calls nothing but these and its own file."""
+"""Packages with the sources of kernels. A kernel elsewhere calls only these and its own file."""
 
 
 @cache
 def source_hash() -> str:
-    """Hash of every source file of the package, and of what compiles them."""
+    """Hash of all source files of the package, and of the versions of the compilers."""
     return _hash(PACKAGE.rglob("*.py"))
 
 
 @cache
 def kernel_hash() -> str:
-    """Hash of the source files that kernels are made of, and of what compiles them."""
+    """Hash of the source files of kernels, and of the versions of the compilers."""
     return _hash(path for room in KERNEL_ROOMS for path in (PACKAGE / room).rglob("*.py"))
 
 
@@ -50,8 +50,8 @@ def _hash(files: Iterable[Path]) -> str:
 def cache_folder() -> Path | None:
     """Folder of the compiled kernels, made on first use; None where nothing can be written.
 
-    ``PANTO_CACHE_DIR`` overrides where it lies. Where that cannot be used, it lies in the temporary folder;
-    where another user has put something under its name there, it is one for this process alone.
+    ``PANTO_CACHE_DIR`` overrides its place. If that cannot be used, it is in the temporary folder; if another
+    user has put something under its name there, it is a new one only for this process.
     """
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     own = _own_folder(Path(os.environ.get("PANTO_CACHE_DIR") or Path(home) / "panto_env"))
@@ -70,13 +70,13 @@ def cache_folder() -> Path | None:
 
 
 def _remove(folder: Path, process: int) -> None:
-    """Remove the folder of a process, at its end: not at that of one that it was forked into."""
+    """Remove the folder of a process at its end, but not at the end of its forked children."""
     if os.getpid() == process:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _own_folder(parent: Path) -> Path | None:
-    """The folder of these sources in another one; None where it cannot be made, or is not ours alone."""
+    """The folder of these sources in another one; None where it cannot be made, or is not private."""
     folder = parent / kernel_hash()
     try:
         parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -91,9 +91,9 @@ def _user() -> int:
 
 
 def _private(folder: Path) -> bool:
-    """Whether a folder is a true one, of this user, that no other user can write to."""
+    """Whether a folder is not a link, belongs to this user, and cannot be written to by others."""
     if not hasattr(os, "getuid"):
-        return True  # as on Windows, where folders of a user are their own
+        return True  # on Windows a user's folders are private
     found = folder.lstat()
     others = stat.S_IWGRP | stat.S_IWOTH
     return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not found.st_mode & others

@@ -1,4 +1,4 @@
-"""How kernels are compiled: on their first call, kept on disk, never stale, never at import."""
+"""Compilation of kernels: on their first call, cached on disk, never stale, never at import."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ E = TypeVar("E", bound=IntEnum)
 
 JIT = not numba.config.DISABLE_JIT
 """Whether kernels are compiled. With ``NUMBA_DISABLE_JIT=1`` the same source runs as plain Python, some
-hundred times slower: for debuggers and for coverage."""
+hundred times slower, for debuggers and for coverage."""
 
 # "contract" lets multiply and add fuse; it leaves the order of operations alone. Kernels allocate
 # nothing, so without Numba's run-time they need not count references to the arrays they are given.
 OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "_nrt": False}
 INLINED = OPTIONS | PART_OPTIONS
-"""Of what kernels call: a call would cost as much as what most of these functions do."""
+"""Options of functions that kernels call: a call would cost as much as most of these functions take."""
 
 
 def kernel(function: F) -> F:
@@ -45,7 +45,7 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """A function that kernels call, compiled by itself and then put in the place of the call."""
+    """Compile a function that kernels call, and inline it at each call."""
     compiled: Any = numba.njit(**INLINED)(function)
     if JIT:
         refuse_calls(compiled)
@@ -53,7 +53,7 @@ def inlined(function: F) -> F:
 
 
 def in_python(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator of the compiled form of a function, an intrinsic of Numba; ``plain``: its form in Python."""
+    """Decorator of the compiled form of a function, an intrinsic of Numba; ``plain``: its Python form."""
 
     def choose_form(compiled: Callable[..., Any]) -> Any:
         return intrinsic(compiled) if JIT else plain
@@ -62,7 +62,7 @@ def in_python(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
 
 
 def python_function(compiled: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python source behind a compiled function, for a call from Python with arrays or numbers."""
+    """The Python function behind a compiled one, for a call from Python with arrays or numbers."""
     source: Callable[..., Any] = getattr(compiled, "py_func", compiled)
     return source
 
@@ -70,7 +70,7 @@ def python_function(compiled: Callable[..., Any]) -> Callable[..., Any]:
 def constants(names: type[E]) -> type[E]:
     """The members of an enum as plain integers under the same names, for use in kernels.
 
-    Numba before 0.68, and its GPU compiler still, refuse a member of an enum as an index of an array.
+    Numba before 0.68, and its GPU compiler even now, refuse a member of an enum as an index of an array.
     """
     numbers: Any = namedtuple("numbers", [member.name for member in names])  # type: ignore[misc]
     members: Any = numbers(*(int(member) for member in names))

@@ -1,7 +1,7 @@
-"""Operations of kernels that differ by the type of what they work on: one name, one source per type.
+"""Operations of kernels that depend on the type of their first argument: one name, one source per type.
 
-Numba picks the source when it compiles a kernel for a type, so that it is inlined and the compiled kernel
-can be kept on disk (a function passed as an argument could not). Without compilation Python picks it.
+Numba selects the source when it compiles a kernel for a type, so that it is inlined and the compiled kernel
+can be cached on disk (a function passed as an argument could not). Without compilation Python selects it.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def operation(declaration: F) -> F:
-    """An operation that each type of its first argument, a class of named tuples, may implement for itself.
+    """An operation that each type of its first argument, a class of named tuples, can implement.
 
-    ``declaration`` has the arguments and the docstring; its body is what is done for a type without a source
-    of its own. ``implements`` adds the source of a type.
+    ``declaration`` has the arguments and the docstring; its body is the default for types without a source
+    of their own. ``implements`` adds the source of a type.
     """
     sources: dict[type, Callable[..., Any]] = {}
-    # Numba wants the signatures of all sources alike, without types.
+    # Numba requires that the signatures of all sources are the same, without types.
     default = FunctionType(declaration.__code__, declaration.__globals__, declaration.__name__)
 
     @wraps(declaration)
@@ -51,9 +51,9 @@ def implements(of: Callable[..., Any], kind: type) -> Callable[[F], F]:
     """
 
     def register(source: F) -> F:
-        wanted, given = (list(inspect.signature(each).parameters) for each in (of, source))
-        if wanted != given:
-            raise TypeError(f"{of.__name__} takes {', '.join(wanted)}, but its source {', '.join(given)}.")
+        required, given = (list(inspect.signature(each).parameters) for each in (of, source))
+        if required != given:
+            raise TypeError(f"{of.__name__} takes {', '.join(required)}, but its source {', '.join(given)}.")
         of.sources[kind] = source  # type: ignore[attr-defined]
         return source
 

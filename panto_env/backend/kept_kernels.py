@@ -1,7 +1,7 @@
-"""Compiled kernels on disk: Numba's cache, where damaged files are compiled anew and no full disk ends a run.
+"""Compiled kernels on disk: Numba's cache, which survives damaged files and a full disk.
 
-Each kernel is kept with a checksum. Processes that need the same one at once compile it each for itself.
-Where one overwrites the other's file with the kernel for other types, that is noticed.
+Each kernel is stored with a checksum. Processes that need the same one at the same time compile it
+independently; if one overwrites the other's file with the kernel for other types, that is noticed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 PAUSE = 60.0
-"""Seconds within which kernels that are compiled are announced only once."""
+"""Time (s) within which a compilation of kernels is announced only once."""
 
 _announced = -PAUSE
 
@@ -25,7 +25,7 @@ class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
     """Compiled kernels in their form on disk."""
 
     def reduce(self, result: Any) -> tuple[bytes, bytes]:
-        """A checksum, and what it is of."""
+        """A checksum, and its data."""
         data = pickle.dumps(super().reduce(result))
         return hashlib.sha256(data).digest(), data
 
@@ -38,15 +38,15 @@ class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class KeptKernels(FunctionCache):  # type: ignore[misc]
-    """What is kept of one kernel: a form for each combination of types that it was called with."""
+    """Cache of one kernel: a compiled form for each combination of types with which it was called."""
 
     _impl_class = _CheckedResults
 
     def load_overload(self, types: Any, target_context: Any) -> Any:
-        """The form for these types; None where there is none, or it is damaged."""
+        """The compiled form for these types; None where it is missing or damaged."""
         try:
             kernel = super().load_overload(types, target_context)
-        except Exception:  # whatever damaged files lead to
+        except Exception:  # damaged files can lead to any error
             kernel = None
         if kernel is None or tuple(kernel.signature.args) != tuple(types):
             _announce()
@@ -54,7 +54,7 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
         return kernel
 
     def save_overload(self, types: Any, kernel: Any) -> None:
-        """Keep a form, with a warning where that is not possible."""
+        """Store a compiled form, with a warning where that is not possible."""
         try:
             try:
                 super().save_overload(types, kernel)
@@ -63,7 +63,7 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
                 super().save_overload(types, kernel)
         except OSError as error:
             warnings.warn(
-                f"Compiled kernels cannot be kept in {self.cache_path} ({error.strerror or error}), so the "
+                f"Compiled kernels cannot be stored in {self.cache_path} ({error.strerror or error}), so the "
                 "next process compiles them again; make room there, or set PANTO_CACHE_DIR.",
                 RuntimeWarning,
                 stacklevel=2,
@@ -71,7 +71,7 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
 
 
 def _announce() -> None:
-    """Say on standard error, where somebody sees it, what takes so long."""
+    """Announce the compilation on standard error, where a user sees it."""
     global _announced
     seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if seen and time.monotonic() - _announced > PAUSE:

@@ -1,6 +1,6 @@
-"""Functions of vectors, for which Python's own (``if``, ``min``, ``max``, ``math.sqrt``) do not serve.
+"""Functions of vectors, for which Python's own (``if``, ``min``, ``max``, ``math.sqrt``) cannot be used.
 
-Beside a vector a number counts as a vector of equal numbers.
+In an operation with a vector a number counts as a vector of equal numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .compile import in_python
 from .vectors import MaskType, VectorType
 
 NOT_NEGATIVE = 0xFFFFFFF
-"""Mask that tells the compiler that an index is not negative, so that it need not wrap around."""
+"""Mask by which the compiler knows that an index is not negative, so that it need not wrap around."""
 
 
 def _common(*given: Any) -> Any:
@@ -28,7 +28,7 @@ def _common(*given: Any) -> Any:
 
 
 def _root_plain(x: Any) -> Any:
-    with np.errstate(invalid="ignore"):  # at places that are not chosen
+    with np.errstate(invalid="ignore"):  # in elements that are not chosen
         return np.sqrt(x)
 
 
@@ -71,13 +71,13 @@ def _extreme(sign: str, plain: Callable[..., Any], docstring: str) -> Any:
     return in_python(plain)(either)
 
 
-smaller: Any = _extreme("<", np.minimum, "``smaller(a, b)``: the smaller of two; b where one is no number.")
-larger: Any = _extreme(">", np.maximum, "``larger(a, b)``: the larger of two; b where one is no number.")
+smaller: Any = _extreme("<", np.minimum, "``smaller(a, b)``: the smaller one; b where one is nan.")
+larger: Any = _extreme(">", np.maximum, "``larger(a, b)``: the larger one; b where one is nan.")
 
 
 @in_python(np.any)
 def any_of(typing: Any, mask: Any) -> Any:
-    """``any_of(mask)``: whether a mask is true at any place."""
+    """``any_of(mask)``: whether any element of a mask is true."""
     if not isinstance(mask, MaskType):
         return None
 

@@ -1,4 +1,4 @@
-"""Memory that vector instructions and caches like, and copies of it that they like as well."""
+"""Memory aligned for vector instructions and caches, also in copies."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 CACHE_LINE = 64
-"""Bytes in a cache line, and in the widest vector: what crosses its border takes two reads."""
+"""Bytes in a cache line, and in the widest vector: data across its border take two reads."""
 PAGE = 4096
 
 
 def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int = 0) -> NDArray[Any]:
-    """Zeros that begin ``place`` bytes into a page, a whole number of cache lines."""
+    """Zeros that begin ``place`` bytes after the start of a page, a whole number of cache lines."""
     item, count = np.dtype(kind).itemsize, math.prod(shape)
     spare = np.zeros(count + 2 * PAGE // item, dtype=kind)
     first = (place - spare.ctypes.data) % PAGE // item
@@ -33,28 +33,28 @@ class _View(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """A named tuple of arrays taken apart, until ``_together`` makes another one of it."""
+    """A named tuple of arrays in a form for copies, from which ``_together`` makes another one."""
 
     kind: type
     blocks: list[tuple[NDArray[np.uint8], int]]  # memory that arrays share, and its place in a page (bytes)
-    fields: list[Any]  # a ``_View`` for each array, ``_Parts`` for each named tuple; the rest is as it was
+    fields: list[Any]  # a ``_View`` for each array, ``_Parts`` for each named tuple; others unchanged
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Itself: the memory is copied when it is put together."""
+        """Itself: ``_together`` copies the memory."""
         return self
 
 
 def copy_whole(*tuples: Any) -> None:
-    """From now on, let named tuples of these classes be copied and pickled as a whole.
+    """Register the classes of these named tuples to be copied and pickled as a whole.
 
-    Arrays that share memory then share it in the copy, and all lie as they did within a page.
+    Arrays that share memory then share it in the copy, and keep their place within a page.
     """
     for each in tuples:
         copyreg.pickle(type(each), _apart)
 
 
 def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
-    """How to make a copy of a named tuple, as ``pickle`` and ``copy`` want it told."""
+    """Reduction of a named tuple for ``pickle`` and ``copy``."""
     owners: dict[int, Any] = {}
     used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
     for array in arrays:
@@ -82,7 +82,7 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
 
 
 def _together(parts: _Parts) -> Any:
-    """The named tuple that ``_apart`` has taken apart, in memory of its own."""
+    """A named tuple from the result of ``_apart``, with memory of its own."""
     memory = []
     for content, place in parts.blocks:
         memory.append(aligned_zeros(content.shape, np.uint8, place))
@@ -99,14 +99,14 @@ def _together(parts: _Parts) -> Any:
 
 
 def _owner(array: Any) -> Any:
-    """The array whose memory this one is a part of."""
+    """The array that owns the memory of this one."""
     while isinstance(array.base, np.ndarray):
         array = array.base
     return array
 
 
 def _reach(array: NDArray[Any]) -> tuple[int, int]:
-    """First address of an array's memory, and the one after its last; strides are not negative."""
+    """First address of an array's memory, and the one after its last; strides must not be negative."""
     first = array.ctypes.data
     if array.size == 0:
         return first, first

@@ -1,9 +1,9 @@
 """Arguments of kernels, packed once in their compiled form.
 
-To turn Python tuples of fifty arrays into what a kernel works on takes a microsecond in each call, as
-long as a step of the plant. ``pack`` does it once; the kernel is given where each tuple lies and reads the
-fields that it uses, as ``line.span``. The arrays must keep their memory, as those of tuples that are never
-rebuilt do. A named tuple may have another one as a field.
+Converting Python tuples of fifty arrays for a kernel takes a microsecond in each call, as long as a step of
+the plant. ``pack`` does it once; the kernel gets the address of each tuple and reads the fields that it
+uses, such as ``line.span``. The arrays must keep their memory: tuples must not be rebuilt. A named tuple may
+have another one as a field.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ POINTER = np.dtype(np.intp).itemsize
 
 
 class Packed:
-    """Named tuples, and where their compiled forms lie."""
+    """Named tuples, and the addresses of their compiled forms."""
 
     def __init__(self, arguments: tuple[Any, ...]) -> None:
         """Pack ``arguments``, which stay alive with this object."""
@@ -60,7 +60,7 @@ _types: dict[Any, Any] = {}
 
 
 def type_of(value: Any) -> Any:
-    """Numba's type of a value; looked up by what it depends on, since to find it anew takes longer."""
+    """Numba's type of a value, cached, since finding it takes longer than looking it up."""
     key = _kind(value)
     if key not in _types:
         _types[key] = numba.typeof(value)
@@ -77,7 +77,7 @@ def _kind(value: Any) -> Any:
 
 
 def entry(compiled: Any, signature: tuple[Any, ...]) -> Callable[..., Any]:
-    """A kernel's entry for arguments of these types, compiled if need be."""
+    """A kernel's entry point for arguments of these types, compiled if necessary."""
     known = compiled.overloads.get(signature)
     if known is None:
         compiled.compile(signature)
@@ -122,7 +122,7 @@ def _unbox(_: PackedType, packed: Any, c: Any) -> NativeValue:
 
 
 def _constant(builder: Any, place: Any) -> Any:
-    """What lies at a place that is written but once: the compiler may read it when it likes."""
+    """Value at an address that is written only once, so that the compiler may read it at any time."""
     value = builder.load(place, align=1 if place.type.pointee == ir.IntType(1) else POINTER)
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value
@@ -143,7 +143,7 @@ def _open_plain(packed: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 open_packed: Any = intrinsic(_open) if JIT else _open_plain
-"""In a kernel: the named tuples that were packed, in their order."""
+"""In a kernel: the packed named tuples, in the order of ``pack``."""
 
 
 @infer_getattr
@@ -174,10 +174,10 @@ def pack(*arguments: Any) -> Any:
 
 
 def bind(compiled: Callable[..., Any], packed: Any, *changing: Any) -> Callable[..., Any]:
-    """A kernel's entry, to be called with arguments of the types of ``changing`` alone.
+    """A kernel's entry point, to be called only with arguments of the types of ``changing``.
 
-    The kernel takes what ``pack`` has packed as one argument before them. Numba's look at the types of
-    arguments is skipped as well.
+    The kernel takes the packed arguments as one argument before them. Numba's check of the types of arguments
+    is skipped.
     """
     if not JIT:
         return partial(compiled, packed)

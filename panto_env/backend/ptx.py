@@ -1,6 +1,6 @@
-"""Kernels compiled for a GPU, off line: whether the same source serves there, without one at hand.
+"""Compilation of kernels for a GPU, to check that the same source works there.
 
-This needs the package numba-cuda with NVIDIA's compiler libraries, and no GPU.
+This needs the package numba-cuda with NVIDIA's compiler libraries, but no GPU.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import Any
 import numba
 
 COMPUTE_CAPABILITY = (9, 0)
-"""Of the GPU that is compiled for."""
+"""Compute capability of the target GPU."""
 
 
 def ptx_of(function: Callable[..., Any], *arguments: Any) -> str:
     """PTX of a function that kernels call, as a device function for arguments such as these.
 
     Raises ImportError where numba-cuda is not installed, and Numba's errors where the source has something
-    that a GPU does not know.
+    that a GPU does not support.
     """
     from numba import cuda
 
@@ -33,7 +33,7 @@ def ptx_of(function: Callable[..., Any], *arguments: Any) -> str:
 
 @contextmanager
 def _without_device() -> Iterator[None]:
-    """Let functions that are called be compiled for the same GPU, though none is there to be asked."""
+    """Within the body called functions are compiled for the same GPU, although the machine has none."""
     from numba.cuda import dispatcher
 
     ask = dispatcher.get_current_device

@@ -1,4 +1,4 @@
-"""Lanes of a batch shared among threads, each inside a kernel, which runs without Python's lock."""
+"""Lanes of a batch distributed among threads, each in a kernel that runs without Python's lock."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..base.machine import cores
 from .compile import JIT
 
 WORTH = 1e-4
-"""Time of a step (s) from which its lanes are shared: to hand some over takes some 20 us."""
+"""Time of a step (s) above which its lanes are distributed: that takes about 20 us."""
 TRIALS = 4
-"""Steps that are made and timed by one thread before it is decided whether others help."""
+"""Number of steps that one thread makes and times before the decision on more threads."""
 
 
 class LaneThreads:
@@ -26,7 +26,7 @@ class LaneThreads:
     def __init__(self, run: Callable[..., int], lanes: int, threads: int | None = None) -> None:
         """run(*work, first, last): the kernel, for the lanes from first to before last.
 
-        threads: at most, by default as many as there are cores.
+        threads: maximum number, by default the number of cores.
         """
         self._run, self._lanes = run, lanes
         # In plain Python only one thread at a time computes.
@@ -35,14 +35,14 @@ class LaneThreads:
         _ALL.add(self)
 
     def begin_alone(self) -> None:
-        """Forget the threads: a process that was forked has none but the one that forked."""
+        """Forget the threads: a forked process has only the one that forked."""
         self._trials = TRIALS if self._threads > 1 else 0
         self._shortest = float("inf")  # time of a step (s)
         self._pool: ThreadPoolExecutor | None = None
         self._limits = [self._lanes * k // self._threads for k in range(self._threads + 1)]
 
     def step(self, *work: object) -> int:
-        """Do a step's work in all lanes; the largest of what the kernel returns."""
+        """Do a step's work in all lanes; returns the maximum of the kernel's results."""
         if self._pool is None:
             return self._run(*work, 0, self._lanes) if not self._trials else self._try(work)
         limits = self._limits
@@ -56,7 +56,7 @@ class LaneThreads:
         return max(answer, *(share.result() for share in shares))
 
     def _try(self, work: tuple[object, ...]) -> int:
-        """A step alone, after the last of which it is decided whether threads are worth their while."""
+        """Make a step in one thread and time it; the last trial decides whether more threads pay off."""
         begun = time.perf_counter()
         answer = self._run(*work, 0, self._lanes)
         self._shortest = min(self._shortest, time.perf_counter() - begun)

@@ -1,13 +1,13 @@
 """Vectors: eight numbers side by side, on which the processor computes at once.
 
-A kernel reads one from a row of an array whose last axis has ``WIDTH`` places, computes with ``+ - * /``,
-comparisons and the functions of ``mathematics``, and writes it to a row. A number beside a vector counts as a
-vector of equal numbers, in the vector's precision. The compiler makes of it what the machine has: a register
-of 256 bits, or two of 128.
+A kernel reads one from a row of an array whose last axis has ``WIDTH`` elements, computes with ``+ - * /``,
+comparisons and the functions of ``mathematics``, and writes it to a row. In an operation with a vector a
+number counts as a vector of equal numbers, in the vector's precision. The compiler uses the registers of the
+machine: one of 256 bits, or two of 128.
 
-There are two forms of it. Compiled, a vector is LLVM's own, which a GPU's compiler takes as well: a thread
-then computes all its numbers. Without compilation it is a NumPy array. A third is planned: on a GPU each
-thread of a group would hold one number.
+It has two forms. Compiled, a vector is LLVM's own, which a GPU's compiler also accepts: a thread then
+computes all its numbers. Without compilation it is a NumPy array. A third is planned: on a GPU each thread of
+a group would hold one number.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from numba.np.arrayobj import make_array
 from .compile import in_python
 
 WIDTH = 8
-"""Numbers in a vector: as many in single precision as a register of 256 bits has."""
+"""Numbers in a vector: a register of 256 bits in single precision."""
 FLAGS = ("contract",)
-"""What the compiler may do with vectors, as with all arithmetic of kernels: fuse multiply and add."""
+"""Freedom of the compiler with vectors, as with all arithmetic of kernels: to fuse multiply and add."""
 
 
 class VectorType(types.Type):  # type: ignore[misc]
@@ -81,7 +81,7 @@ def _spread(context: Any, builder: Any, number_type: Any, vector: Any, number: A
 def _operator(
     function: Any, result: Callable[[Any], Any], build: Callable[..., Any], inputs: int = 2
 ) -> None:
-    """Let an operator take vectors, or a vector and a number; ``build`` makes the instruction."""
+    """Define an operator for vectors, or a vector and a number; ``build`` makes the instruction."""
 
     class Template(AbstractTemplate):  # type: ignore[misc]
         key = function
@@ -117,7 +117,7 @@ _arithmetic("fadd", operator.add, operator.iadd)
 _arithmetic("fsub", operator.sub, operator.isub)
 _arithmetic("fmul", operator.mul, operator.imul)
 _arithmetic("fdiv", operator.truediv, operator.itruediv)
-# Not as an instruction of its own, which a GPU's compiler does not know.
+# Not as an instruction of its own, which a GPU's compiler does not have.
 _operator(operator.neg, _itself, lambda builder, a: builder.fsub(ir.Constant(a.type, None), a), inputs=1)
 
 
@@ -133,7 +133,7 @@ _comparison("==", operator.eq)
 
 
 def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -> Any:
-    """Address of a row of so many numbers."""
+    """Address of a row of ``count`` numbers."""
     array, i = values
     data = make_array(array_type)(context, builder, array).data
     first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, count))])
@@ -153,7 +153,7 @@ def _store_plain(rows: Any, i: int, vector: Any) -> None:
 
 
 def row_access(count: int) -> tuple[Any, Any]:
-    """``load_row`` and ``store_row`` for rows of so many numbers."""
+    """``load_row`` and ``store_row`` for rows of ``count`` numbers."""
 
     @in_python(_load_plain)
     def load(typing: Any, rows: Any, i: Any) -> Any:
@@ -203,6 +203,6 @@ def _shift(up: bool) -> Any:
 
 
 shift_up: Any = _shift(up=True)
-"""``shift_up(vector, end)``: each number at the next place; at the first place what ``end`` has there."""
+"""``shift_up(vector, end)``: each number one element further; the first element is that of ``end``."""
 shift_down: Any = _shift(up=False)
-"""``shift_down(vector, end)``: each number at the place before; at the last place what ``end`` has there."""
+"""``shift_down(vector, end)``: each number one element back; the last element is that of ``end``."""

@@ -1,4 +1,4 @@
-"""From a catalogue name or a TOML file to a validated entry."""
+"""Loading of a catalogue entry or a TOML file, with validation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCHEMAS: dict[str, Mapping[str, type[Settings]]] = {
     "catenary": {name: kind.schema for name, kind in CATENARIES.items()},
     "pantograph": {"pantograph": PantographData},
 }
-"""Of each family by the word under ``kind``."""
+"""Schemas of each family by the value of ``kind``."""
 
 
 def available(family: str) -> tuple[str, ...]:
@@ -36,7 +36,7 @@ def available(family: str) -> tuple[str, ...]:
 
 
 def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
-    """Line of a catalogue name, of a TOML file, or an entry already loaded.
+    """Line from a catalogue name, a TOML file, or an entry that is already loaded.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
@@ -44,7 +44,7 @@ def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
 
 
 def load_pantograph(source: str | Path | PantographData) -> PantographData:
-    """Pantograph of a catalogue name, of a TOML file, or an entry already loaded.
+    """Pantograph from a catalogue name, a TOML file, or an entry that is already loaded.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
@@ -52,9 +52,9 @@ def load_pantograph(source: str | Path | PantographData) -> PantographData:
 
 
 def text_of(name: str) -> str:
-    """The TOML file of a line or a pantograph of the catalogue, as a start for one's own.
+    """Text of the TOML file of a line or a pantograph of the catalogue, as a start for your own.
 
-    Raises InputError where neither is called so.
+    Raises InputError where the catalogue does not have this name.
     """
     for family in FOLDERS:
         if name in available(family):
@@ -79,7 +79,7 @@ def _find(family: str, source: str | Path) -> Path:
         return FOLDERS[family] / f"{text}.toml"
     if text.endswith(".toml"):
         path = Path(text)
-        if os.path.isfile(path):  # which no name is too odd for
+        if os.path.isfile(path):  # which accepts any name
             return path
         raise InputError(f"The {family} file {text} does not exist; give the path of a TOML file.")
     near = nearest(text, available(family))
@@ -97,7 +97,7 @@ def _read(family: str, path: Path, _modified: int) -> Any:
         table = {"name": path.stem, **_split(read_toml(path), "", sources), "sources": sources}
         schema = _schema(family, table)
         if "line" in schema.model_fields and isinstance(table.get("line"), str):
-            table["line"] = load_catenary(table["line"])  # a rig may name the line that it computes
+            table["line"] = load_catenary(table["line"])  # a rig may name its computed line
         entry = schema.model_validate(table)
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
@@ -112,7 +112,7 @@ def _read(family: str, path: Path, _modified: int) -> Any:
 
 
 def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
-    """The schema of the table's kind: a wrong one would make every other key look wrong."""
+    """The schema of the table's kind, checked first: a wrong schema would make all other keys look wrong."""
     schemas = SCHEMAS[family]
     kinds = f"{'one of ' if len(schemas) > 1 else ''}{', '.join(map(repr, schemas))}"
     if len(schemas) == 1 and "kind" not in table:
@@ -125,18 +125,18 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
 
 
 class _TableError(Exception):
-    """A table of another kind, or that is meant to give a value with its source, but does not."""
+    """An error in a table: an unknown kind, or a table of value and source with other keys."""
 
 
 def _split(table: dict[str, Any], prefix: str, sources: dict[str, str]) -> dict[str, Any]:
-    """Values alone; ``{ value = ..., source = ... }`` leaves its source in ``sources``."""
+    """Values without sources; the sources in ``{ value = ..., source = ... }`` go to ``sources``."""
     values: dict[str, Any] = {}
     for key, item in table.items():
         place = f"{prefix}{key}"
         if isinstance(item, dict) and not item.keys().isdisjoint({"value", "source"}):
             if "value" not in item or not set(item) <= {"value", "source"}:
                 raise _TableError(
-                    f"key '{place}' must hold 'value' and, where wanted, 'source', and nothing "
+                    f"key '{place}' must hold 'value' and optionally 'source', and nothing "
                     f"else (given: {', '.join(map(repr, item))})"
                 )
             sources[place] = str(item.get("source", "not given"))

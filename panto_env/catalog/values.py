@@ -20,12 +20,12 @@ class Value(NamedTuple):
 
 
 def values_of(entry: Any) -> list[Value]:
-    """All values of a line or a pantograph that are given."""
+    """All values of a line or a pantograph that are not None."""
     return [Value(key, value, text, entry.sources.get(key, "")) for key, value, text in _leaves(entry, "")]
 
 
 def _leaves(entry: BaseModel, prefix: str) -> Iterator[tuple[str, Any, str]]:
-    """Keys, values and meanings of all values of an entry, its tables opened."""
+    """Keys, values and meanings of all values of an entry, including those in its tables."""
     for key, field in type(entry).model_fields.items():
         value = getattr(entry, key)
         if isinstance(value, BaseModel):

@@ -19,13 +19,13 @@ from ..base.standard_streams import guarded_streams, say
 from ..base.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
-"""Of Click, which older releases of Typer import and newer ones bring along."""
+"""Click's class, which older releases of Typer import and newer ones include."""
 
 
 def main() -> None:
-    """Run the command. Bad input ends it with one line on standard error and exit status 2.
+    """Run the command. Invalid input ends it with one line on standard error and exit status 2.
 
-    SIGTERM ends it as an interrupt from the keyboard does: what it has begun is put in order.
+    SIGTERM ends it like an interrupt from the keyboard, with all clean-up.
     """
     show_always()
     warnings.showwarning = _show_warning
@@ -38,12 +38,12 @@ def _run() -> int:
     stopped = _stop_on_sigterm()
     status: int | None
     try:
-        status = make_app()(standalone_mode=False)  # else Typer draws a box around what it refuses
-        print(end="", flush=True)  # what cannot be written is told here, not at the exit
+        status = make_app()(standalone_mode=False)  # otherwise Typer draws a box around errors
+        print(end="", flush=True)  # output that cannot be written fails here, not at the exit
     except InputError as error:
         return _refuse(str(error))
     except UsageError as error:
-        if type(error).__name__ == "NoArgsIsHelpError":  # no error: what it says is the help
+        if type(error).__name__ == "NoArgsIsHelpError":  # not an error: its message is the help
             error.show()
             return int(error.exit_code)
         context = error.ctx
@@ -58,7 +58,7 @@ def _run() -> int:
 
 
 def _stop_on_sigterm() -> list[int]:
-    """Make an interrupt of the first SIGTERM, and return a list that will hold it; a second one kills."""
+    """Turn the first SIGTERM into an interrupt, and return a list that will hold it; a second one kills."""
     stopped: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -83,7 +83,7 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Write our own warnings without the place in our sources, which tells the user nothing."""
+    """Write our own warnings without the place in our sources, which does not help the user."""
     if issubclass(category, AccuracyWarning):
         say(f"warning: {message}")
     elif sys.stderr is not None:
@@ -91,7 +91,7 @@ def _show_warning(
 
 
 def make_app() -> typer.Typer:
-    """The command with all its sub-commands, those of installed packages too."""
+    """The command with all its sub-commands, including those of installed packages."""
     from . import (
         catalogue,
         diagnose,
@@ -135,14 +135,14 @@ def make_app() -> typer.Typer:
     return app
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         print(f"panto-env {__version__}")
         raise typer.Exit
 
 
 Version = Annotated[
-    bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Say which version this is.")
+    bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
 ]
 
 

@@ -1,4 +1,4 @@
-"""``panto list``: what can be named on the command line."""
+"""``panto list``: lines, pantographs, policies and presets by name."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ def list_entries(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="Show all of this line, pantograph, policy, line condition, preset of actuator or sensors, "
-            "or TOML file."
+            help="Show all values of this line, pantograph, policy, line condition, preset of actuator or "
+            "sensors, or TOML file."
         ),
     ] = None,
     toml: Annotated[
-        bool, typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from.")
+        bool,
+        typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from."),
     ] = False,
     json: Json = False,
 ) -> None:
-    """List lines, pantographs, policies and presets, or every value of one with its source or default."""
+    """List lines, pantographs, policies and presets, or all values of one with their source or default."""
     if toml:
         if name is None:
-            raise InputError("Name a line or a pantograph: panto list en50318-2002 --toml.")
+            raise InputError("Give the name of a line or a pantograph: panto list en50318-2002 --toml.")
         sys.stdout.write(text_of(name))
         return
     if name is not None:
@@ -67,7 +68,9 @@ def list_entries(
                 changed.insert(0, f"kind={kind}")
             table.add_row(each.name, ", ".join(changed) or "none")
         console.print(table)
-    console.print("All of one: panto list NAME. With values of your own: NAME:key=value,...", markup=False)
+    console.print(
+        "All values of one: panto list NAME. With your own values: NAME:key=value,...", markup=False
+    )
 
 
 def _print(each: Description) -> None:

@@ -1,4 +1,4 @@
-"""What can be named on the command line, described: lines, pantographs, policies, presets of settings."""
+"""Descriptions of everything with a name: lines, pantographs, policies, presets of settings."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
     "actuator": ACTUATOR_PRESETS,
     "sensors": SENSOR_PRESETS,
 }
-"""By the settings that they are of."""
+"""Presets by setting."""
 POLICY = "policy"
 
 
 class Description(NamedTuple):
-    """One thing that can be named."""
+    """Description of one line, pantograph, policy or preset."""
 
     family: str
     name: str
     text: str  # paragraphs
     headings: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    data: Any  # the same for machines
+    data: Any  # the same content for JSON
 
 
 def everything() -> dict[str, list[Description]]:
-    """All that can be named, by family."""
+    """Descriptions of everything with a name, by family."""
     return {
         **{
             family: [_entry(family, load(name)) for name in available(family)]
@@ -56,7 +56,7 @@ def everything() -> dict[str, list[Description]]:
 
 
 def described(name: str) -> list[Description]:
-    """All that is called so, or the entry of a TOML file. Raises InputError where there is none."""
+    """Descriptions of everything with this name, or of a TOML file. Raises InputError for an unknown name."""
     if name.endswith(".toml"):
         family = _family_of(name)
         return [_entry(family, LOADERS[family](name))]
@@ -73,7 +73,7 @@ def described(name: str) -> list[Description]:
 
 
 def _family_of(path: str) -> str:
-    """The family that a TOML file's kind belongs to; a line's where it has none or an unknown one."""
+    """Family of a TOML file, by its kind; that of lines where the kind is missing or unknown."""
     kind = read_toml(path).get("kind")
     return next((family for family, schemas in SCHEMAS.items() if kind in schemas), next(iter(LOADERS)))
 
@@ -109,7 +109,7 @@ def _preset(family: str, name: str) -> Description:
     others = ", ".join(PRESETS[family])
     option = f"--{family.replace('_', '-')}"
     first = next(key for key, value in usual if isinstance(value, float))
-    text = f"A preset of {option}; presets are {others}. With values of your own: {option} {name}:{first}=..."
+    text = f"A preset of {option}; presets are {others}. With your own values: {option} {name}:{first}=..."
     text += f"\n\n{inspect.getdoc(type(preset))}"
     return Description(
         family, name, text, ("key", "value", "usually", "meaning"), rows, preset.model_dump(mode="json")

@@ -12,11 +12,11 @@ from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
 
 MOST_FALSE_ALARMS = 20.0
-"""Per km, about one in a span: beyond, a threshold means nothing."""
+"""Maximum false alarms per km, about one per span: beyond it a threshold has no meaning."""
 
 
 def diagnose(
-    run: Annotated[Path, typer.Argument(help="Run to be judged, as `panto simulate --output` writes it.")],
+    run: Annotated[Path, typer.Argument(help="Run to be diagnosed, from `panto simulate --output`.")],
     more: Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)] = None,
     healthy: Annotated[
         list[Path] | None,
@@ -27,7 +27,7 @@ def diagnose(
     ] = None,
     again: Annotated[
         list[Path] | None,
-        typer.Option(help="A further run over the line that is judged, for a mean; can be given again."),
+        typer.Option(help="A further run over the diagnosed line, for a mean; may be repeated."),
     ] = None,
     false_alarms: Annotated[
         float | None, typer.Option(help="False alarms per km that set the threshold. Default: 0.1.")
@@ -35,26 +35,26 @@ def diagnose(
     pantograph: Annotated[
         str | None,
         typer.Option(
-            help="As the estimator knows it: a name of the catalogue or a TOML file. Default: the one of the "
-            "catalogue that a run names."
+            help="Pantograph that the estimator assumes: a name of the catalogue or a TOML file. Default: "
+            "the run's, from the catalogue."
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Say whether a line is healthy, and if not, where and of which kind its defects are.
+    """Find out whether a line is healthy, and if not, the places and kinds of its defects.
 
-    The force is held against that of healthy runs, place by place, from the tenth span on. It is not taken
-    as simulated, but as an estimator on the train finds it, up to 20 Hz, from displacements of collector head
-    and frame with noise, and from the pantograph as designed.
+    The force is compared with that of healthy runs, place by place, from the tenth span on. It is not the
+    simulated force, but the one that an estimator on the train finds, up to 20 Hz, from noisy displacements
+    of collector head and frame, and from the pantograph as designed.
     """
     from ..diagnosis import diagnose as judge
     from ..diagnosis.tables import findings_table, verdict
     from ..diagnosis.threshold import FALSE_ALARMS
 
     if not healthy:
-        raise InputError("Say which runs are healthy: panto diagnose RUN --healthy RUN RUN RUN.")
+        raise InputError("Give the healthy runs: panto diagnose RUN --healthy RUN RUN RUN.")
     rate = FALSE_ALARMS if false_alarms is None else false_alarms
     if not 0 < rate <= MOST_FALSE_ALARMS:
         raise InputError(
@@ -62,7 +62,7 @@ def diagnose(
         )
     if seed < 0:
         raise InputError(f"--seed must be a whole number from 0 up, not {seed}.")
-    with progress_console.status("reading and judging"):
+    with progress_console.status("reading and diagnosing"):
         runs = [Trajectory.load(path) for path in (run, *(again or []))]
         reference = [Trajectory.load(path) for path in (*healthy, *(more or []))]
         found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
@@ -76,13 +76,13 @@ def diagnose(
             later(save, plot_diagnosis(found, title), plot)
         if json:
             findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
-            told = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
+            facts = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
             extra = {
                 "threshold": found.evidence.threshold,
                 "false_alarms": found.false_alarms,
                 "notes": found.notes,
             }
-            print_json(told | extra | {"findings": findings})
+            print_json(facts | extra | {"findings": findings})
             return
         for sentence in verdict(found):
             console.print(sentence, soft_wrap=True)

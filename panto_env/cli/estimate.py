@@ -40,15 +40,15 @@ def estimate(
         Path,
         typer.Argument(
             help="CSV: time, head, frame, and where measured head_velocity, frame_velocity, frame_force, "
-            "head_force; contact_force is compared with."
+            "head_force; a contact_force is compared with the estimate."
         ),
     ],
     pantograph: Annotated[
-        str, typer.Option(help="Name in the catalogue, or a TOML file, as `panto identify` writes it.")
+        str, typer.Option(help="Name in the catalogue, or a TOML file, e.g. from `panto identify`.")
     ],
     speed: Annotated[
         float | None,
-        typer.Option(help="Of the train (km/h); needed for an aerodynamic uplift.", min=0, max=1000),
+        typer.Option(help="Speed of the train (km/h); required for aerodynamic uplift.", min=0, max=1000),
     ] = None,
     span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1, max=1000)] = None,
     lift: Annotated[
@@ -58,10 +58,10 @@ def estimate(
         ),
     ] = None,
     displacements: Annotated[
-        bool, typer.Option("--displacements", help="Leave out velocities, though they were measured.")
+        bool, typer.Option("--displacements", help="Do not use velocities, even if they were measured.")
     ] = False,
     force_model: Annotated[
-        str, typer.Option(help="random-walk, shaped or periodic, with values as 'shaped:wavelength=5'.")
+        str, typer.Option(help="random-walk, shaped or periodic, with values such as 'shaped:wavelength=5'.")
     ] = "random-walk",
     displacement_noise: Annotated[
         float | None, typer.Option(help="White noise of a sample, rms (m).", show_default="2e-5")
@@ -69,18 +69,18 @@ def estimate(
     velocity_noise: Annotated[
         float | None, typer.Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
     ] = None,
-    lag: Annotated[float, typer.Option(help="How long the estimate may wait for later samples (s).")] = 0.0,
+    lag: Annotated[float, typer.Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
     free_zero: Annotated[
         bool,
-        typer.Option("--free-zero", help="The zero of heights is not known: the lift is the mean."),
+        typer.Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift."),
     ] = False,
     tune: Annotated[
         bool,
-        typer.Option("--tune", help="Find noise intensities by maximum likelihood on this record first."),
+        typer.Option("--tune", help="First find noise intensities on this record by maximum likelihood."),
     ] = False,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Unit of a column whose header has none, as head=mm; may be repeated."),
+        typer.Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
     ] = None,
     output: Annotated[
         str | None,
@@ -91,9 +91,9 @@ def estimate(
 ) -> None:
     """Estimate the contact force from the motion of collector head and articulated frame (paper 2).
 
-    Heights count up (m or mm, as the header says) from where the pantograph's springs carry nothing. A record
-    that can't be a pantograph's is refused with the likely mistake. The mean force rests on the lift, and the
-    inertia of the head on its mass: no test shows if these are wrong.
+    Heights are positive upwards (m or mm, according to the header), from the position with unloaded springs.
+    A record that cannot be a pantograph's is refused with the likely mistake. The mean force depends on the
+    lift, and the inertia of the head on its mass: no test shows whether these are wrong.
     """
     from ..base.settings import parse
     from ..catalog import load_pantograph
@@ -127,11 +127,11 @@ def estimate(
         settings = tuned.settings
         values = ", ".join(f"{name} = {value:.4g}" for name, value in tuned.values.items())
         progress_console.print(
-            f"Tuned on this record: {values}; so the size of its innovations is no test of it, nor of "
-            "another that is as faulty."
+            f"Tuned on this record: {values}; so the size of its innovations is no test of this record, nor "
+            "of another one with the same errors."
         )
         for name in tuned.at_bounds:
-            alert("Warning:", f"the record does not tell {name}.", progress_console)
+            alert("Warning:", f"the record does not determine {name}.", progress_console)
     found = run(motion, known, settings)
     scores = _scores(motion, found)
     with written_last() as later:
@@ -150,16 +150,16 @@ def estimate(
 
 
 def _lift(pantograph: PantographData, speed: float | None, lift: float | None, motion: Motion) -> float:
-    """What lifts the pantograph (N), where it is not given."""
+    """Lift of the pantograph (N): as given, or nominal."""
     if lift is not None:
         return lift
     if speed is None and pantograph.aerodynamic_coefficient > 0:
         raise InputError(
             f"Pantograph '{pantograph.name}' has an aerodynamic uplift; give the speed of the train, "
-            "--speed, or what lifts it in all, --lift."
+            "--speed, or the whole lift, --lift."
         )
     nominal = float(pantograph.nominal_force(speed or 0.0))
-    if pantograph.force == "mean":  # it states the contact force: the lowest spring is lifted besides
+    if pantograph.force == "mean":  # this is the contact force: the lowest spring needs a lift in addition
         nominal += pantograph.stiffnesses[-1] * float(motion.frame.mean())
     return nominal
 
@@ -177,7 +177,7 @@ def _rows(found: Estimate) -> list[dict[str, Any]]:
 
 
 def _figures(found: Estimate) -> dict[str, float]:
-    """Of the estimate low-passed as EN 50317 does, once the start has been forgotten (N)."""
+    """Statistics of the estimate behind EN 50317's low-pass (N), after the filter's start."""
     from ..metrics.low_pass import low_pass
 
     step = float(found.time[1] - found.time[0])
@@ -191,7 +191,7 @@ def _figures(found: Estimate) -> dict[str, float]:
 
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:
-    """Against the contact force of the record, where it has one, in bands that it is long enough for."""
+    """Comparison with the record's contact force, if any, in bands for which the record is long enough."""
     from ..estimation.score import BANDS, score
 
     if motion.contact_force is None:
@@ -233,14 +233,14 @@ def _print(
         (LABELS[key].heading, number(value)) for key, value in _figures(found).items()
     ]
     rows += [
-        ("lift, which the mean rests on (N)", number(motion.lift)),
+        ("lift, which determines the mean (N)", number(motion.lift)),
         ("rms error by the model, all frequencies (N)", number(found.deviation)),
         (f"innovations, squared (1; a true model's {low:.3f} to {high:.3f})", f"{tested.nis:.3f}"),
         (
             f"their autocorrelation (0; a true model's to {tested.whiteness.bound:.3f})",
             f"{tested.whiteness.largest:+.3f}",
         ),
-        ("to be believed", "yes" if found.verdict.believe else Alarm("no")),
+        ("reliable", "yes" if found.verdict.believe else Alarm("no")),
     ]
     model = f"{settings.observation}, {settings.force_model.kind}"
     print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", ""), rows))
@@ -256,5 +256,5 @@ def _scores_table(scores: list[Score]) -> Table:
         forces = number(each.bias, 2), number(each.rms, 2)
         likeness = number(each.correlation, 4), number(1e3 * each.delay, 2)
         rows.append((f"0 to {each.band:g} Hz", *forces, *likeness))
-    headings = ("band", "bias (N)", "rms error (N)", "correlation", "late by (ms)")
-    return Table("Against the recorded contact force", headings, rows)
+    headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
+    return Table("Compared with the recorded contact force", headings, rows)

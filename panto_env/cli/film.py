@@ -12,7 +12,7 @@ from ..render.video import FILMS, write_film
 from ..terminal import console, progress_console, writable
 
 MOST = 4
-"""Passes in one film."""
+"""Maximum number of passes in one film."""
 
 
 @with_settings(left_out=("observation",))
@@ -21,8 +21,8 @@ def film(
     policies: Annotated[
         list[str],
         typer.Argument(
-            help="What is shown, above each other: a policy as a name, name:key=value,..., a model file or "
-            "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then hold for all."
+            help="Passes to show above each other: a policy as a name, name:key=value,..., a model file or "
+            "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then apply to all."
         ),
     ],
     output: Annotated[
@@ -33,11 +33,13 @@ def film(
         float, typer.Option(min=0.1, max=600, help="Time of the run that is shown (s).")
     ] = 3.0,
     slow_motion: Annotated[
-        float, typer.Option(min=0.1, max=100, help="How many times slower than life the film is.")
+        float, typer.Option(min=0.1, max=100, help="Factor by which the film is slowed down.")
     ] = 4.0,
     size: Annotated[
         tuple[int, int] | None,
-        typer.Option(help="Width and height (px); by default 1280 x 720, twice 480 high for two policies."),
+        typer.Option(
+            help="Width and height (px); by default 1280 x 720, for several policies 480 high each."
+        ),
     ] = None,
     seed: Annotated[
         int | None,
@@ -46,11 +48,11 @@ def film(
 ) -> None:
     """Write a film of a pass along a line: wires, pantograph, actuator and contact force.
 
-    Several policies drive the same line under the same seed, above each other; their figures stand beside.
-    A saved run is made anew from its settings, and refused where its contact force comes out another.
+    Several policies run on the same line under the same seed, above each other, with their figures.
+    A saved run is repeated from its settings, and refused if its contact force differs.
     """
     from ..base.errors import InputError
-    from ..render.film import frames, shown
+    from ..render.film import excerpt, frames
     from ..render.filmed import Filmed, check_together, policy_pass, saved_passes
 
     if len(policies) > MOST:
@@ -69,21 +71,19 @@ def film(
         given = [f"--{RENAMED.get(name, name).replace('_', '-')}" for name in settings]
         given += [] if seed is None else ["--seed"]
         if given:
-            raise InputError(
-                f"All settings of the film are those of {first.file}; leave out {', '.join(given)}."
-            )
+            raise InputError(f"The film takes all settings from {first.file}; leave out {', '.join(given)}.")
         settings, seed = first.settings, first.seed
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:
-        bar = progress.add_task("running the whole passes", total=len(policies))
+        bar = progress.add_task("simulating all passes", total=len(policies))
         filmed: list[Filmed] = []
         for policy in policies:
             each = saved.get(policy) or policy_pass(policy, settings, seed or 0)
             each.check()
             filmed.append(each)
             progress.advance(bar)
-        what = shown(filmed[0], first_span, seconds, slow_motion)
+        what = excerpt(filmed[0], first_span, seconds, slow_motion)
         bar = progress.add_task("drawing", total=1.0)
         drawn = frames(filmed, what, whole, lambda share: progress.update(bar, completed=share))
         write_film(drawn, output, what.rate, whole)
@@ -91,7 +91,7 @@ def film(
         if each.run.terminated:
             console.print(f"{each.title}: {each.run.ending}", markup=False, soft_wrap=True)
     console.print(
-        f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than life.",
+        f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than real.",
         markup=False,
         highlight=False,
         soft_wrap=True,

@@ -37,23 +37,25 @@ def identify(
         list[str] | None,
         typer.Option(
             help="Known values in SI units: k1T=32992 m2=5 k2=14544, in one option or several. Any other "
-            "parameter may be given too and is then not identified."
+            "parameter may also be given, and is then not identified."
         ),
     ] = None,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Unit of a column whose header has none, as y_p1=mm; may be repeated."),
+        typer.Option(help="Unit of a column whose header has none, e.g. y_p1=mm; may be repeated."),
     ] = None,
     band: Annotated[
-        float | None, typer.Option(help="Highest frequency of the excitation (Hz), else found.")
+        float | None,
+        typer.Option(help="Maximum frequency of the excitation (Hz), by default found."),
     ] = None,
     free_offset: Annotated[
         bool,
-        typer.Option("--free-offset", help="Only motion counts: the zero of the displacements is not known."),
+        typer.Option("--free-offset", help="Use only changes: the zero of the displacements is unknown."),
     ] = False,
-    method: Annotated[Method, typer.Option(help="Whose parameters are plotted and written.")] = Method.output,
+    method: Annotated[Method, typer.Option(help="Method whose parameters are used.")] = Method.output,
     static_force: Annotated[
-        float | None, typer.Option(help="Lifting force of the pantograph written (N), else the mean force.")
+        float | None,
+        typer.Option(help="Lifting force to be written (N), by default the mean force."),
     ] = None,
     output: Annotated[
         str | None,
@@ -67,11 +69,11 @@ def identify(
 ) -> None:
     """Identify a two-mass pantograph from a record of a rig, as paper 1 does, and by output error.
 
-    y_p1 is the plate, y_p2 the pan head, y_p3 the articulated frame. They count from where the unloaded
-    pantograph rests, in the direction in which the plate pushes the head (down, under a wire); the force is
-    positive where the plate pushes. A record whose sampling, sizes or signs can't be a rig's is refused with
-    the likely mistake; values that no pantograph can have are marked; a pantograph is written only where the
-    model explains the recorded motion.
+    y_p1 is the plate, y_p2 the pan head, y_p3 the articulated frame. They are measured from the rest position
+    of the unloaded pantograph, positive in the direction in which the plate pushes the head (down, under a
+    wire); a pushing force is positive. A record whose sampling, sizes or signs cannot be a rig's is refused
+    with the likely mistake; values that no pantograph can have are marked; a pantograph is written only where
+    the model explains the recorded motion.
     """
     from .. import identification
 
@@ -126,7 +128,7 @@ def pairs(texts: list[str]) -> dict[str, str]:
             continue
         name, equals, text = part.partition("=")
         if not (name and equals and text):
-            raise InputError(f"'{part}' must read name=value, as k1T=32992 or y_p1=mm.")
+            raise InputError(f"'{part}' must read name=value, e.g. k1T=32992 or y_p1=mm.")
         if name in pairs:
             raise InputError(f"{name} is given twice, as {pairs[name]} and as {text}.")
         pairs[name] = text
@@ -141,7 +143,7 @@ def _value(name: str, text: str) -> float:
 
 
 def _static_force(given: float | None, force: Array | None, file: Path) -> tuple[float, str]:
-    """Lifting force (N) of the pantograph that is written, and where it is from."""
+    """Lifting force (N) of the written pantograph, and its source."""
     if given is not None:
         return given, "own choice: --static-force"
     if force is None:
@@ -152,7 +154,7 @@ def _static_force(given: float | None, force: Array | None, file: Path) -> tuple
 
 
 def _plain(identified: Identification, matches: list[Match], method: Method) -> dict[str, Any]:
-    """Everything as plain data."""
+    """All results as plain data."""
     fits, failures = _by_short_name(identified.fits), _by_short_name(identified.failures)
     return {
         "band": identified.band,
@@ -164,7 +166,7 @@ def _plain(identified: Identification, matches: list[Match], method: Method) -> 
 
 
 def _by_short_name(by_method: Mapping[str, T]) -> dict[str, T]:
-    """By the short name of a method what is given by its full one; other keys are left out."""
+    """Values by short names of methods, from values by full names; other keys are left out."""
     from ..identification import METHODS
 
     return {

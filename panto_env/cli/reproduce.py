@@ -1,4 +1,4 @@
-"""``panto reproduce``: the papers' results, ours beside theirs."""
+"""``panto reproduce``: our results compared with the papers'."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def reproduce(
     ),
     json: Json = False,
 ) -> None:
-    """Reproduce a paper's results: print ours beside the paper's, write figures and every number."""
+    """Reproduce a paper's results: print ours next to the paper's, write figures and all numbers."""
     names = studies.STUDIES if name == "all" else (name,)
     chosen = {name: studies.find_study(name) for name in names}
     for name in chosen:  # now: a study takes minutes
@@ -55,7 +55,7 @@ def reproduce(
                 _print(outcome)
             try:
                 files = studies.write(outcome, output / study)
-            except InputError as error:  # what was computed is printed nevertheless, and the others go on
+            except InputError as error:  # results are printed nevertheless, and the other studies continue
                 failed.append(error)
                 continue
             if not json:

@@ -1,4 +1,4 @@
-"""``panto rig``: a hardware-in-the-loop rig beside the line itself."""
+"""``panto rig``: a hardware-in-the-loop rig compared with the line itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..terminal import Json, Plot, console, print_json, print_table, progress_co
 RIGS = ("rig", "rig-flexible")
 PANTOGRAPH, SPEED_KMH = "dsa350", 250.0
 REFERENCE = "en50318-2002"
-"""Line beside which a rig stands whose own line has no droppers: paper 2's finite elements were of it."""
+"""Line with which a rig is compared if its own line has no droppers: paper 2's finite elements were of it."""
 
 
 @with_settings(only=("pantograph", "speed_kmh", "actuator", "sensors"), defaults=False)
@@ -26,24 +26,27 @@ def rig(
     reference: Annotated[
         str | None,
         typer.Option(
-            help="Line that the rig is to be; by default the one that it computes, where that has droppers, "
+            help="Line with which the rig is compared; by default its computed line if that has droppers, "
             f"else {REFERENCE}."
         ),
     ] = None,
-    policy: Annotated[str | None, typer.Option(help="Policy, on the rig and under the line.")] = None,
+    policy: Annotated[str | None, typer.Option(help="Policy, on the rig and on the line.")] = None,
     stability: Annotated[
-        bool, typer.Option("--stability", help="Find what delay and lag each loop bears; some 20 s a rig.")
+        bool,
+        typer.Option(
+            "--stability", help="Find the delay and lag at which each loop gets unstable; about 20 s per rig."
+        ),
     ] = False,
     clock: Annotated[
         float,
-        typer.Option(min=0, max=3600, help="Run each rig's computer against the clock for so long (s)."),
+        typer.Option(min=0, max=3600, help="Run each rig's computer in real time for this time (s)."),
     ] = 0.0,
     spans: Spans = None,
     seed: Seed = 0,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Run a pantograph on a rig and under the line itself, and print what of the line the rig follows.
+    """Run a pantograph on a rig and on the line itself, and print how well the rig follows the line.
 
     By default that is pantograph dsa350 at 250 km/h, as in paper 2.
     """

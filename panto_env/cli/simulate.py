@@ -45,7 +45,7 @@ def simulate(
     ] = None,
     plot: Plot = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Draw force and heights in the terminal while the run goes on.")
+        bool, typer.Option("--live", help="Draw force and heights in the terminal during the run.")
     ] = False,
     json: Json = False,
 ) -> None:
@@ -77,8 +77,8 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
     criteria = trajectory.compliance(chosen)
     if json:
-        told = {"spans": covered, "figures": figures.as_dict()}
-        print_json(_facts(trajectory) | told | {"compliance": [each.as_dict() for each in criteria]})
+        results = {"spans": covered, "figures": figures.as_dict()}
+        print_json(_facts(trajectory) | results | {"compliance": [each.as_dict() for each in criteria]})
         return
     table = Table("figure", "value", "unit")
     for key, label in LABELS.items():
@@ -98,7 +98,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
 def _shown(
     live: bool, policy: str
 ) -> Iterator[tuple[Callable[[float], None] | None, Callable[[Any], None] | None]]:
-    """What tells a person how far a run is, a bar or the run itself: ``progress`` and ``watch`` of a run."""
+    """Progress of a run as a bar or as a live picture: arguments ``progress`` and ``watch`` of the run."""
     if live and console.is_terminal and not console.is_dumb_terminal:
         from ..render.live import live as on_terminal
 
@@ -106,7 +106,7 @@ def _shown(
             yield None, watch
         return
     if live:
-        say("--live needs a terminal to draw in; the run goes on without.")
+        say("--live needs a terminal to draw in; the run continues without.")
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:

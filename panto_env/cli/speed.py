@@ -1,4 +1,4 @@
-"""``panto speed``: how fast the plants and environments are on this machine."""
+"""``panto speed``: speed of the plants and environments on this machine."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from ..terminal import Json, Plot, console, print_json, print_table, progress_co
 def speed(
     results: Annotated[
         list[Path] | None,
-        typer.Argument(help="Results stored with --json, to print side by side instead of measuring."),
+        typer.Argument(help="Results stored with --json, to print next to each other instead of measuring."),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats to take the median of.")] = 9,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
     plot: Plot = None,
     json: Json = False,
     markdown: Annotated[
         bool,
-        typer.Option("--markdown", help="Print what README.md, then what docs/speed.md holds of it."),
+        typer.Option("--markdown", help="Print the tables for README.md, then those for docs/speed.md."),
     ] = False,
 ) -> None:
-    """Measure times real time of each plant on one core, and environment steps per second.
+    """Measure the speed of each plant relative to real time on one core, and environment steps per second.
 
-    Beside them stand Gymnasium's own Pendulum and native CartPole, and the limits of the machine; then
-    how the cost grows with spans, modes, grid, lanes and cores. Of several stored results the first one's
-    details are shown.
+    They are compared with Gymnasium's own Pendulum and native CartPole, and with the limits of the machine;
+    then follows the cost by spans, modes, grid, lanes and cores. With several stored results, details are
+    those of the first one.
     """
     if json and markdown:
         raise InputError("Give one of --json and --markdown, not both.")
@@ -65,6 +65,6 @@ def speed(
 
 
 def _plain(table: Table) -> Table:
-    """The same without the backticks of Markdown."""
+    """The table without the backticks of Markdown."""
     rows = [tuple(cell.replace("`", "") for cell in row) for row in table.cells]
     return replace(table, rows=rows)

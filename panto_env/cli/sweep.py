@@ -33,18 +33,18 @@ def sweep(
         list[str],
         typer.Argument(
             metavar="NAME=VALUES...",
-            help="One or two parameters by dotted name, as pantograph.masses.0, "
+            help="One or two parameters by dotted name, e.g. pantograph.masses.0, "
             "catenary.contact_wire.tension, actuator.lag, policy.gain or speed_kmh; values as "
             "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),
     ],
     policy: Annotated[
         list[str] | None,
-        typer.Option(help="Policy: a name, name:key=value,... or a model file; can be given again."),
+        typer.Option(help="Policy: a name, name:key=value,... or a model file; may be repeated."),
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    workers: Annotated[int | None, typer.Option(help="Threads; one per core unless told otherwise.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
     output: Annotated[
         str | None,
         typer.Option(help="Save the table to this .csv or .parquet file.", callback=writable(TABLES)),
@@ -78,19 +78,19 @@ def sweep(
             later(save, plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
         if json:
             used = plain(run_settings(settings | {"spans": line_spans}))
-            told = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
-            print_json(told | {"rows": rows})
+            facts = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
+            print_json(facts | {"rows": rows})
             return
         _print(rows, list(values))
 
 
 def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
-    """Values by name from NAME=VALUES. Raises InputError where they can't be read."""
+    """Values by name from NAME=VALUES. Raises InputError where they cannot be read."""
     found: dict[str, list[float]] = {}
     for text in parameters:
         name, equals, values = text.partition("=")
         if not (equals and name and values):
-            raise InputError(f"'{text}' must read NAME=VALUES, as catenary.mean_stiffness=3000:5000:5.")
+            raise InputError(f"'{text}' must read NAME=VALUES, e.g. catenary.mean_stiffness=3000:5000:5.")
         if name in found:
             raise InputError(f"{name} is given twice; put all of its values in one list.")
         found[name] = parse_values(name, values)
@@ -98,7 +98,7 @@ def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
 
 
 def parse_values(name: str, text: str) -> list[float]:
-    """Values from "start:stop:count", both ends included, or from "1,2,3". InputError if not so."""
+    """Values from "start:stop:count", both ends included, or from "1,2,3". InputError for anything else."""
     try:
         if ":" not in text:
             return [float(value) for value in text.split(",")]
@@ -111,8 +111,8 @@ def parse_values(name: str, text: str) -> list[float]:
             f"The values of {name} must be start:stop:count with a count from 2 up, or numbers with "
             f"commas between, not '{text}'."
         ) from error
-    if steps >= MOST_PASSES:  # before as many are made
-        raise InputError(f"{name} has {steps + 1:,} values; {MOST_PASSES:,} passes at most can be run.")
+    if steps >= MOST_PASSES:  # before they are created
+        raise InputError(f"{name} has {steps + 1:,} values; the maximum is {MOST_PASSES:,} passes.")
     return [first + (last - first) * k / steps for k in range(steps + 1)]
 
 

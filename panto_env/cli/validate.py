@@ -1,4 +1,4 @@
-"""``panto validate``: the table of EN 50318:2002, and how the figures converge."""
+"""``panto validate``: the table of EN 50318:2002, and the convergence of figures."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from ..terminal import Json, Plot, alert, console, print_json, print_table, prog
 
 def validate(
     convergence: Annotated[
-        bool, typer.Option("--convergence", help="Print how the figures converge in grid and step.")
+        bool, typer.Option("--convergence", help="Print the convergence of figures with grid and step.")
     ] = False,
     window: Annotated[
         bool, typer.Option("--window", help="Print how travelling windows compare with a whole line.")
     ] = False,
     wear: Annotated[
-        bool, typer.Option("--wear", help="Print what the time step does to figures on a worn line.")
+        bool, typer.Option("--wear", help="Print the effect of the time step on figures of a worn line.")
     ] = False,
     lines: Annotated[
         bool,
-        typer.Option("--lines", help="Print what the default grid and step cost on every line and speed."),
+        typer.Option(
+            "--lines", help="Print the errors of the default grid and step on every line and speed."
+        ),
     ] = False,
     start: Annotated[
-        bool, typer.Option("--start", help="Print what the start of a run does to σ, by spans evaluated.")
+        bool, typer.Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
     ] = False,
     plot: Plot = None,
     json: Json = False,
@@ -53,7 +55,7 @@ def validate(
             checks, *others = validation.tables
             print_table(checks)
             console.print(
-                "The catalogue entry en50318-2002 says which open values were chosen, and how: "
+                "The catalogue entry en50318-2002 explains the choice of open values: "
                 "`panto list en50318-2002`."
             )
             for run, criteria in zip(validation.runs, validation.compliance, strict=True):

@@ -1,4 +1,4 @@
-"""Many jobs: on this machine or as tasks of a Ray cluster, and in parts that outlast what ends them."""
+"""Many jobs: on this machine or as tasks of a Ray cluster, and in parts that survive an interruption."""
 
 from .spread import RayAddress, spread
 

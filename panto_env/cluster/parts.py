@@ -1,4 +1,4 @@
-"""Work in parts, each a file that is written whole: whatever ends it, it goes on with what is missing."""
+"""Work in parts, each a file that is written whole: after an interruption it continues with missing parts."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from ..base.version import __version__, commit
 from .spread import spread
 
 Job = Callable[[Path], None]
-"""Work that writes its result to a path, whole or not at all; a ``functools.partial``, to go elsewhere."""
+"""Work that writes its result to a path, whole or not at all: for other processes a ``functools.partial``."""
 PARTS = ".parts"
-"""Folder in the output with one for each data set's parts; hidden, so that Minari does not look into it."""
+"""Folder in the output for the parts of each data set; hidden, so that Minari does not read it."""
 IDENTITY = "identity.json"
 
 
 def identity(kind: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What a work is made of, plain data: results of the same are the same."""
+    """Everything that determines the results of a work, as plain data."""
     made_by = {"version": __version__, "commit": commit(), "sources": source_hash()}
     return {"kind": kind, **made_by, "settings": json.loads(json.dumps(settings))}
 
 
 def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
-    """Make the folder of a work's parts, or go on with it; made_of: what ``identity`` gives.
+    """Make the folder of a work's parts, or continue it; made_of: from ``identity``.
 
-    Raises InputError where it holds parts of something else.
+    Raises InputError where it holds parts of another work.
     """
     make_folder(folder)
     path = folder / IDENTITY
@@ -44,7 +44,7 @@ def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
     if difference:
         raise InputError(
             f"{folder} holds parts of another work ({difference}); finish that one, remove the folder, or "
-            "take another --output."
+            "use another --output."
         )
 
 
@@ -56,10 +56,10 @@ def make_parts(
     ray: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Make all files, each by its job; those that are there and whole are kept.
+    """Make all files, each by its job; existing files that are whole are kept.
 
     read: reads a file, and raises InputError where it is missing or damaged; such a file is made again.
-    workers, ray: as ``spread`` takes them. progress: called with the files there, and of all.
+    workers, ray: as in ``spread``. progress: called with the numbers of existing and of all files.
     """
     missing = {path: job for path, job in jobs.items() if not _whole(path, read)}
     kept = len(jobs) - len(missing)
@@ -75,18 +75,18 @@ def make_parts(
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove what is needed no more."""
+    """Remove a folder of parts that are no longer needed."""
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def remove_if_empty(folder: Path) -> None:
-    """Remove a folder in which nothing is left."""
+    """Remove a folder if it is empty."""
     if folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
 
 
 def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """The first thing in which two identities differ, as a clause; "" where there is none."""
+    """The first difference of two identities, as a clause; "" for none."""
     before, now = ({**each, **each.get("settings", {})} for each in (old, new))
     for key in sorted(before.keys() | now.keys()):
         if key != "settings" and before.get(key) != now.get(key):
@@ -95,7 +95,7 @@ def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 
 
 def _whole(path: Path, read: Callable[[Path], object]) -> bool:
-    """Whether a part is there as it was written."""
+    """Whether a part exists and is not damaged."""
     try:
         read(path)
         return True

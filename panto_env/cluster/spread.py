@@ -1,4 +1,4 @@
-"""One call for jobs that run in processes here, or as tasks of a Ray cluster."""
+"""Jobs in processes on this machine, or as tasks of a Ray cluster."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ RayAddress = Annotated[
     typer.Option(
         "--ray",
         metavar="ADDRESS",
-        help='Work on a Ray cluster instead: its address, "auto", or "local" for one of this machine alone.',
+        help='Work on a Ray cluster instead: its address, "auto", or "local" for one on this machine only.',
     ),
 ]
-"""The option of a command whose work may go over a cluster."""
+"""Option of a command whose work can run on a cluster."""
 
 
 def spread(
@@ -31,16 +31,14 @@ def spread(
     progress: Progress | None = None,
     take: Take[T] | None = None,
 ) -> list[T]:
-    """Results of jobs, in their order, which must not depend on where a job runs.
+    """Results of jobs, in the given order; they must not depend on where a job runs.
 
-    workers: processes of this machine, one per core by default. ray: address of a cluster to work on
-    instead. take: called here with the place and the result of each job, as soon as it is there. Raises
+    workers: processes on this machine, one per core by default. ray: address of a cluster to use instead.
+    take: called in this process with the index and the result of each job as soon as it is finished. Raises
     InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
     """
     if ray is None:
         return in_processes(jobs, workers=workers, progress=progress, take=take)
     if workers is not None:
-        raise InputError(
-            "The workers of a Ray cluster are as many as its CPUs; leave out either workers or ray."
-        )
+        raise InputError("A Ray cluster has as many workers as CPUs; leave out either workers or ray.")
     return on_ray(jobs, ray, progress=progress, take=take)

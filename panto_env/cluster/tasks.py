@@ -1,4 +1,4 @@
-"""Jobs as tasks of a Ray cluster. Ray, an extra, is imported only when it is asked for."""
+"""Jobs as tasks of a Ray cluster. Ray, an extra, is imported only when it is used."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..base.shown import shown
 
 T = TypeVar("T")
 LOCAL = "local"
-"""The address of a cluster of this machine alone, which is started for the jobs and ends with them."""
+"""Address of a cluster on this machine only, which is started for the jobs and ends with them."""
 RETRIES = 5
-"""How often a job is run again whose worker or machine died."""
+"""Maximum number of retries of a job whose worker or machine died."""
 PATIENCE = 10.0
-"""Seconds within which the head of a cluster must answer."""
+"""Time (s) within which the head of a cluster must answer."""
 OBJECT_STORE = 256 * 2**20
-"""Bytes of shared memory of a local cluster: results are small, Ray would take a third of all memory."""
+"""Shared memory of a local cluster (bytes): results are small; by default Ray takes a third of the memory."""
 
 
 class Home(NamedTuple):
-    """Where the jobs come from."""
+    """Sources and folder of the process that submits the jobs."""
 
     sources: str  # hash of our source files
-    folder: Path  # to which relative paths of jobs refer
+    folder: Path  # base of relative paths in jobs
 
 
 def on_ray(
@@ -40,14 +40,14 @@ def on_ray(
     progress: Progress | None = None,
     take: Take[T] | None = None,
 ) -> list[T]:
-    """Results of jobs, in their order, that run as tasks of a Ray cluster, one on each of its CPUs.
+    """Results of jobs, in the given order, that run as tasks of a Ray cluster, one on each of its CPUs.
 
-    address: of the cluster's head, as "10.0.0.5:6379"; "auto", the one that runs on this machine; or LOCAL. A
-    job whose worker or machine dies is run again, so that a job must give the same when it is begun anew.
+    address: of the cluster's head, e.g. "10.0.0.5:6379"; "auto" for the one on this machine; or LOCAL. A job
+    whose worker or machine dies is run again, so a repeated job must give the same result.
 
-    Raises what a job raises, and InputError where Ray is not installed, this process is connected to it
-    already, there is no cluster, a machine of it cannot load a job or has other sources than this one, or a
-    job lost its worker more than RETRIES times. What has not ended by then is stopped.
+    Raises a job's error, and InputError where Ray is not installed, this process is already connected to it,
+    there is no cluster, one of its machines cannot load a job or has other sources than this one, or a job
+    lost its worker more than RETRIES times. Jobs that still run are then stopped.
     """
     ray = _ray()
     home = Home(source_hash(), Path.cwd())
@@ -65,13 +65,13 @@ def on_ray(
             raise error.cause from error
         except ray.exceptions.RayError as error:
             raise InputError(
-                f"A job was begun {RETRIES + 1} times on the Ray cluster and lost each time "
-                f"({_reason(error)}); see that a worker has enough memory, or run it without --ray."
+                f"A job was started {RETRIES + 1} times on the Ray cluster and lost each time "
+                f"({_reason(error)}); make sure that a worker has enough memory, or run it without --ray."
             ) from error
 
 
 def _run(job: Job[T], home: Home) -> T:
-    """In a worker: the job, if it would be the same as at home."""
+    """Run a job in a worker. Raises InputError where the worker has other sources."""
     if source_hash() != home.sources:
         raise InputError(
             f"The machine {socket.gethostname()} of the Ray cluster has other sources of panto-env, or "
@@ -84,12 +84,12 @@ def _run(job: Job[T], home: Home) -> T:
 
 
 def _reason(error: Exception) -> str:
-    """The first line of Ray's many, as part of a sentence."""
+    """The first line of an error message of Ray, as part of a sentence."""
     return str(error).strip().partition("\n")[0].rstrip(".")
 
 
 def _ray() -> Any:
-    """The package. Raises InputError where it is not installed."""
+    """The package Ray. Raises InputError where it is not installed."""
     try:
         import ray
     except ImportError as error:
@@ -101,13 +101,13 @@ def _ray() -> Any:
 
 @contextmanager
 def _connected(ray: Any, address: str) -> Iterator[None]:
-    """Within the body this process is connected to a cluster; to leave it ends what still runs there."""
+    """Within the body this process is connected to a cluster; at the end tasks that still run are stopped."""
     if ray.is_initialized():
         raise InputError("This process is connected to a Ray cluster already; call ray.shutdown() before.")
-    variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # the reason is in `in_processes`
+    variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # for the reason see ``in_processes``
     settings: dict[str, Any] = {"logging_level": "ERROR", "runtime_env": {"env_vars": variables}}
     if address == LOCAL:
-        # Ray reports each cluster to its makers, unless told not to.
+        # By default Ray reports each cluster to its makers.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         settings |= {"num_cpus": cores(), "include_dashboard": False, "object_store_memory": OBJECT_STORE}
     try:

@@ -29,8 +29,8 @@ class Row(IntEnum):
     WIRE_HEIGHT = 3  # m
     HEAD_VELOCITY = 4  # m/s
     FRAME_VELOCITY = 5  # m/s
-    FRAME_FORCE = 6  # of the actuator (N), one row per place
-    HEAD_FORCE = 7  # likewise
+    FRAME_FORCE = 6  # of the actuator on the frame (N); rows in the order of ``Place``
+    HEAD_FORCE = 7  # of the actuator on the head (N)
     STEP = 8  # steps since the start
     STRIDE = 9  # distance covered in one step (m), the mean where the speed drifts
     NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
@@ -42,7 +42,7 @@ class Scratch(IntEnum):
 
     IRREGULARITY = 0  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 1  # height of the wire where it is touched, at the step's start (m)
-    WIRE_MIDDLE = 2  # likewise at mid-step, as far as this step's forces don't count (m)
+    WIRE_MIDDLE = 2  # its height at mid-step, without the forces of this step (m)
 
 
 ROW, PLACE, SCRATCH = constants(Row), constants(Place), constants(Scratch)

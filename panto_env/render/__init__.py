@@ -1,4 +1,4 @@
-"""Pictures of what moves: frames of a run or an episode, films of them, a window."""
+"""Moving pictures: frames of a run or an episode, films, a window."""
 
 from .moment import Moment, moment_of
 

@@ -1,4 +1,4 @@
-"""A picture that is drawn into, in memory: no screen is needed. Lines by OpenCV, words by Pillow."""
+"""A picture in memory, which needs no screen. OpenCV draws lines, Pillow draws words."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .packages import check_packages
 
 Colour = tuple[int, int, int]
 PARTS = 4
-"""Places are drawn to a part 1 / 2^PARTS of a pixel."""
+"""Resolution of places: 1 / 2^PARTS of a pixel."""
 KEPT_WORDS = 2000
-"""Drawings of words that are kept: numbers come again."""
+"""Number of drawings of words that are kept, since numbers repeat."""
 
 
 def rgb(colour: str) -> Colour:
-    """A colour as "#rrggbb" in numbers."""
+    """Red, green and blue of a colour "#rrggbb"."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 class Canvas:
-    """A picture of so many pixels, (height, width, 3), and a pen. Places are pixels from the top left."""
+    """A picture, (height, width, 3), with functions to draw. Places are in pixels from the top left."""
 
     def __init__(self, width: int, height: int) -> None:
         """Raises InputError where OpenCV is not installed."""
@@ -33,38 +33,38 @@ class Canvas:
         self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
 
     def start_from(self, other: Canvas) -> None:
-        """Begin a new picture, in pixels of its own, with what another canvas shows."""
+        """Begin a new picture with a copy of another canvas."""
         self.pixels = other.pixels.copy()
 
     def fill(self, colour: Colour) -> None:
-        """Make all of it one colour."""
+        """Fill the picture with one colour."""
         self.pixels[...] = colour
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
-        """A filled rectangle."""
+        """Draw a filled rectangle."""
         rows = slice(max(round(top), 0), max(round(top + height), 0))
         self.pixels[rows, max(round(left), 0) : max(round(left + width), 0)] = colour
 
     def line(self, points: Any, colour: Colour, width: float = 1.0) -> None:
-        """A smooth line through points, (n, 2)."""
+        """Draw an antialiased line through points, (n, 2)."""
         import cv2
 
         cv2.polylines(self.pixels, [_exact(points)], False, colour, max(1, round(width)), cv2.LINE_AA, PARTS)
 
     def wire(self, points: Any, colour: Colour, width: int) -> None:
-        """A nearly level line of so many pixels: several thin ones, in a third of the time of a broad one."""
+        """Draw a nearly level line as ``width`` thin ones, in a third of the time of a broad one."""
         points = np.asarray(points, dtype=float)
         for k in range(width):
             self.line(points + np.array([0.0, 0.8 * (k - (width - 1) / 2)]), colour)
 
     def shape(self, points: Any, colour: Colour) -> None:
-        """A filled convex polygon."""
+        """Draw a filled convex polygon."""
         import cv2
 
         cv2.fillConvexPoly(self.pixels, _exact(points), colour, cv2.LINE_AA, PARTS)
 
     def dot(self, x: float, y: float, radius: float, colour: Colour, edge: Colour | None = None) -> None:
-        """A filled circle, with an edge of another colour or none."""
+        """Draw a filled circle, with an edge of another colour or none."""
         import cv2
 
         place, part = tuple(_exact([(x, y)])[0].tolist()), 1 << PARTS
@@ -83,7 +83,7 @@ class Canvas:
         bold: bool = False,
         anchor: str = "left",
     ) -> float:
-        """A line of text, y being its middle and x its left, middle or right; returns its width."""
+        """Draw a line of text and return its width; x: left, middle or right end; y: middle."""
         shade = _shade(text, max(8, round(size)), bold)
         high, wide = shade.shape[:2]
         left = round(x - {"left": 0.0, "middle": 0.5, "right": 1.0}[anchor] * wide)
@@ -96,14 +96,14 @@ class Canvas:
 
 
 def _exact(points: Any) -> NDArray[np.int32]:
-    """Places, (n, 2), in parts of a pixel, far ones brought nearer: OpenCV's numbers end."""
+    """Places, (n, 2), in parts of a pixel, limited to the range of OpenCV's integers."""
     near = np.clip(np.asarray(points, dtype=float), -20_000, 20_000)
     return np.asarray(np.rint(near * (1 << PARTS)), dtype=np.int32)
 
 
 @lru_cache(maxsize=KEPT_WORDS)
 def _shade(text: str, size: int, bold: bool) -> NDArray[np.float32]:
-    """How dark words are, 0 to 1, (height, width, 1)."""
+    """Opacity of drawn words, 0 to 1, (height, width, 1)."""
     from PIL import Image, ImageDraw
 
     font = _font(size, bold)
@@ -115,7 +115,7 @@ def _shade(text: str, size: int, bold: bool) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=32)
 def _font(size: int, bold: bool) -> Any:
-    """The font that comes with Matplotlib: it has σ and Δ, and needs nothing of the system."""
+    """The font that comes with Matplotlib: it has σ and Δ, and does not depend on the system."""
     import matplotlib
     from PIL import ImageFont
 
@@ -124,7 +124,7 @@ def _font(size: int, bold: bool) -> Any:
 
 
 def zigzag(x: float, top: float, bottom: float, half: float, turns: int) -> Array:
-    """A spring from top to bottom, (n, 2)."""
+    """Points, (n, 2), of a spring from top to bottom."""
     down = np.concatenate([[0.0, 0.1], np.linspace(0.15, 0.85, 2 * turns), [0.9, 1.0]])
     aside = np.concatenate([[0.0, 0.0], np.where(np.arange(2 * turns) % 2, -half, half), [0.0, 0.0]])
     return np.column_stack([x + aside, top + (bottom - top) * down])

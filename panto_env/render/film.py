@@ -1,4 +1,4 @@
-"""Films of passes above each other, such as several policies on one line under the same seed."""
+"""Films of one or several passes above each other, such as policies on one line under the same seed."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .moment import moment_of
 from .picture import Picture
 
 FASTEST = 25.0
-"""Frames per second that a film has at most."""
+"""Maximum frames per second of a film."""
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What of a pass a film shows, and how."""
+class Excerpt:
+    """The part of a pass that a film shows, and its frames."""
 
     begin: float  # s
     end: float  # s
@@ -32,11 +32,10 @@ class Shown:
     rate: float  # frames per second
 
 
-def shown(first: Filmed, first_span: int, seconds: float, slow_motion: float) -> Shown:
-    """What a film of a pass shows: so many seconds from the start of a span on.
+def excerpt(first: Filmed, first_span: int, seconds: float, slow_motion: float) -> Excerpt:
+    """The part of a pass for a film: a number of seconds from the start of a span on.
 
-    Frames are control steps, all of them or every so many-th. Raises InputError where the pass has no such
-    span.
+    Every n-th control step is a frame. Raises InputError where the pass does not have the span.
     """
     run, interval = first.run, first.control_interval
     begin = run.time_at(run.alignment.support(first_span - 1))
@@ -46,18 +45,18 @@ def shown(first: Filmed, first_span: int, seconds: float, slow_motion: float) ->
         )
     every = max(1, ceil(1 / (FASTEST * slow_motion * interval) - 1e-9))
     end = min(begin + seconds, float(run.time[-1]))
-    return Shown(begin, end, every, 1 / (every * interval * slow_motion))
+    return Excerpt(begin, end, every, 1 / (every * interval * slow_motion))
 
 
 def frames(
     filmed: Sequence[Filmed],
-    what: Shown,
+    what: Excerpt,
     size: tuple[int, int],
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[NDArray[np.uint8]]:
     """Frames, (height, width, 3), of passes above each other.
 
-    size: width and height of the film (px); progress: called with the share done.
+    size: width and height of the film (px). progress: called with the finished share.
     """
     width, height = size[0], size[1] // len(filmed)
     passes = [_Pass(each, figures_in_words(each, filmed[0]), (width, height)) for each in filmed]
@@ -75,7 +74,7 @@ def frames(
 
 
 class _Pass:
-    """One pass, drawn as it goes."""
+    """One pass that is drawn while it runs."""
 
     def __init__(self, filmed: Filmed, figures: dict[str, str], size: tuple[int, int]) -> None:
         run = filmed.run
@@ -87,30 +86,30 @@ class _Pass:
 
     @property
     def time(self) -> float:
-        """Since the start (s)."""
+        """Time since the start (s)."""
         return self.task.plant.of(0, Row.STEP) * self.task.plant.time_step
 
     def step(self) -> bool:
-        """One control step; whether there was one left."""
+        """Make one control step; False if the pass has ended."""
         return next(self._steps, None) is not None
 
     def frame(self) -> NDArray[np.uint8]:
-        """The picture now."""
+        """The present picture."""
         return self._picture.draw(moment_of(self.task, 0, self._title, self._figures))
 
 
 def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
-    """Mean and σ of a whole pass, and by how much its σ differs from that of the first one.
+    """Mean and σ of a whole pass, and the change of σ relative to the first pass.
 
-    The difference is told only of passes that differ in their control alone.
+    The change is given only for passes that differ just in their control.
     """
     run = filmed.run
     if run.terminated:
         return {"figures": "none: it ends early"}
     figures, spans = run.summary(), in_words(run.spans())
     values = {"mean": figures.mean, "std": figures.std}
-    told = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
+    texts = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
     if filmed is not first and not first.run.terminated and alike(filmed.run, first.run):
         change = 100 * (figures.std / first.run.summary().std - 1)
-        told[f"σ beside {first.title}"] = f"{change:+.1f} %"
-    return told
+        texts[f"σ relative to {first.title}"] = f"{change:+.1f} %"
+    return texts

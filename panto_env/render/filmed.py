@@ -14,18 +14,18 @@ from ..control.settings import run_settings
 from ..metrics.trajectory import Trajectory
 
 OF_CONTROL = ("version", "actuator", "sensors", "estimator", "known_pantograph")
-"""What of a run's settings may differ where two runs are told as one line under two controls."""
+"""Settings that may differ between two runs that count as the same line under two controls."""
 
 
 class Filmed(NamedTuple):
     """One pass of a film."""
 
-    title: str  # what a picture calls it
+    title: str  # name in the picture
     policy: Any
     settings: dict[str, Any]
     seed: int
-    run: Trajectory  # the whole pass, of which figures are told
-    file: str = ""  # that it was saved to; empty: it was not
+    run: Trajectory  # the whole pass, for its figures
+    file: str = ""  # of a saved run; empty for others
 
     @property
     def control_interval(self) -> float:
@@ -33,13 +33,13 @@ class Filmed(NamedTuple):
         return run_settings(self.settings).control_interval
 
     def check(self) -> None:
-        """Raise InputError where it is a saved run that comes out another one today."""
+        """Raise InputError where it is a saved run that cannot be repeated."""
         if self.file:
             check_made_anew(self.run, self.settings, self.file)
 
 
 def saved_passes(sources: Sequence[str]) -> dict[str, Filmed]:
-    """Those of the sources that are files of saved runs. Raises InputError where one cannot be read."""
+    """Passes of the sources that are files of saved runs. Raises InputError where one cannot be read."""
     found = {}
     for source in sources:
         if is_saved_run(source):
@@ -56,7 +56,7 @@ def policy_pass(policy: str, settings: dict[str, Any], seed: int) -> Filmed:
 
 
 def check_together(filmed: Sequence[Filmed]) -> None:
-    """Raise InputError unless passes can stand above each other: in step, the same spans at the same time."""
+    """Raise InputError unless passes can be shown together: same spans, speed and control interval."""
     first = filmed[0]
     for other in filmed[1:]:
         if other.run.alignment != first.run.alignment:
@@ -77,11 +77,11 @@ def check_together(filmed: Sequence[Filmed]) -> None:
 
 
 def alike(one: Trajectory, other: Trajectory) -> bool:
-    """Whether two runs differ in their control alone."""
+    """Whether two runs differ only in their control."""
     return _but_for_control(one) == _but_for_control(other)
 
 
 def _but_for_control(run: Trajectory) -> str:
-    """As text, in which what is no number is like itself, too."""
+    """A run's settings without its control, as text, in which nan equals nan."""
     settings = {name: value for name, value in run.settings.items() if name not in OF_CONTROL}
     return json.dumps([settings, run.design, run.seed, run.speed_kmh, run.nominal_force], sort_keys=True)

@@ -1,4 +1,4 @@
-"""Where everything in a frame lies: from metres and newtons to pixels. Nothing here draws."""
+"""Layout of a frame: from metres and newtons to pixels. Nothing here draws."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ TITLE, CHART, ROOF = 0.075, 0.30, 0.045
 """Shares of the frame's height: of the title, of the chart below, and of the train's roof."""
 PANTOGRAPH = 0.22
 """Share of the frame's height from the contact wire down to the roof."""
-LEAST_HEIGHT = 0.35
-"""That a picture shows above the contact wire at least (m)."""
+MINIMUM_HEIGHT = 0.35
+"""Minimum height that a picture shows above the contact wire (m)."""
 CHAIN = 0.55
-"""Share of the way from wire to roof over which the pantograph's masses are spread."""
+"""Share of the distance from wire to roof over which the pantograph's masses are spread."""
 ARROW = 0.11
-"""Length of the largest force's arrow, as a share of the frame's height."""
+"""Length of the maximum force's arrow, as a share of the frame's height."""
 ROUND_TO = (1, 2, 5, 10, 15, 20, 30, 50, 100, 200)
-"""Exaggerations of heights that are used: one that a person can remember."""
+"""Possible exaggerations of heights: round numbers that are easy to remember."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Of one frame: the pantograph stands still in it, the line passes by."""
+    """Layout of one frame: the pantograph stands still, the line passes by."""
 
     width: int  # px
     height: int  # px
@@ -36,9 +36,9 @@ class Layout:
 
     @classmethod
     def of(cls, moment: Moment, width: int, height: int) -> Layout:
-        """Of all frames of a line: the exaggeration is the largest round one by which its wires fit in."""
+        """Layout of all frames of a line, with the largest round exaggeration at which its wires fit in."""
         wires = moment.line.messenger if moment.line.messenger.size else moment.line.contact
-        tallest = max(LEAST_HEIGHT, float(wires.max()) if wires.size else 0.0)
+        tallest = max(MINIMUM_HEIGHT, float(wires.max()) if wires.size else 0.0)
         span = moment.alignment.mean_length
         per_metre = width / ((BEHIND + AHEAD) * span)
         room = (1 - TITLE - CHART - ROOF - PANTOGRAPH) * height
@@ -53,17 +53,17 @@ class Layout:
 
     @property
     def pantograph(self) -> float:
-        """Where the pantograph stands (px from the left)."""
+        """Place of the pantograph (px from the left)."""
         return self.per_metre * BEHIND * self.span
 
     @property
     def wire(self) -> float:
-        """Where height 0 is (px from the top)."""
+        """Place of height 0 (px from the top)."""
         return (1 - CHART - ROOF - PANTOGRAPH) * self.height
 
     @property
     def roof(self) -> float:
-        """Where the train's roof is (px from the top)."""
+        """Place of the train's roof (px from the top)."""
         return (1 - CHART - ROOF) * self.height
 
     @property
@@ -72,11 +72,11 @@ class Layout:
         return (1 - CHART + 0.045) * self.height, 0.975 * self.height
 
     def across(self, places: Array, position: float) -> Array:
-        """Pixels from the left of places along the line (m), the pantograph being at ``position`` (m)."""
+        """Pixels from the left for places along the line (m), with the pantograph at ``position`` (m)."""
         return self.pantograph + self.per_metre * (np.asarray(places) - position)
 
     def up(self, heights: Array | float) -> Array:
-        """Pixels from the top of heights (m)."""
+        """Pixels from the top for heights (m)."""
         return self.wire - self.exaggeration * self.per_metre * np.asarray(heights)
 
     def points(self, places: Array, heights: Array, position: float) -> Array:
@@ -84,16 +84,16 @@ class Layout:
         return np.column_stack([self.across(places, position), self.up(heights)])
 
     def forces(self, forces: Array | float, largest: float) -> Array:
-        """Pixels from the top of contact forces (N) in the chart, from 0 to beyond the limit."""
+        """Pixels from the top for contact forces (N) in the chart, from 0 to beyond the limit."""
         top, bottom = self.chart
         low, high = -0.06 * largest, 1.12 * largest
         shown = np.clip(forces, low, high)
         return bottom - (bottom - top) * (np.asarray(shown) - low) / (high - low)
 
     def chain(self, heights: Array) -> Array:
-        """Pixels from the top of the pantograph's masses, (masses,), by their heights (m), head first.
+        """Pixels from the top for the pantograph's masses, (masses,), from their heights (m), head first.
 
-        They stand evenly below each other in the first frame, and move from there as they do.
+        In the first frame they are evenly spaced; from there they move by the change of their heights.
         """
         count, heights = len(heights), heights - np.array(self.rest)
         apart = CHAIN * (self.roof - self.wire) * np.arange(count) / max(count - 1, 1)
@@ -105,5 +105,5 @@ class Layout:
 
 
 def lost(force: Array) -> NDArray[np.bool_]:
-    """Where contact is lost, (n,)."""
+    """Whether contact is lost, (n,)."""
     return np.asarray(force) <= 0

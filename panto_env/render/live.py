@@ -1,4 +1,4 @@
-"""A run shown in the terminal while it goes on."""
+"""A run shown in the terminal while it is simulated."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ INTERVAL = 0.1
 
 @contextmanager
 def live(console: Console, policy: str) -> Iterator[Callable[[Task], None]]:
-    """Show a task's first lane on a terminal while the body runs; the body calls what it gets with the task.
+    """Show a task's first lane on a terminal while the body runs; yields a function of the task.
 
-    policy: its name. The last picture stays. The cursor comes back however the body ends.
+    policy: its name. The last picture stays. The cursor is restored in any case.
     """
-    with Live(Text("making the line ready"), console=console, auto_refresh=False) as shown:
+    with Live(Text("preparing the line"), console=console, auto_refresh=False) as shown:
         latest: list[Task] = []
         drawn = 0.0
 

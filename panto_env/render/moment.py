@@ -1,4 +1,4 @@
-"""What a picture shows: one lane of a task at one moment, and its force up to then."""
+"""Content of a picture: one lane of a task at one moment, and its force up to then."""
 
 from __future__ import annotations
 
@@ -16,51 +16,51 @@ from ..plant.catenary.view import LineView
 from ..plant.state import Place, Row
 
 BEHIND, AHEAD = 1.3, 0.75
-"""How much of the line a picture shows behind and ahead of the pantograph (spans)."""
+"""Part of the line that a picture shows behind and ahead of the pantograph (spans)."""
 SETTLING = 0.5
-"""Time (s) before what is shown, from which the force is low-passed."""
+"""Time (s) for which the low-pass of the force runs before the shown part."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """One lane at one moment."""
+    """State of one lane at one moment."""
 
-    title: str  # what runs where
+    title: str  # names of pantograph, line and policy
     time: float  # since the start (s)
     speed: float  # of the train (m/s)
     position: float  # of the pantograph (m)
     alignment: Alignment  # of the line
     line: LineView
     masses: Array  # (masses,): head first (kg)
-    heights: Array  # (masses,): of each (m), 0 where no spring is strained and the head at height 0
+    heights: Array  # (masses,): displacement of each (m), 0 with unstrained springs and the head at height 0
     wire: float  # height of the contact wire above the pantograph (m)
-    places: Array  # (n,): where the force that is shown acted (m)
+    places: Array  # (n,): positions of the shown force (m)
     force: Array  # (n,): contact force there, raw (N)
     filtered: Array  # (n,): low-passed at 20 Hz as EN 50317 does, so 31 ms late (N)
     nominal_force: float  # N
     largest_force: float  # that EN 50367 allows (N)
     actuators: dict[Place, float]  # forces of those that there are (N)
     force_limit: float  # of an actuator (N)
-    figures: dict[str, str] = field(default_factory=dict)  # to be told beside, by name
+    figures: dict[str, str] = field(default_factory=dict)  # additional texts by name
 
 
 class Felt(NamedTuple):
     """The contact of a lane up to now, along the last part of the line."""
 
-    places: Array  # (n,): where it was (m)
+    places: Array  # (n,): positions (m)
     force: Array  # (n,): raw (N)
     filtered: Array  # (n,): low-passed at 20 Hz as EN 50317 does, so 31 ms late (N)
     head: Array  # (n,): height of the collector head (m)
 
 
 def position_of(task: Task, lane: int) -> float:
-    """Where a lane's pantograph is (m)."""
+    """Position of a lane's pantograph (m)."""
     plant = task.plant
     return float(plant.position(lane, int(plant.of(lane, Row.STEP)))[0])
 
 
 def felt(task: Task, lane: int, behind: float) -> Felt:
-    """The contact of a lane of a task that keeps its samples, up to so many spans behind it."""
+    """The contact of a lane of a task that keeps its samples; behind: length of the shown part (spans)."""
     plant = task.plant
     steps, speed, step = int(plant.of(lane, Row.STEP)), float(task.speed[lane]), plant.time_step
     length = behind * plant.alignment.mean_length
@@ -74,7 +74,7 @@ def felt(task: Task, lane: int, behind: float) -> Felt:
 
 
 def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Moment:
-    """What a lane of a task that keeps its samples is doing now."""
+    """Present moment of a lane of a task that keeps its samples."""
     plant = task.plant
     own = plant.run.table[0, lane]
     speed, position = float(task.speed[lane]), position_of(task, lane)

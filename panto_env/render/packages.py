@@ -1,4 +1,4 @@
-"""Packages of the extra 'render', asked for before anything of them is imported."""
+"""Check for the packages of the extra 'render', before any of them is imported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of a moment: the line and the pantograph above, the contact force that it has felt below."""
+"""The picture of a moment: line and pantograph above, contact force so far below."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222
 METAL, TRAIN, RAW = (70, 78, 88), (196, 204, 213), (186, 194, 203)
 FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
 NEAREST = 4
-"""Of places at which a wire is drawn (px)."""
+"""Minimum distance of the points of a wire (px)."""
 WORDS = 0.0222
 """Size of words, as a share of a frame's height; at 720 rows, 16 px."""
 
@@ -59,7 +59,7 @@ def _size(layout: Layout) -> float:
 
 
 def _draw_still(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """What does not change from frame to frame."""
+    """Draw the parts that do not change from frame to frame."""
     canvas.fill(GROUND)
     size, right = _size(layout), layout.pantograph
     canvas.words(0.015 * layout.width, 0.04 * layout.height, moment.title, INK, 1.35 * size, bold=True)
@@ -91,7 +91,7 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_scale(canvas: Canvas, layout: Layout) -> None:
-    """How long ten metres are along the line, and ten centimetres upwards; which droppers are slack."""
+    """Draw the scale: ten metres along the line, ten centimetres upwards, and the exaggeration."""
     size, right = _size(layout), 0.985 * layout.width
     y, long = 0.04 * layout.height, 10 * layout.per_metre
     high = 0.1 * layout.exaggeration * layout.per_metre
@@ -104,7 +104,7 @@ def _draw_scale(canvas: Canvas, layout: Layout) -> None:
 
 
 def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Masts and arms, wires, droppers; or the spring that a line is, where it has no wire."""
+    """Draw masts, arms, wires and droppers; for a line without wires, its spring."""
     line, at = moment.line, moment.position
     if not line.x.size:
         _draw_spring_line(canvas, layout, moment)
@@ -129,7 +129,7 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | None, slack: bool) -> None:
-    """What the wires are called, at the left; and what a bowed dropper is, while there is one."""
+    """Draw the names of the wires at the left, and of slack droppers while there is one."""
     size, x = 0.85 * _size(layout), 0.01 * layout.width
     canvas.words(x, float(contact[0, 1]) + size, "contact wire", QUIET, size)
     if upper is not None:
@@ -140,7 +140,7 @@ def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | N
 
 
 def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: Array | None) -> None:
-    """A mast behind the line, its arm, and the steady arm of the contact wire."""
+    """Draw a mast behind the line, its arm, and the steady arm of the contact wire."""
     away, scale = 0.018 * layout.width, layout.height / 720
     low = float(np.interp(x, contact[:, 0], contact[:, 1]))
     high = low - 40 * scale if upper is None else float(np.interp(x, upper[:, 0], upper[:, 1]))
@@ -156,7 +156,7 @@ def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: 
 
 
 def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """A line that is but a spring above the pantograph, and where its spans begin."""
+    """Draw a line that is only a spring above the pantograph, and the limits of its spans."""
     x, y = layout.pantograph, float(layout.up(moment.wire))
     ceiling = 0.16 * layout.height
     canvas.line([(x - 60, ceiling), (x + 60, ceiling)], METAL, 3)
@@ -172,7 +172,7 @@ def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_pantograph(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Collector head, masses with the springs between them, and the frame's two arms down to the roof."""
+    """Draw collector head, masses with the springs between them, and the frame's two arms to the roof."""
     x, scale = layout.pantograph, layout.height / 720
     chain = layout.chain(moment.heights).tolist()
     head, frame = chain[0], chain[-1]
@@ -193,7 +193,7 @@ def _draw_pantograph(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """An arrow for each actuator's force: up where it presses the pantograph against the wire."""
+    """Draw an arrow for each actuator's force, upwards where it increases the contact force."""
     chain, scale = layout.chain(moment.heights).tolist(), layout.height / 720
     for place, force in moment.actuators.items():
         y = chain[0] if place is Place.HEAD else chain[-1]
@@ -210,7 +210,7 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_force(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """The contact force where it was felt, below the place on the line."""
+    """Draw the contact force below the places where it acted."""
     if len(moment.places) < 2:
         return
     x, largest = layout.across(moment.places, moment.position), moment.largest_force
@@ -225,7 +225,7 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _rows(moment: Moment) -> dict[str, str]:
-    """Numbers that stand to the right of the chart, by name."""
+    """Numbers to the right of the chart, by name."""
     span = moment.alignment.span_of(moment.position)
     force = f"{moment.filtered[-1]:.0f} N" if moment.filtered.size else "–"
     return {
@@ -239,7 +239,7 @@ def _rows(moment: Moment) -> dict[str, str]:
 
 
 def _draw_rows(canvas: Canvas, layout: Layout, words: list[str], *, named: bool) -> None:
-    """The names of these numbers, which stand still, or the numbers."""
+    """Draw the names of these numbers, which do not change, or the numbers."""
     size, y = _size(layout), layout.chart[0]
     x = layout.pantograph + 0.03 * layout.width if named else 0.985 * layout.width
     anchor, colour = ("left", QUIET) if named else ("right", INK)

@@ -15,19 +15,19 @@ from ..plant.state import Row
 from .moment import felt, position_of
 
 SPANS = 3.0
-"""How much of the line is shown (spans)."""
+"""Length of the shown part of the line (spans)."""
 FORCE_ROWS, HEIGHT_ROWS = 10, 6
 NARROW, WIDE = 40, 120
-"""Columns that are drawn at least and at most."""
+"""Minimum and maximum number of columns."""
 AXIS = 9
-"""Columns of the numbers beside a chart."""
+"""Columns for the numbers next to a chart."""
 EMPTY = "\u2800"
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
-"""Of a character of Unicode's Braille patterns: four rows of two dots."""
+"""Bits of the dots in a character of Unicode's Braille patterns: four rows of two."""
 
 
 class Strip:
-    """What a task's first lane has felt, drawn as wide as the terminal is."""
+    """Contact force and head height of a task's first lane, drawn as wide as the terminal."""
 
     def __init__(self, task: Task, policy: str) -> None:
         """policy: its name. The task must keep its samples."""
@@ -63,11 +63,11 @@ class Strip:
             return where
         return (
             f"{where}, span {self._alignment.span_of(self._felt.places[-1])}  force {force[-1]:.0f} N  "
-            f"of what is shown: mean {force.mean():.0f} N, σ {force.std():.0f} N"
+            f"shown part: mean {force.mean():.0f} N, σ {force.std():.0f} N"
         )
 
     def _force_chart(self, across: Array, columns: int) -> list[Text]:
-        """The low-passed force from 0 to beyond its limit, and where contact was lost."""
+        """The low-passed force from 0 to beyond its limit, with marks where contact was lost."""
         seen = self._felt
         highest = max(self._limit, float(seen.filtered.max(initial=0.0)))
         lines = chart(across, seen.filtered, (0.0, 1.1 * highest), FORCE_ROWS, columns, self._limit)
@@ -84,10 +84,10 @@ def chart(
     columns: int,
     line: float | None = None,
 ) -> list[Text]:
-    """A curve in Braille, as rows of text, with the ends of its extent beside it.
+    """A curve in Braille, as rows of text, labelled with the ends of its extent.
 
-    across: (n,), rising, in columns from the left; values: (n,); extent: lowest and highest value drawn, at
-    whose edge lies what is beyond; line: value at which a level line is drawn.
+    across: (n,), increasing, in columns from the left. values: (n,). extent: minimum and maximum drawn value;
+    others are drawn at the edge. line: value of a level line.
     """
     low, high = extent
     dots = np.zeros((4 * rows, 2 * columns), dtype=bool)
@@ -115,7 +115,7 @@ def chart(
 
 
 def _characters(dots: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """Braille of dots, (4 rows, 2 columns), as (rows, columns)."""
+    """Braille characters, (rows, columns), of dots, (4 rows, 2 columns)."""
     rows, columns = dots.shape[0] // 4, dots.shape[1] // 2
     cells = dots.reshape(rows, 4, columns, 2).transpose(0, 2, 1, 3)
     codes = ord(EMPTY) + (cells * DOTS).sum(axis=(2, 3))
@@ -127,7 +127,7 @@ def _column(across: Array, columns: int) -> NDArray[np.intp]:
 
 
 def _round(heights: Array) -> tuple[float, float]:
-    """Tens of millimetres about heights (mm)."""
+    """Extent of heights (mm), in tens of millimetres."""
     if not heights.size:
         return 0.0, 10.0
     low, high = 10 * np.floor(heights.min() / 10), 10 * np.ceil(heights.max() / 10)

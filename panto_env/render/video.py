@@ -1,4 +1,4 @@
-"""Frames written as a film: MP4 that every browser plays, or GIF."""
+"""Writing of frames as a film: MP4 for every browser, or GIF."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .packages import check_packages
 
 Frames = Iterable[NDArray[np.uint8]]
 FILMS = (".mp4", ".gif")
-"""Suffixes of files that a film can be written to."""
+"""Suffixes of files for films."""
 QUALITY = "23"
-"""Of H.264, smaller is better and larger as a file; its usual one."""
+"""Quality of H.264, its usual value; a smaller one gives a better picture and a larger file."""
 COLOURS = 64
-"""Of a GIF."""
+"""Number of colours of a GIF."""
 
 
 def write_film(frames: Frames, path: str | Path, rate: float, size: tuple[int, int]) -> None:
     """Write frames, each (height, width, 3), as a film, whole or not at all.
 
-    rate: frames per second; size: width and height (px), even numbers for MP4. Raises InputError for a
-    name that is not a film's, or where the extra 'render' is missing.
+    rate: frames per second. size: width and height (px), even numbers for MP4. Raises InputError for a name
+    with another suffix, or where the extra 'render' is missing.
     """
     check_output(path, FILMS)
     write = _write_gif if Path(path).suffix.lower() == ".gif" else _write_mp4
@@ -59,7 +59,7 @@ def _write_gif(frames: Frames, path: Path, rate: float, size: tuple[int, int]) -
         palette = None
         for frame in frames:
             image = Image.fromarray(frame)
-            if palette is None:  # one for all: colours do not flicker, and the file is smaller
+            if palette is None:  # the same for all frames: no flicker, and a smaller file
                 palette = image.quantize(COLOURS)
             yield image.quantize(palette=palette, dither=Image.Dither.NONE)
 

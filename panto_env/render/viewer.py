@@ -1,4 +1,4 @@
-"""What an environment draws with: a picture per lane, and a window where one is asked for."""
+"""Drawing of an environment: a picture per lane, and a window if requested."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .window import Window
 
 SHOWN = ("mean", "std", "contact_loss")
-"""Figures of the episode so far that stand beside the picture."""
+"""Figures of the episode so far that are shown next to the picture."""
 
 
 class Viewer:
@@ -31,14 +31,14 @@ class Viewer:
         self._window: Window | None = None
 
     def frame(self, task: Task, lane: int, title: str, reward: float) -> NDArray[np.uint8]:
-        """A lane of a task now, (height, width, 3); reward: summed over the episode so far."""
+        """Present frame of a lane of a task, (height, width, 3); reward: sum over the episode so far."""
         if lane not in self._pictures:
             self._pictures[lane] = Picture(*self._size)
         figures = figures_so_far(task, lane) | {"reward so far": f"{reward:.2f}"}
         return self._pictures[lane].draw(moment_of(task, lane, title, figures))
 
     def show(self, frame: NDArray[np.uint8], title: str, rate: float) -> None:
-        """Show a frame in a window, and wait until it is time for the next; rate: frames per second."""
+        """Show a frame in a window, and wait for the time of the next one; rate: frames per second."""
         from .window import Window
 
         if self._window is None:
@@ -53,12 +53,12 @@ class Viewer:
 
 
 def figures_so_far(task: Task, lane: int) -> dict[str, str]:
-    """Figures of a lane's episode so far, in words; none before its first step, or once it has diverged."""
+    """Figures of a lane's episode so far, as text; none before the first step, or after it has diverged."""
     if not task.episode.table[lane, TaskRow.SAMPLES]:
         return {}
     try:
         values = task.figures(lane).as_dict()
     except InputError:
         return {}
-    told = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in SHOWN}
-    return {f"{LABELS[name].short} so far": value for name, value in told.items()}
+    texts = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in SHOWN}
+    return {f"{LABELS[name].short} so far": text for name, text in texts.items()}

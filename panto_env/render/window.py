@@ -1,4 +1,4 @@
-"""A window that shows frames, by pygame."""
+"""A window that shows frames, with pygame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Window:
     def __init__(self, size: tuple[int, int], title: str) -> None:
         """size: width and height (px). Raises InputError where pygame or a screen is missing."""
         check_packages("pygame")
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # else it greets on standard output
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # no greeting on standard output
         import pygame
 
         self._pygame = pygame
@@ -32,7 +32,7 @@ class Window:
         self._clock = pygame.time.Clock()
 
     def show(self, frame: NDArray[np.uint8], rate: float) -> None:
-        """Show a frame, (height, width, 3), so long after the one before that there are ``rate`` a second."""
+        """Show a frame, (height, width, 3), at the right time for ``rate`` frames per second."""
         height, width, _ = frame.shape
         picture = self._pygame.image.frombuffer(frame.tobytes(), (width, height), "RGB")
         self._screen.blit(picture, (0, 0))
@@ -41,5 +41,5 @@ class Window:
         self._pygame.display.flip()
 
     def close(self) -> None:
-        """Close it."""
+        """Close the window."""
         self._pygame.display.quit()

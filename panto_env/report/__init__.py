@@ -1,4 +1,4 @@
-"""A report of runs for engineers: one page of HTML that holds all it needs."""
+"""A report of runs for engineers: one self-contained page of HTML."""
 
 from .page import save
 

@@ -1,4 +1,4 @@
-"""Charts of a report, as SVG that lies within the page."""
+"""Charts of a report, as SVG inside the page."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HIGHEST = 25.0
-"""Frequency up to which a spectrum is drawn (Hz)."""
+"""Maximum frequency of the spectra (Hz)."""
 
 
 def drawn(draw: Callable[[Axes], Any], height: float = 3.2) -> str:
-    """What a function draws into axes, as SVG, the same text for the same drawing."""
+    """A function's drawing as SVG; the same drawing gives the same text."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -64,7 +64,7 @@ def force_along(one: Findings) -> str:
 def force_folded(names: Mapping[Findings, str]) -> str:
     """Contact force over the place within the span: median, minimum and maximum of all spans.
 
-    names: runs, and what each is called.
+    names: runs and their names.
     """
 
     def draw(axes: Axes) -> None:
@@ -85,7 +85,10 @@ def force_folded(names: Mapping[Findings, str]) -> str:
 
 
 def spectrum(names: Mapping[Findings, str]) -> str:
-    """Amplitudes of the force of runs, by name, and what passes per span and per dropper in the first one."""
+    """Amplitudes of the force of runs, with the span and dropper frequencies of the first one.
+
+    names: runs and their names.
+    """
     first = next(iter(names))
     of = f", {names[first]}" if len(names) > 1 else ""
 
@@ -111,7 +114,7 @@ def spectrum(names: Mapping[Findings, str]) -> str:
 
 
 def uplifts(names: Mapping[Findings, str]) -> str:
-    """Largest uplift of runs, by name, at each support."""
+    """Maximum uplift at each support; names: runs and their names."""
     supports = sorted({number for one in names for number, _, _ in one.uplifts})
 
     def draw(axes: Axes) -> None:
@@ -121,7 +124,7 @@ def uplifts(names: Mapping[Findings, str]) -> str:
             width = 0.8 / len(names)
             at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
             axes.bar(at, heights, width, color=series_colour(k), label=names[one])
-        axes.set(xlabel="support", ylabel="largest uplift (mm)", xticks=supports)
+        axes.set(xlabel="support", ylabel="maximum uplift (mm)", xticks=supports)
         legend_above(axes, 4)
 
     return drawn(draw, 2.6)
@@ -141,10 +144,10 @@ def stiffness(one: Findings) -> str:
 
 
 def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
-    """What each run is called beside the others: by what differs, and by its file where that is not told."""
+    """A distinct name for each run, from what differs between runs, if necessary with its file."""
     columns = list(zip(*map(_parts, found), strict=True))
-    told = [column for column in columns if len({*column}) > 1] or [columns[2]]
-    names = [", ".join(words) for words in zip(*told, strict=True)]
+    differing = [column for column in columns if len({*column}) > 1] or [columns[2]]
+    names = [", ".join(words) for words in zip(*differing, strict=True)]
     if len({*names}) < len(names):
         names = [f"{name} ({one.file})" for name, one in zip(names, found, strict=True)]
     return dict(zip(found, names, strict=True))

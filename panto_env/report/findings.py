@@ -1,4 +1,4 @@
-"""What a report tells of a run beside its figures: supports, droppers, losses of contact, elasticity."""
+"""Content of a report besides a run's figures: supports, droppers, contact losses, elasticity."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from ..plant.pantograph.schema import PantographData
 
 FOLDS = 240
-"""Places of a span at which spans are compared."""
+"""Number of places in a span at which spans are compared."""
 
 
 class Dropper(NamedTuple):
-    """One dropper of a span, over all evaluated spans, while the train is in its span."""
+    """Forces of one dropper of a span, over all evaluated spans, while the train is in its span."""
 
     position: float  # from the support (m)
     largest: float  # N
@@ -34,7 +34,7 @@ class Dropper(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """One loss of contact."""
+    """One contact loss."""
 
     position: float  # where it begins (m)
     duration: float  # s
@@ -51,14 +51,14 @@ class Folded(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All of one run; like itself alone."""
+    """All findings of one run; two objects are never equal."""
 
     run: Trajectory
     file: str
 
     @cached_property
     def covered(self) -> Spans | None:
-        """The spans that figures are of; None where the run ended early or is too short."""
+        """The evaluated spans; None where the run ended early or is too short."""
         try:
             return self.run.spans()
         except InputError:
@@ -66,29 +66,29 @@ class Findings:
 
     @cached_property
     def figures(self) -> Figures | None:
-        """Figures of these spans."""
+        """Figures of the evaluated spans."""
         return None if self.covered is None else self.run.summary()
 
     @cached_property
     def criteria(self) -> list[Criterion]:
-        """Requirements and what is told beside."""
+        """Requirements, and values without limits."""
         return [] if self.covered is None else self.run.compliance()
 
     @cached_property
     def line(self) -> Any:
-        """The line, by value. Raises InputError where the file does not hold it."""
+        """Data of the line. Raises InputError where the file does not hold them."""
         return CATENARIES[self._design("catenary")["kind"]].schema.model_validate(self._design("catenary"))
 
     @cached_property
     def pantograph(self) -> PantographData:
-        """The pantograph, by value. Raises InputError where the file does not hold it."""
+        """Data of the pantograph. Raises InputError where the file does not hold them."""
         return PantographData.model_validate(self._design("pantograph"))
 
     def _design(self, part: str) -> dict[str, Any]:
         if part not in self.run.design:
             raise InputError(
                 f"{self.file} was written by an older version, without its line and pantograph; simulate it "
-                "anew with `panto simulate --output`."
+                "again with `panto simulate --output`."
             )
         return dict(self.run.design[part])
 
@@ -99,7 +99,7 @@ class Findings:
 
     @cached_property
     def filtered(self) -> Array:
-        """The contact force behind EN 50317's filter (N), of the whole run."""
+        """The contact force of the whole run behind EN 50317's filter (N)."""
         return low_pass(self.run.contact_force, self.run.time_step)
 
     @cached_property
@@ -117,7 +117,7 @@ class Findings:
 
     @cached_property
     def uplifts(self) -> list[tuple[int, float, float]]:
-        """Support, its place (m) and its largest uplift (m), of the evaluated spans and both ends."""
+        """Number, position (m) and maximum uplift (m) of the supports of the evaluated spans."""
         run = self.run
         begin, end = run.position[self.inside][[0, -1]]
         stride = 1.5 * run.stride
@@ -147,7 +147,7 @@ class Findings:
 
     @cached_property
     def losses(self) -> list[Loss]:
-        """Losses of contact in the evaluated spans."""
+        """Contact losses in the evaluated spans."""
         run = self.run
         lost = (run.contact_force[self.inside] <= 0).astype(int)
         edges = np.diff(np.concatenate([[0], lost, [0]]))

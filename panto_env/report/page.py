@@ -1,4 +1,4 @@
-"""The page of one run or several: tables and charts in one file, the same bytes for the same runs."""
+"""The page of one or several runs: tables and charts in one file, the same bytes for the same runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .template import page_template
 from .words import ACCURACY, FILTER, LEFT_OUT
 
 MOST = 8
-"""Runs on one page: more cannot be told apart."""
+"""Maximum number of runs on one page: more cannot be distinguished."""
 
 
 def page(found: Sequence[Findings]) -> str:
@@ -30,7 +30,7 @@ def page(found: Sequence[Findings]) -> str:
     Raises InputError where there are too many runs, or one does not hold its line and pantograph.
     """
     if not 1 <= len(found) <= MOST:
-        raise InputError(f"A report is of 1 to {MOST} runs, not {len(found)}.")
+        raise InputError(f"A report shows 1 to {MOST} runs, not {len(found)}.")
     template = page_template("panto_env.report", number=number, digits=digits, limits=limits_in_words)
     names = charts.names_of(found)
     judged = {one: name for one, name in names.items() if one.figures is not None}
@@ -58,9 +58,9 @@ def page(found: Sequence[Findings]) -> str:
 
 
 def save(files: Sequence[str | Path], path: str | Path) -> None:
-    """Write the page of runs in files, whole or not at all.
+    """Write the page of saved runs, whole or not at all.
 
-    Raises InputError for a name that is not a page's, or files that are no runs.
+    Raises InputError for a name with another suffix, or files that are not runs.
     """
     check_output(path, PAGES)
     found = [Findings(Trajectory.load(file), Path(file).name) for file in files]
@@ -70,12 +70,12 @@ def save(files: Sequence[str | Path], path: str | Path) -> None:
 
 
 def number(value: float, digits: int = 1) -> str:
-    """A number with so many digits after the point, or a dash where there is none."""
+    """A number with a given number of decimals, or a dash where it is not finite."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
 
 
 def digits(value: float) -> str:
-    """The same with as many digits as its size wants."""
+    """A number with one decimal from 10 on, with three below."""
     return number(value, 1 if abs(value) >= 10 else 3)
 
 
@@ -86,9 +86,10 @@ def _title(found: Sequence[Findings]) -> str:
 
 
 def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]]:
-    """Of each different line or pantograph the first run on it, and the files of all; part: which of both.
+    """For each different line or pantograph its first run, and the files of all its runs.
 
-    By value: a file of one's own may have been edited between two runs, and kept its name.
+    part: "line" or "pantograph". They are compared by value: a user's file may have been edited between two
+    runs under the same name.
     """
     alike: dict[str, list[Findings]] = {}
     for one in found:
@@ -97,7 +98,7 @@ def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]
 
 
 def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:
-    """Each criterion of any run, and what it is in each; None where a run has none of it."""
+    """Each criterion of any run, and the criteria of all runs with its key; None where a run has none."""
     by_key = [{each.key: each for each in one.criteria} for one in found]
     keys = dict.fromkeys(key for criteria in by_key for key in criteria)
     rows = []

@@ -1,4 +1,4 @@
-"""Where the templates of pages come from, and how they treat what they are given."""
+"""Loading of the templates of pages, with escaping."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ if TYPE_CHECKING:
 
 
 def page_template(package: str, **filters: Callable[..., Any]) -> Template:
-    """The template of a package's page, with filters of its own.
+    """The template of a package's page, with additional filters.
 
-    Everything that it is given is escaped, since it may come from anyone's file; a name that is not given is
-    an error.
+    All values are escaped, since they may come from untrusted files; an undefined name is an error.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 

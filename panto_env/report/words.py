@@ -1,4 +1,4 @@
-"""Sentences that a report must hold: what the model leaves out, and how its figures are meant."""
+"""Fixed sentences of a report: limits of the model, accuracy, and meaning of its figures."""
 
 LEFT_OUT = """
 Stitch wires, stagger and the lateral plane, longitudinal motion of droppers and arms, large rotations,
@@ -6,13 +6,14 @@ aerodynamic force on the wires, temperature. Motion is linear about the static s
 droppers and the unilateral contact. A line is anchored at both ends; this influences its first and last
 spans. EN 50318:2018 is not claimed.
 """.strip()
-"""As in docs/validation.md, which a test compares."""
+"""The same text as in docs/validation.md; a test compares them."""
 ACCURACY = """
-By default grid and time step leave σ, maximum and minimum within about 1 % of converged ones, contact loss
-within 0.1 points; a contact harder than 100 kN/m, or settings coarser than the default, leave more, and the
-run warned of it. The model itself is held against EN 50318:2002 and an independent finite-element model.
+With the default grid and time step σ, maximum and minimum are within about 1 % of converged values, contact
+loss within 0.1 points; a contact harder than 100 kN/m, or settings coarser than the default, have larger
+errors, and the run has warned of them. The model itself is validated against EN 50318:2002 and an
+independent finite-element model.
 """.strip()
 FILTER = """
-Force statistics are of the contact force behind EN 50317's low-pass (20 Hz, sixth order); losses of contact
-are of the raw force.
+Force statistics use the contact force behind EN 50317's low-pass (20 Hz, sixth order); contact losses use
+the raw force.
 """.strip()

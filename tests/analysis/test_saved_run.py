@@ -156,7 +156,7 @@ def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path
     second = policy_pass("passive", first.settings, first.seed)
     check_together([first, second])
     assert first.title == "pd (run.parquet)"
-    change = figures_in_words(second, first)["σ beside pd (run.parquet)"]
+    change = figures_in_words(second, first)["σ relative to pd (run.parquet)"]
     ratio = second.run.summary().std / first.run.summary().std
     assert float(change.removesuffix(" %")) == pytest.approx(100 * (ratio - 1), abs=0.06)
     told = film(kept[2], "passive", "--output", output, "--size", 320, 320)
@@ -192,7 +192,7 @@ def test_what_cannot_stand_above_each_other_is_refused(kept, tmp_path):
     )
     assert "the same control_interval (s)" in film(run, finer, "--output", output)
     told = film(run, "--output", output, "--speed", 250, "--line-spans", 30, "--seed", 1)
-    assert f"are those of {run}; leave out --speed, --line-spans, --seed" in told
+    assert f"takes all settings from {run}; leave out --speed, --line-spans, --seed" in told
     assert "nowhere.parquet does not exist" in film(tmp_path / "nowhere.parquet", "--output", output)
     assert not output.exists()
 

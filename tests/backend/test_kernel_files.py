@@ -126,7 +126,7 @@ def test_where_the_disk_is_full_it_runs_and_says_that_nothing_is_kept(call):
 
     told, said = call(preexec_fn=no_room)
     assert told == ["4.5", "0"]
-    assert "Compiled kernels cannot be kept in" in said
+    assert "Compiled kernels cannot be stored in" in said
     assert "Traceback" not in said
     assert call()[0] == ["4.5", "0"]
     assert call()[0] == ["4.5", "1"]

@@ -43,7 +43,7 @@ OUTPUTS = {
 }
 """By option: the command without it, whether it names a file or a folder, and a suffix that it may have."""
 OF_FILES = {
-    "no folder": ("nowhere/out{suffix}", "there is not a folder nowhere, so make it first"),
+    "no folder": ("nowhere/out{suffix}", "there is no folder nowhere, so make it first"),
     "a file for its folder": ("file/out{suffix}", "is not a folder"),
     "a folder of its name": ("folder{suffix}", "it is a folder"),
     "a pipe": ("pipe{suffix}", "it is not a regular file"),
@@ -133,9 +133,7 @@ def test_every_output_of_every_command_is_tried():
 
 
 def test_an_argument_that_can_t_be_written_is_refused(folder):
-    assert "there is not a folder nowhere" in refused(
-        ["export", "model.safetensors", "nowhere/out.safetensors"]
-    )
+    assert "there is no folder nowhere" in refused(["export", "model.safetensors", "nowhere/out.safetensors"])
     assert "must end in .safetensors" in refused(["export", "model.safetensors", "out.onnx"])
 
 

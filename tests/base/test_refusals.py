@@ -77,7 +77,7 @@ def diverging(monkeypatch):
 
 
 def test_a_run_that_diverges_gives_no_figures(diverging):
-    with pytest.raises(InputError, match="diverged, so it has no result; take a time_step below"):
+    with pytest.raises(InputError, match="diverged, so it has no result; use a time_step below"):
         simulate(**diverging)
 
 
@@ -85,7 +85,7 @@ def test_an_episode_that_diverges_ends_and_has_no_figures(diverging):
     env = gymnasium.make("panto_env:Pantograph-v0", **BARE | diverging)
     env.reset(seed=0)
     still, ended = np.zeros(1, dtype=np.float32), False
-    with pytest.warns(AccuracyWarning, match="diverged, so it has no result; take a time_step below"):  # noqa: PT031 - at which step is not known
+    with pytest.warns(AccuracyWarning, match="diverged, so it has no result; use a time_step below"):  # noqa: PT031 - at which step is not known
         while not ended:
             _, _, *ends, info = env.step(still)
             ended = any(ends)
@@ -201,7 +201,7 @@ LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
     with pytest.raises(
-        InputError, match=r"84,960,000 time steps with 999 supports would take 1,368.9 GB, and"
+        InputError, match=r"84,960,000 time steps with 999 supports would take 1,368.9 GB, but"
     ):
         simulate(**LONG, record_droppers=False)
 
@@ -217,7 +217,7 @@ def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypa
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("nowhere/a", "there is not a folder nowhere, so make it first"),
+        ("nowhere/a", "there is no folder nowhere, so make it first"),
         ("own.py/a", "own.py is not a folder"),
         ("folder", "it is a folder"),
     ],

@@ -211,7 +211,7 @@ def test_a_line_of_the_catalogue_is_a_start_for_one_of_yours(tmp_path):
     given = load_catenary("re250").model_dump(exclude={"name"})
     assert load_catenary(mine).model_dump(exclude={"name"}) == given
     for arguments, words in (
-        (["--toml"], "Name a line or a pantograph"),
+        (["--toml"], "Give the name of a line or a pantograph"),
         (["pd", "--toml"], "is called 'pd'"),
     ):
         refused = CliRunner().invoke(make_app(), ["list", *arguments])

@@ -108,7 +108,7 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     )  # fmt: skip
     assert shown.returncode == 0, shown.stderr
     assert "from displacements, periodic" in " ".join(shown.stdout.split())
-    assert "to be believed" in shown.stdout
+    assert "reliable" in shown.stdout
 
 
 def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):

@@ -42,11 +42,11 @@ class ConductorRail:
     wave_speed = np.inf
     length = np.inf
 
-    def __init__(self, data, *, lanes, spans, numerics, runs):
+    def __init__(self, data, *, lanes, collectors, spans, numerics, runs):
         refuse_defects(data, runs.conditions)
         self.time_step = numerics.time_step or 5e-3
         self.line, self.wire = RailLine(1 / data.stiffness), RailWire(np.zeros(lanes))
-        self.usual_end = spans * data.span_length
+        self.usual_end = data.alignment(spans).length
         self.supports = self.droppers = np.zeros(0)
         self.start_point = StartPoint(0.0, 0.0, self.line.compliance)
 

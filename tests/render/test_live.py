@@ -169,6 +169,6 @@ def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
 def test_without_a_terminal_it_says_so_and_goes_on():
     told = panto("simulate", "--live", "--catenary", "periodic-stiffness", "--pantograph", "three-mass")
     assert told.returncode == 0
-    assert told.stderr == "panto: --live needs a terminal to draw in; the run goes on without.\n"
+    assert told.stderr == "panto: --live needs a terminal to draw in; the run continues without.\n"
     assert "standard deviation" in told.stdout
     assert "height of the head" not in told.stdout

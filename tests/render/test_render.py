@@ -20,7 +20,7 @@ from panto_env.plant.state import Place, Row
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import frames, shown
+from panto_env.render.film import excerpt, frames
 from panto_env.render.filmed import policy_pass
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
@@ -255,7 +255,7 @@ def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
     command = ["film", "passive", "pd", "--output", str(path), "--size", "640", "480", "--seconds", "0.3"]
     result = CliRunner().invoke(make_app(), [*command, "--line-spans", "14", "--slow-motion", "5"])
     assert result.exit_code == 0, result.output
-    assert "20 frames per second, 5 times slower than life" in result.output
+    assert "20 frames per second, 5 times slower than real" in result.output
     if suffix == ".mp4":
         meta, number = read(path)
         assert meta["size"] == (640, 480)
@@ -273,7 +273,7 @@ def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
 def test_a_film_shows_the_pass_that_simulate_makes():
     settings = {"speed_kmh": 300.0, "spans": 14}
     filmed = policy_pass("pd", settings, 2)
-    what = shown(filmed, 10, 0.2, 4.0)
+    what = excerpt(filmed, 10, 0.2, 4.0)
     assert what.begin == pytest.approx(9 * 60 / (300 / 3.6))
     (first, *_) = frames([filmed], what, SIZE)
     task = Task(run_settings(settings))
@@ -284,7 +284,7 @@ def test_a_film_shows_the_pass_that_simulate_makes():
 def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
     short = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 200.0}
     with pytest.raises(InputError, match="before span 10; begin in an earlier one"):
-        shown(policy_pass("passive", short, 0), 10, 1.0, 1.0)
+        excerpt(policy_pass("passive", short, 0), 10, 1.0, 1.0)
     with pytest.raises(InputError, match=r"must end in one of \.mp4, \.gif"):
         write_film([], tmp_path / "film.avi", 25, SIZE)
     for arguments, words in (

@@ -146,7 +146,7 @@ def test_a_browser_shows_the_values(file, found, tmp_path):
     assert value == pytest.approx(figures.std, abs=0.05)
     assert margin == pytest.approx(0.3 * figures.mean - figures.std, abs=0.05)
     assert ("NOT KEPT" in row) == (figures.std > 0.3 * figures.mean)
-    assert float(re.search(r'id="unevenness">([\d.]+)', shown)[1]) == pytest.approx(
+    assert float(re.search(r'id="non-uniformity">([\d.]+)', shown)[1]) == pytest.approx(
         found.elasticity[2], abs=0.05
     )
     assert shown.count("<svg") == 5

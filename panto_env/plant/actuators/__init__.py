@@ -38,7 +38,7 @@ ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": LaggedActuator(),
     # Published active pantographs: delay 4-5 ms, lag 15-40 ms, about 2500 N/s, +-80 to +-100 N.
     "realistic": LaggedActuator(delay=0.005, lag=0.015, rate_limit=2500.0),
-    # Paper 2's, in the joints of the collector head: values and their sources stand in ``motor/schema.py``.
+    # Paper 2's, in the joints of the collector head: values and their sources are in ``motor/schema.py``.
     "head-motor": MotorActuator(),
 }
 

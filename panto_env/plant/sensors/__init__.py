@@ -41,8 +41,8 @@ SENSORS: dict[str, type[SensorSettings]] = {name: import_module(f".{name}", __na
 
 # Force and displacement as published; the velocity's is an own choice: an accelerometer of 0.01 m/s^2
 # integrated over some seconds. An odometer's bounds in ETCS (Subset-041) are 5 m and 5 % of the way
-# (recalled). Within them all is own choice: a wheel whose diameter is known within 1 %, two standard
-# deviations; hardly any slip; masts detected within 0.3 m and speed within 0.7 km/h, likewise.
+# (recalled). Values within them are own choices: a wheel diameter known within 1 %, two standard deviations;
+# hardly any slip; masts detected within 0.3 m and speed read within 0.7 km/h, also two standard deviations.
 _REALISTIC = DelayedSensors(
     force_noise=2.0,
     displacement_noise=2e-5,

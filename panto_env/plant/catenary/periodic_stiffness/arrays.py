@@ -1,4 +1,4 @@
-"""The arrays of a line of periodic stiffness: its constants alone, since nothing moves."""
+"""Arrays of a line of periodic stiffness: only its constants, since nothing moves."""
 
 from __future__ import annotations
 
