@@ -92,7 +92,7 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
             whole = isinstance(cause, InputError) or not words.startswith("must ")
             return Complaint(key, words, "" if whole else given, whole)
         case "tuple_type":
-            return Complaint(key, f"must be a list, e.g. [{given}]", "", False)
+            return Complaint(key, f"must be a list, such as [{given}]", "", False)
         case "too_long":
             return Complaint(key, f"must hold at most {problem['ctx']['max_length']} values", "", False)
         case other:

@@ -140,7 +140,7 @@ def _places(
 def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> float:
     if not unit:
         raise InputError(
-            f"Column {name} of {path} has no unit; write it in the header, e.g. "
+            f"Column {name} of {path} has no unit; write it in the header, such as "
             f"'{name} ({column.example})', or give --unit."
         )
     if unit not in column.units:

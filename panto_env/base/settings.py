@@ -56,7 +56,7 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
             return _changed(presets[preset], changes, name)
     options = [f"'{preset}'" for preset in presets]
     if presets:
-        options[-1] += f" (with values, e.g. '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
+        options[-1] += f" (with values, such as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {shown(value)}.")
 

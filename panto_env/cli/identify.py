@@ -128,7 +128,7 @@ def pairs(texts: list[str]) -> dict[str, str]:
             continue
         name, equals, text = part.partition("=")
         if not (name and equals and text):
-            raise InputError(f"'{part}' must read name=value, e.g. k1T=32992 or y_p1=mm.")
+            raise InputError(f"'{part}' must read name=value, such as k1T=32992 or y_p1=mm.")
         if name in pairs:
             raise InputError(f"{name} is given twice, as {pairs[name]} and as {text}.")
         pairs[name] = text

@@ -90,7 +90,7 @@ def _parse(parameters: Sequence[str]) -> dict[str, list[float]]:
     for text in parameters:
         name, equals, values = text.partition("=")
         if not (equals and name and values):
-            raise InputError(f"'{text}' must read NAME=VALUES, e.g. catenary.mean_stiffness=3000:5000:5.")
+            raise InputError(f"'{text}' must read NAME=VALUES, such as catenary.mean_stiffness=3000:5000:5.")
         if name in found:
             raise InputError(f"{name} is given twice; put all of its values in one list.")
         found[name] = parse_values(name, values)

@@ -28,7 +28,7 @@ def takes(
         @wraps(initialise)
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
-                raise TypeError(f"{type(self).__name__}() takes its arguments by name, e.g. catenary='re250'")
+                raise TypeError(f"{type(self).__name__}() takes arguments by name, such as catenary='re250'")
             check_arguments(given, settings, type(self).__name__)
             initialise(self, given)
 

@@ -76,7 +76,7 @@ def _begin(task: TaskState, lanes: Any, end: Array) -> None:
     if not nominal[low] > 0:  # the reward is relative to it
         raise InputError(
             f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
-            f"against the wire: its lift is {nominal[low]:g} N. Give it a static_force or an "
+            f"against the wire: its lift is {nominal[low]:g} N; give it a static_force or an "
             "aerodynamic_coefficient, or set a mean_force."
         )
     target, spread = task.targets(task.speed[lanes], nominal)

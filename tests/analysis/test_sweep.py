@@ -128,13 +128,13 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
         (
             {"pantograph.masses.0": [7.0, -7.0]},
             {},
-            r"pantograph.masses.0 can't be -7: must be a number from 0.1 to 200 kg",
+            r"pantograph.masses.0 cannot be -7: must be a number from 0.1 to 200 kg",
         ),
-        ({"pantograph.masses.0": [float("nan")]}, {}, "can't be nan"),
+        ({"pantograph.masses.0": [float("nan")]}, {}, "cannot be nan"),
         ({"pantograph.masses.0": []}, {}, "no values of pantograph.masses.0"),
-        ({"catenary.spans": [12.5]}, {}, "catenary.spans can't be 12.5"),
-        ({"catenary.span_length": [20.0]}, {}, "catenary.span_length can't be 20: dropper at"),
-        ({"catenary.contact_wire.tension": [-1.0]}, {}, "catenary.contact_wire.tension can't be -1"),
+        ({"catenary.spans": [12.5]}, {}, "catenary.spans cannot be 12.5"),
+        ({"catenary.span_length": [20.0]}, {}, "catenary.span_length cannot be 20: dropper at"),
+        ({"catenary.contact_wire.tension": [-1.0]}, {}, "catenary.contact_wire.tension cannot be -1"),
         ({"speed_kmh": [300, 600]}, {}, "At speed_kmh = 600: The speed must lie above 0"),
         ({"speed_kmh": [300]}, {"spans": (5, 90)}, "At speed_kmh = 300: spans 5 to 90"),
         ({"actuator.lag": [0, 0.1]}, {}, "actuator.lag changes nothing without a policy"),
@@ -153,7 +153,7 @@ def test_bad_input_is_refused_in_one_sentence(values, settings, message):
 
 def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
-    with pytest.raises(InputError, match="can't be -1"):
+    with pytest.raises(InputError, match="cannot be -1"):
         sweep({"pantograph.masses.0": [7.0, 8.0, -1.0]})
 
 
@@ -205,7 +205,7 @@ def test_command_writes_the_rows_it_prints(tmp_path):
         (["speed_kmh=200", "speed_kmh=250"], "given twice"),
         (["speed_kmh=200", "--speed", "250"], "swept already"),
         (["pantograph.mases.0=5"], "did you mean 'pantograph.masses.0'"),
-        (["pantograph.masses.0=5,-5"], "pantograph.masses.0 can't be -5"),
+        (["pantograph.masses.0=5,-5"], "pantograph.masses.0 cannot be -5"),
         (["speed_kmh=250", "--plot", "s.doc"], "must end in one of"),
         (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .parquet"),
     ],

@@ -56,7 +56,7 @@ def test_a_damaged_table_of_evaluations_is_refused_on_resume(damage, folder):
         lambda: folder.drop_evaluations_after(128),
     ):
         with pytest.raises(
-            InputError, match=r"evaluations\.csv is damaged after \d whole rows; mend"
+            InputError, match=r"evaluations\.csv is damaged after \d whole rows; correct"
         ) as caught:
             resume()
         assert "\n" not in str(caught.value)

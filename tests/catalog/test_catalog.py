@@ -374,7 +374,7 @@ BAD: list[tuple[str, str, str, str, str]] = [
     ),
     ("pantograph", MASSES, f"{MASSES}\nflexible = 1", "flexible", "known are kind"),
     ("pantograph", MASSES, "", "masses", "missing: masses, head first (kg)"),
-    ("pantograph", MASSES, "masses = 7", "masses", "a list, as [7]"),
+    ("pantograph", MASSES, "masses = 7", "masses", "a list, such as [7]"),
     ("pantograph", MASSES, "masses = []", "masses", "must not be empty (given: [])"),
     ("pantograph", MASSES, "masses = [7, 'a']", "masses.1", "a number from 0.1 to 200 kg (given: 'a')"),
     ("pantograph", MASSES, "masses = [7, -2]", "masses.1", "a number from 0.1 to 200 kg (given: -2)"),

@@ -67,7 +67,7 @@ def test_a_pantograph_that_nothing_lifts_is_refused_or_trimmed():
         lambda: gymnasium.make("panto_env:Pantograph-v0", pantograph=limp).reset(seed=0),
     ):
         with pytest.raises(
-            InputError, match=r"nothing presses 'en50318-2002' against the wire, its lift is 0 N"
+            InputError, match=r"nothing presses 'en50318-2002' against the wire: its lift is 0 N"
         ):
             made()
     assert simulate(pantograph=limp, mean_force=110.0).summary().mean == pytest.approx(110.0, abs=0.5)

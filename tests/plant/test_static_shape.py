@@ -146,7 +146,7 @@ def test_a_line_that_can_t_hang_so_is_refused_however_it_is_made(values, message
 
 def test_a_parameter_with_which_a_line_can_t_hang_is_refused_in_the_same_words():
     message = r"Unloaded, dropper 3 .* at 17 m, would be -0.04186 m long"
-    with pytest.raises(InputError, match=rf"catenary.encumbrance can't be 0.5: {message}"):
+    with pytest.raises(InputError, match=rf"catenary.encumbrance cannot be 0.5: {message}"):
         change(LINE, "catenary.encumbrance", 0.5)
     with pytest.raises(InputError, match=f"do not go together: {message}"):
         change_together(LINE, {"catenary.encumbrance": 0.5})

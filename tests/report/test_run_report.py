@@ -205,7 +205,7 @@ def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
         page([Findings(run, "run.parquet")] * 9)
     odd = tmp_path / "odd.json"
     for files, words in (
-        ([file, odd], "runs (.parquet) alone or of the benchmark's results (.json) alone"),
+        ([file, odd], "either runs (.parquet) or results of the benchmark (.json), not both"),
         ([tmp_path / "run.txt"], "run.txt: give either runs"),
         ([tmp_path / "gone.parquet"], "does not exist"),
     ):
