@@ -75,6 +75,13 @@ def test_the_likely_mistake_is_named(factors, message):
         identify(changed(RECORD, **factors), KNOWN)
 
 
+def test_a_head_higher_than_any_reaches_is_refused_however_little_it_moves():
+    """Below 3 m it is taken; the record's own displacements are some centimetres."""
+    check_record(replace(RECORD, head=RECORD.head + 2.8), KNOWN)
+    with pytest.raises(InputError, match=r"y_p2 holds displacements of 3\.\d* m, which no pantograph makes"):
+        check_record(replace(RECORD, head=RECORD.head + 3.1), KNOWN)
+
+
 @pytest.mark.parametrize(
     ("known", "message"),
     [

@@ -14,8 +14,7 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
 ARITHMETIC, BITS = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"BitOr", "BitAnd"}
-SAME = ({"Is", "Eq"}, {"IsNot", "NotEq"}, {"Is", "NotEq"}, {"IsNot", "Eq"})
-"""Comparisons that mean the same of None and of an enumeration's members."""
+ORDER, IDENTITY = {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"}, {"Is", "IsNot"}
 SPARED = re.compile(
     r"@(cache|lru_cache|cached_property|dataclass|kernel|inlined|override|overload)\b|strict=True"
 )
@@ -45,7 +44,7 @@ def _sensible(name: str) -> bool:
     if kind == "ReplaceBinaryOperator":
         return set(names) <= ARITHMETIC or set(names) <= BITS
     if kind == "ReplaceComparisonOperator":
-        return set(names) not in SAME
+        return set(names) <= ORDER or set(names) <= IDENTITY
     return kind not in ("VariableInserter", "VariableReplacer")  # these need names of variables
 
 
@@ -90,7 +89,8 @@ def _without_behaviour(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[in
     nodes: list[ast.AST | None] = []
     for node in ast.walk(tree):
         nodes += [getattr(node, "annotation", None), getattr(node, "returns", None)]
-        nodes += [node] if isinstance(node, ast.Raise | ast.Assert) else []
+        ranges = isinstance(node, ast.Subscript) and getattr(node.value, "id", "") == "Annotated"
+        nodes += [node] if ranges or isinstance(node, ast.Raise | ast.Assert) else []
     return [
         ((node.lineno, node.col_offset), (node.end_lineno or 0, node.end_col_offset or 0))
         for node in nodes
