@@ -26,7 +26,7 @@ class Actor:
     squashed: bool = False  # whether the last layer goes through tanh; otherwise it is clipped
 
     def squash(self) -> Actor:
-        """The same actor with tanh after its last layer."""
+        """A copy of this actor with tanh after its last layer."""
         return replace(self, squashed=True)
 
     def reset(self, context: Context) -> None:

@@ -16,17 +16,17 @@ from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, line_model, mean_line
 
 CORNER = 30.0
-"""rad/s: up to this the height of the wire is expected to vary."""
+"""Angular frequency (rad/s) up to which the height of the wire is expected to vary."""
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
 """Noise of the readings ``OUTPUTS``, including the model's error (N, m, m/s)."""
 HEIGHT = 1e-3
-"""m: unit of the height of the wire."""
+"""Unit (m) of the height of the wire."""
 WIDTH = 0.7
-"""Damping of the weight on the contact force: a band of about its frequency to either side."""
+"""Damping ratio of the weight on the contact force, which sets the width of its band."""
 NEAR = 1.1
 """Ratio of the bound used to the minimum one: a controller at the minimum bound is badly conditioned."""
 AVERAGED = 2.0
-"""Time constant (s) of the slow averages that readings are counted from."""
+"""Time constant (s) of the slow averages that are subtracted from readings."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
 """Bounds (-) between which the minimum is searched for, the factor from one to the next, and how often that
 factor is then halved."""

@@ -29,7 +29,7 @@ FEEDBACK_GAINS = {
     **{f"{name}, {step} steps ago": Gain(3.0 * 0.5) for step in range(HISTORY) for name in SIGNALS},
     **{f"command, {step + 1} steps ago": Gain(3.0 * 0.2) for step in range(COMMANDS)},
 }
-"""Of the signals (N per their unit), newest first, then of the commands."""
+"""Gains of the signals (N per their unit), newest step first, then gains of the commands."""
 
 
 class LinearFeedback:

@@ -16,19 +16,19 @@ from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, MeanLine, Sampled, line_model, mean_line
 
 HIGHEST = 8.0
-"""Hz: harmonics of the span up to this are in the model of the wire's height."""
+"""Maximum frequency (Hz) of the span's harmonics in the model of the wire's height."""
 FADING = 0.05
-"""Relative damping of these harmonics: how long the filter takes to forget one, and the sharpness."""
+"""Damping ratio of these harmonics: it sets the filter's memory and bandwidth."""
 HEIGHT = 1e-3
-"""m: unit of the noise that drives heights."""
+"""Unit (m) of the noise that drives heights."""
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
-"""Of ``OUTPUTS``, rms: the model's own error is most of it, so that force is trusted first (N, m, m/s)."""
+"""Rms noise of ``OUTPUTS`` (N, m, m/s), mostly the model's own error; the force is trusted most."""
 ROUNDING = 1e-14
 """Variance added to each state's noise, without which the Riccati equation is too badly conditioned."""
 AVERAGED = 2.0
-"""Time constant (s) of the slow averages that readings are counted from."""
+"""Time constant (s) of the slow averages that are subtracted from readings."""
 HELD = 0.7
-"""Hz: below this the integral of the command costs more than the command: it holds the mean force."""
+"""Frequency (Hz) below which the integral of the command costs more than the command: it keeps the mean."""
 
 
 class LinearQuadraticGaussian(TunableLaw):
@@ -38,9 +38,9 @@ class LinearQuadraticGaussian(TunableLaw):
     dashpot. The disturbance is the height of the wire at the contact point: lightly damped oscillators at
     the span's harmonics, and a random walk. The regulator minimises the mean of F^2 + effort u^2, the
     filter estimates all states from five readings; both are discrete Riccati equations (Kwakernaak and Sivan,
-    Linear Optimal Control Systems, 1972, ch. 6). Through the oscillators the regulator also acts ahead on
-    what the span repeats. Readings are counted from slow averages, and the integral of the command
-    is a state that costs: below HELD effort costs the more the slower, and the mean command is zero.
+    Linear Optimal Control Systems, 1972, ch. 6). Through the oscillators the regulator also anticipates
+    what repeats with the span. Slow averages are subtracted from readings, and the integral of the command
+    is a state with a cost: below ``HELD``, slower commands cost more, and the mean command is zero.
 
     It needs to know the pantograph, tension and mass of the wires, the span, the speed, and the delays.
     """

@@ -17,27 +17,26 @@ from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 
 HORIZON = 30
-"""Control steps looked ahead: 0.3 s, about a period of the frame under the wire."""
+"""Control steps of the prediction: 0.3 s, about a period of the frame under the wire."""
 LENGTH = 120
-"""Control steps in which the answer to a command has died out."""
+"""Control steps after which the response to a command has died out."""
 HELD = 0.4
-"""Hz: below this the integral of the command costs more than a force of the command's size would."""
+"""Frequency (Hz) below which the integral of the command costs more than a force of the same size."""
 TOLERANCE = 1e-3
-"""Of the solver (N, and relative)."""
+"""Tolerance of the solver (N, and relative)."""
 AVERAGED = 2.0
-"""Time constant (s) of the slow average that the contact force is counted from."""
+"""Time constant (s) of the slow average that is subtracted from the contact force."""
 
 
 class PredictiveControl(TunableLaw):
     """Commands over a horizon that minimise the variation of the predicted force within limits, at each step.
 
-    Predicted force = passive force of the line as designed at the places to come + answers to commands given
-    and to be given, each with the response of the place where it is given (``preview``: stiffness along the
-    span, waves, delay and lag are all in it) + what was measured beyond that at these places in the spans
-    before + what is measured beyond all of it now, fading. To minimise
-    sum of F^2 + effort u^2 + (2 pi held q)^2, q the integral of u (so that the mean force stays), with |u|
-    and |change of u| within the actuator's limits: a quadratic program, solved by OSQP (Stellato et al.,
-    Math. Prog. Comp. 12:637, 2020) where the limits matter.
+    Predicted force = passive force of the line as designed at the places ahead + responses to past and future
+    commands, each for the place of the command (``preview``, which includes stiffness along the span, waves,
+    delay and lag) + the prediction error at these places in earlier spans + the present error beyond that,
+    fading with time. It minimises the sum of F^2 + effort u^2 + (2 pi held q)^2, where q is the integral of u
+    (which keeps the mean force), with |u| and |change of u| within the actuator's limits: a quadratic
+    program, solved by OSQP (Stellato et al., Math. Prog. Comp. 12:637, 2020) if the limits matter.
 
     It needs to know the line's and the pantograph's design, the place within the span, the speed, delays and
     limits of the actuator. Computing the preview takes about a second for each speed.
@@ -53,9 +52,9 @@ class PredictiveControl(TunableLaw):
     def __init__(
         self, gains: Source = "mpc", delay: float = DELAY, lag: float = LAG, rate: float = RATE
     ) -> None:
-        """gains: (4,): log10 of effort (N^2/N^2), share of what is measured beyond the prediction that is
-        believed, log10 of the time in which that fades (s), share of it that is learnt for the next span; or
-        a file of gains by name or path.
+        """gains: (4,): log10 of effort (N^2/N^2), share of the prediction error that is carried forward,
+        log10 of the time in which it fades (s), share of it that is learnt for the next span; or a file of
+        gains by name or path.
 
         delay of actuator and sensors together, lag of the actuator: s; rate: N/s.
         """

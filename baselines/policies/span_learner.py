@@ -12,7 +12,7 @@ from .lanes_law import Array
 HIGHEST = 16.0
 """Maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz."""
 LISTENING = 3.0
-"""Spans without control at the start, of which the last two say what the passive sigma is about."""
+"""Spans without control at the start; the last two give the approximate passive sigma."""
 TOLERATED = 1.05
 """Ratio of a span's sigma to the passive one above which the control backs off."""
 BACK_OFF, RECOVERY = 0.5, 1.05
