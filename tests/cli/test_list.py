@@ -110,7 +110,7 @@ def test_a_preset_takes_values_and_defects():
         ("worn:wear_depth", "'wear_depth' must read name=value"),
         (
             "worm:wear_depth=1e-3",
-            r"must be 'new' or 'fair' or 'as-built' or 'worn' \(with values, such as 'new:irregularity=...'\)",
+            r"'new' or 'fair' or 'as-built' or 'worn' \(with values, such as 'new:irregularity=...'\)",
         ),
     ],
 )
