@@ -123,7 +123,8 @@ def test_reproduce_prints_what_it_writes_as_json(monkeypatch, capsys, tmp_path):
 def test_what_is_no_option_is_refused_in_one_line():
     result = panto("simulate", "--nowhere")
     assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr.startswith("panto: No such option: --nowhere")
+    assert result.stderr.startswith("panto: No such option")
+    assert "--nowhere" in result.stderr
     assert len(result.stderr.splitlines()) == 1
 
 
