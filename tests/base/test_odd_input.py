@@ -71,7 +71,9 @@ def test_an_odd_name_is_refused_in_a_sentence(odd):
         sentence(caught.value)
 
 
-@pytest.mark.parametrize("odd", ["nan", "infinite", "minus", "complex", "huge as text", "list", "strange"])
+@pytest.mark.parametrize(
+    "odd", ["nan", "infinite", "minus", "complex", "huge as text", "list", "strange", "nothing"]
+)
 def test_an_odd_seed_is_refused(odd):
     with pytest.raises(InputError, match="seed must be a whole number from 0 up"):
         simulate("periodic-stiffness", "three-mass", seed=ODD[odd])

@@ -187,13 +187,6 @@ def test_a_sweep_of_millions_is_refused_before_it_begins(tmp_path):
     assert "10,000,000 values" in done.stderr
 
 
-def test_a_run_is_saved_as_parquet_or_not_computed_at_all(tmp_path):
-    done = panto("simulate", "--output", "run.csv", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "run.csv must end in .parquet" in done.stderr
-    assert not list(tmp_path.iterdir())
-
-
 LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 """A train that takes three hours under a line of a thousand supports."""
 
@@ -212,46 +205,6 @@ def test_passes_at_once_that_would_not_fit_are_refused_before_the_first(monkeypa
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 1.5 * needed / SHARE)
     with pytest.raises(InputError, match=r"The record of 2 passes at once would take .*, or fewer workers"):
         sweep({"pantograph.masses.0": [7.0, 8.0]}, distance=540.0, workers=2)
-
-
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [
-        ("nowhere/a", "there is no folder nowhere, so make it first"),
-        ("own.py/a", "own.py is not a folder"),
-        ("folder", "it is a folder"),
-    ],
-)
-@pytest.mark.parametrize(
-    ("suffix", "arguments"),
-    [
-        (".parquet", ["simulate", "--output"]),
-        (".png", ["simulate", "--plot"]),
-        (".csv", ["sweep", "speed_kmh=250", "--output"]),
-        (".png", ["sweep", "speed_kmh=250", "--plot"]),
-        (".json", ["benchmark", "--output"]),
-        (".png", ["benchmark", "--plot"]),
-        (".toml", ["identify", "rig.csv", "--output"]),
-        (".png", ["identify", "rig.csv", "--plot"]),
-        (".png", ["evaluate", "p", "--plot"]),
-        (".png", ["validate", "--plot"]),
-        (".png", ["speed", "--plot"]),
-    ],
-)
-def test_a_file_that_can_t_be_written_is_refused_before_the_work(
-    path, message, suffix, arguments, own, monkeypatch
-):
-    """And no folder is made for it."""
-    folder = own.parent
-    (folder / f"folder{suffix}").mkdir()
-    before = sorted(folder.rglob("*"))
-    name = f"{path}{suffix}"
-    monkeypatch.chdir(folder)
-    with pytest.raises(InputError, match="cannot be written") as caught:
-        command(*arguments, name)
-    assert str(caught.value).startswith(f"{name} cannot be written: ")
-    assert message in str(caught.value)
-    assert sorted(folder.rglob("*")) == before
 
 
 def test_a_folder_that_is_asked_for_is_made(tmp_path):
@@ -328,12 +281,6 @@ def test_it_is_said_in_one_sentence_what_is_wrong(arguments, message, own, monke
     with pytest.raises(InputError, match=message) as caught:
         command(*arguments)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("seed", [-1, 1.5, None])
-def test_a_seed_is_a_whole_number_from_0_up(seed):
-    with pytest.raises(InputError, match="seed must be a whole number from 0 up"):
-        simulate(seed=seed, distance=60.0)
 
 
 def test_a_sweep_s_line_may_have_more_spans():

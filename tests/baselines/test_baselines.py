@@ -112,6 +112,11 @@ def test_reset_forgets_the_last_episode(name: str) -> None:
         ("fb+ff:speed_unit=mph", "speed_unit must be one of km/h, m/s"),
         ("fb+ff:gain={}", "gain must hold at least one speed"),
         ("p:gian=1", "gian"),
+        ("mpc:rate=0", "rate must be a positive number"),
+        ("lqg:gains=()", "gains must be finite numbers"),
+        ("skyhook:gains=(1,1e999)", "gains must be finite numbers"),
+        ("repetitive:gian=1", "gian"),
+        ("repetitive:place='guessed'", "place must be one of read, counted"),
     ],
 )
 def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
@@ -224,11 +229,6 @@ def test_each_calms_the_contact_force_without_pressing_less() -> None:
         assert figures[name].std < 0.97 * passive.std
         assert figures[name].cost_function < passive.cost_function
         assert passive.mean < figures[name].mean < NOMINAL
-
-
-def test_the_passive_policy_is_no_policy() -> None:
-    none, passive = simulate(distance=200.0), simulate(distance=200.0, policy="passive")
-    assert np.array_equal(none.contact_force, passive.contact_force)
 
 
 def test_pd_stays_stable_under_a_real_actuator() -> None:

@@ -26,7 +26,6 @@ from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
 from panto_env.estimation.kalman import steady_gain
-from panto_env.policies import find_policy
 
 Array = NDArray[np.float64]
 
@@ -315,23 +314,3 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
     seen = np.array(answer)
     assert np.std(seen) > 0.2
     assert np.std(seen - predicted[: len(seen)]) < 0.05 * np.std(seen)
-
-
-# --- refusals ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("source", "words"),
-    [
-        ("mpc:rate=0", "rate must be a positive number"),
-        ("lqg:gains=()", "gains must be finite numbers"),
-        ("skyhook:gains=(1,1e999)", "gains must be finite numbers"),
-        ("repetitive:gian=1", "gian"),
-        ("repetitive:place='guessed'", "place must be one of read, counted"),
-    ],
-)
-def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        find_policy(source)
-    assert words in str(caught.value)
-    assert f"'{source}'" in str(caught.value)

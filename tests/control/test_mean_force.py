@@ -1,7 +1,6 @@
 """A mean force that is asked for is met by trimming the static force, once, and kept."""
 
 import json
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -151,19 +150,6 @@ def test_a_damaged_file_is_made_anew(empty_store, damage):
 def test_it_is_kept_under_the_hash_of_the_sources():
     simulate(**LIGHT, mean_force=60.0)
     assert any((cache_folder() / "mean_force").iterdir())
-
-
-def test_it_is_written_whole_or_not_at_all(empty_store, monkeypatch):
-    folder, _ = empty_store
-
-    def interrupted(path, text, encoding):
-        path.write_bytes(text.encode()[:10])
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Path, "write_text", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        simulate(**LIGHT, mean_force=60.0)
-    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("speeds", [300.0, (290.0, 301.0)])

@@ -145,22 +145,6 @@ def test_gymnasium_s_vector_wrappers_work():
 
 
 @pytest.mark.parametrize(
-    ("actions", "message"),
-    [
-        (np.full((3, 1), np.nan), "must be finite"),
-        (np.zeros(3), "must have the shape"),
-        (np.zeros((2, 1)), "must have the shape"),
-    ],
-)
-def test_bad_actions_change_nothing(actions, message):
-    env = make()
-    env.reset(seed=0)
-    with pytest.raises(InputError, match=message):
-        env.step(actions)
-    assert (env.unwrapped.task.plant.row(Row.STEP) == 0).all()
-
-
-@pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from panto_agents.ablation import load_ablation
 from panto_agents.model_file import read_model
@@ -14,16 +17,21 @@ from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER as MODELS
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.episodes import Episode, read_episodes
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
 from panto_baselines.policies.gains import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
+from panto_env.base.array_file import write_arrays
+from panto_env.base.checksums import read_checked
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import text_of
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification.record_file import read_record
 from panto_env.rig.computer import load_rig
+from panto_env.studies import Comparison, Outcome
+from panto_env.studies import write as write_study
 from panto_env.studies.throughput import study as speed
 
 from .files import write_files
@@ -71,6 +79,8 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "oracles": Subject("JSON", stored.RESULTS, stored.read, checked=True),
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
         "settings of a training": Subject("JSON", run.settings, _settings, checked=True),
+        "study": Subject("JSON", _study(folder), read_checked, checked=True),
+        "part of a data set": _part(folder),
     }
     models = {
         f"model {path.stem}": Subject("model", path, read_model, True)
@@ -103,6 +113,25 @@ def _pantograph(path: Path) -> Any:
 def _pass(line: Any, pantograph: Any, distance: float) -> Trajectory:
     with warnings.catch_warnings(action="ignore"):
         return simulate(line, pantograph, 200.0, distance=distance, accuracy="fast")
+
+
+def _study(folder: Path) -> Path:
+    compared = Comparison("mass", "kg", 1.25, 1.2, 1.0, 1.5)
+    (path,) = write_study(Outcome("a study", (compared,), numbers={"σ": [1 / 3, None]}), folder)
+    return path
+
+
+def _part(folder: Path) -> Subject:
+    settings = load_episodes(ROOT / "configs" / "dataset-known-line.toml")
+    plans = list(islice(settings.plans(settings.sets[0]), 2))
+    arrays = {
+        f"{plan.number}|{name}|{'std' if name in ('infos', 'figures') else ''}": np.array(float(plan.number))
+        for plan in plans
+        for name in Episode._fields
+    }
+    path = folder / "part.safetensors"
+    write_arrays(path, {}, arrays)
+    return Subject("model", path, lambda path: read_episodes(path, plans), checked=True)
 
 
 def _evaluations(path: Path) -> Any:

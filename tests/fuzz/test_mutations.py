@@ -1,5 +1,6 @@
 """Damaged files end well: thousands in the proofs, more in `make fuzz`."""
 
+import json
 import sys
 
 import pytest
@@ -29,6 +30,19 @@ def check(count, folder):
 @pytest.mark.slow
 def test_thousands(tmp_path):
     check(3000, tmp_path)
+
+
+def test_none_of_a_file_with_a_checksum_goes_unnoticed(tmp_path, capsys):
+    from .mutations import run_cases
+    from .subjects import subjects
+
+    (tmp_path / "files").mkdir()
+    for name, subject in subjects(tmp_path / "files").items():
+        if subject.checked:
+            run_cases(subject, range(36), tmp_path)
+            told = capsys.readouterr().out
+            assert '"bad"' not in told, f"{name}: {told}"
+            assert json.loads(told.splitlines()[-1])["ends"]["refused"] > 10
 
 
 def test_each_damage_is_one():
