@@ -132,7 +132,7 @@ def evaluate(
     """
     from panto_baselines.benchmark.seeds import TEST, check_seeds
     from panto_env.analysis.pool import check_passes
-    from panto_env.policies import find_policy
+    from panto_env.policies import find_policy, wishes
 
     from .evaluation import Comparison, in_words, verdict
     from .policy import TrainedPolicy
@@ -145,7 +145,8 @@ def evaluate(
     check_passes(2 * seeds * len(chosen), "This evaluation")
     judged_on = range(TEST.start, TEST.start + seeds)
     check_seeds(judged_on, "test")
-    comparison = Comparison(arguments(environment), chosen, judged_on, settings.get("distance"))
+    given = arguments(environment) | {"washout": wishes(driver)["washout"]} | settings
+    comparison = Comparison(given, chosen, judged_on, settings.get("distance"))
     with progress_console.status("running"):
         pairs = comparison.run(driver)
     with written_last() as later:

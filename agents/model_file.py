@@ -38,6 +38,9 @@ class Needs(Settings):
     channels: tuple[int, ...]  # actuator that each action drives: 0 frame, 1 head
     force_limit: float  # N
     control_interval: float  # s
+    washout: float = (
+        0.0  # time constant (s) of what the environment subtracts from the actions, 0 for nothing
+    )
 
     @field_validator("channels")
     @classmethod
@@ -64,6 +67,7 @@ class Needs(Settings):
             channels=context.channels,
             force_limit=context.force_limit,
             control_interval=context.control_interval,
+            washout=context.washout,
         )
 
 
@@ -102,8 +106,12 @@ def export_model(source: Path, target: Path) -> None:
 
     Raises InputError, naming the file, if ``source`` is damaged or ``target`` cannot be written.
     """
-    facts, actor = read_model(source)
-    _write(target, facts, layers(actor))
+    write_policy(target, *read_model(source))
+
+
+def write_policy(path: Path, facts: Facts, actor: Actor) -> None:
+    """Write a model file without the state for further training. Raises InputError if it can't be written."""
+    _write(path, facts, layers(actor))
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:

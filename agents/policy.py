@@ -31,7 +31,7 @@ class TrainedPolicy:
         self._policy = policy_of(actor, facts)
         needs = facts.needs
         self.observation, self.harmonics, self.history = needs.observation, needs.harmonics, needs.history
-        self.normalise = needs.normalise
+        self.normalise, self.washout = needs.normalise, needs.washout
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""
@@ -67,7 +67,7 @@ def load(path: str | Path) -> TrainedPolicy:
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
     """First property that differs, and what to do about it; "" if none differs."""
-    for name in OBSERVATION_SETTINGS:
+    for name in (*OBSERVATION_SETTINGS, "washout"):
         needed, here = getattr(needs, name), getattr(offered, name)
         if needed != here:
             return f"it was trained with {name}={shown(needed)}, this task has {shown(here)}; set it to match"

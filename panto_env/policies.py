@@ -27,8 +27,8 @@ from .control.observation import OBSERVATION_SETTINGS
 class Policy(Protocol):
     """Any object with these two methods. It gets observations, never the environment.
 
-    It may have attributes ``observation``, ``harmonics``, ``history`` and ``normalise``: settings of its
-    observation, unless a run is given others.
+    It may have attributes ``observation``, ``harmonics``, ``history`` and ``normalise``, settings of its
+    observation, and ``washout``, 0 unless it has one: a run takes these unless it is given others.
     """
 
     def reset(self, context: Context) -> None:
@@ -72,9 +72,13 @@ def find_policy(source: Any) -> Policy:
 
 
 def wishes(policy: Any) -> dict[str, Any]:
-    """Settings of the observation that a policy requests by its attributes, by name."""
+    """Settings that a policy requests by its attributes, by name: of its observation, and the washout.
+
+    A policy without an attribute ``washout`` commands forces as they are.
+    """
     requested = {name: getattr(policy, name, None) for name in OBSERVATION_SETTINGS}
-    return {name: value for name, value in requested.items() if value is not None}
+    found = {name: value for name, value in requested.items() if value is not None}
+    return found | {"washout": getattr(policy, "washout", 0.0)}
 
 
 def with_parameters(source: str, parameters: str) -> str:

@@ -19,6 +19,7 @@ class Context:
     channels: tuple[int, ...]  # place where each action acts: 0 frame, 1 head
     force_limit: float  # force of an action of 1 (N)
     control_interval: float  # s
+    washout: float  # time constant (s) of what is subtracted from the actions, 0 for nothing
     speed: float  # of the train (m/s)
     alignment: Alignment  # of the line
     nominal_force: float  # static and aerodynamic uplift (N)

@@ -43,6 +43,7 @@ class Episode(NamedTuple):
     time_step: float  # s
     control_steps: int  # plant steps in a control step
     mean_share: float  # weight of a control step in the running mean of the force
+    washout_share: float  # weight of a control step in the washout's average; 0: there is no washout
     loss_limit: int  # plant steps without contact that end an episode
     head_range: float  # height of the head (m), up or down, that ends an episode
 
@@ -71,10 +72,16 @@ def new_episode(
         alignment=plant.alignment.arrays,
         time_step=plant.time_step,
         control_steps=control_steps,
-        mean_share=1 - math.exp(-settings.control_interval / MEAN_TIME),
+        mean_share=_share(settings.control_interval, MEAN_TIME),
+        washout_share=_share(settings.control_interval, settings.washout),
         loss_limit=round(LOSS_TIME / plant.time_step),
         head_range=HEAD_RANGE,
     )
+
+
+def _share(interval: float, time_constant: float) -> float:
+    """Weight of an interval (s) in an average with this time constant (s); 0: there is none."""
+    return 1 - math.exp(-interval / time_constant) if time_constant else 0.0
 
 
 class Results(NamedTuple):

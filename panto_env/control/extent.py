@@ -25,10 +25,11 @@ def runs(settings: RunSettings) -> Runs:
 
 def spans(settings: RunSettings) -> int | None:
     """Number of spans: as given, or as many as the distance needs, at least the line's own; None: its own."""
-    if settings.spans is not None or settings.distance is None:
-        return settings.spans
     line = settings.catenary
-    last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in)
+    if settings.spans is not None or settings.distance is None:
+        more = math.ceil(settings.settle)
+        return line.spans + more if settings.spans is None and more else settings.spans
+    last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
     needed = last + (CLEAR if last >= line.spans else 1)
     if needed > MOST_SPANS:
         longest = line.alignment().support(MOST_SPANS - CLEAR)

@@ -15,8 +15,8 @@ from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
 
-NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward")
-"""Settings that only concern policies."""
+NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "settle")
+"""Settings that only concern policies; the distance of a run includes what settles."""
 
 
 def plain(settings: RunSettings) -> dict[str, Any]:

@@ -22,7 +22,9 @@ class EpisodeLength:
     def __init__(self, settings: RunSettings, plant: Plant) -> None:
         """Raises InputError for a distance, control interval or speed that is not possible on the plant."""
         self._drift, self._plant = settings.drift, plant
-        self.distance = plant.model.usual_end if settings.distance is None else float(settings.distance)
+        self.settling = plant.alignment.support(settings.settle)  # m
+        given = settings.distance
+        self.distance = plant.model.usual_end if given is None else float(given) + self.settling
         if self.distance > plant.model.length:
             raise InputError(
                 f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
@@ -50,26 +52,30 @@ class EpisodeLength:
             self._plant.check_speed(speed)
         return low, high
 
-    def plant_steps(self, speed: Any, run_in: Any = 0, drift: Array | None = None) -> Any:
+    def plant_steps(
+        self, speed: Any, run_in: Any = 0, drift: Array | None = None, distance: float | None = None
+    ) -> Any:
         """Plant steps to an episode's end: whole control steps that cover the distance and stay on the line.
 
         speed: m/s, a number or an array. run_in: control steps before the episode begins. drift: of each
-        speed, as in ``Plant.start``.
+        speed, as in ``Plant.start``. distance: m, by default the whole episode's.
         """
+        distance = self.distance if distance is None else distance
         stride = speed * self.control_interval
         if drift is not None:
-            return np.array([self._drifting_steps(*each) for each in zip(stride, run_in, drift, strict=True)])
-        needed = run_in + np.ceil(self.distance / stride - 1e-9)
+            each = zip(stride, run_in, drift, strict=True)
+            return np.array([self._drifting_steps(*one, distance) for one in each])
+        needed = run_in + np.ceil(distance / stride - 1e-9)
         possible = self._plant.model.length / stride + 1e-9
         return np.maximum(1, np.floor(np.minimum(needed, possible))) * self.control_steps
 
-    def _drifting_steps(self, stride: float, run_in: float, drift: Array) -> int:
+    def _drifting_steps(self, stride: float, run_in: float, drift: Array, distance: float) -> int:
         """``plant_steps`` of one train with drift; stride: mean distance in a control step (m)."""
         lag = largest_lag(self._drift)
-        farthest = min(self._plant.model.length, stride * run_in + lag + self.distance) + lag
+        farthest = min(self._plant.model.length, stride * run_in + lag + distance) + lag
         steps = np.arange(math.ceil(farthest / stride) + 1.0)
         position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # increasing
-        needed = np.searchsorted(position, position[int(run_in)] + self.distance - 1e-9)
+        needed = np.searchsorted(position, position[int(run_in)] + distance - 1e-9)
         possible = np.searchsorted(position, self._plant.model.length + 1e-9) - 1
         return max(1, min(int(needed), int(possible))) * self.control_steps
 

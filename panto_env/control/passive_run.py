@@ -26,7 +26,16 @@ KNOT_DISTANCE = 25.0
 """Maximum distance (km/h) between the speeds of the runs; between them values are interpolated."""
 LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
-NO_MATTER = (*OBSERVATION_SETTINGS, "estimator", "known_pantograph", "reward", "actuator", "sensors")
+NO_MATTER = (
+    *OBSERVATION_SETTINGS,
+    "estimator",
+    "known_pantograph",
+    "reward",
+    "settle",
+    "actuator",
+    "sensors",
+    "washout",
+)
 """Settings on which a passive run does not depend."""
 
 RunPassively = Callable[[RunSettings], Trajectory]

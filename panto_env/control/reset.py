@@ -49,7 +49,10 @@ def reset(
     run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
     end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
     run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
-    _begin(task, lanes, end)
+    counted_from = np.zeros(len(lanes))
+    if task.length.settling:
+        counted_from = task.length.plant_steps(drawn.speed, run_in, drawn.drift, task.length.settling)
+    _begin(task, lanes, end, counted_from)
     plant.clear(task.samples, lanes)
     samples = plant.run.table[:, lanes, :SAMPLE_ROWS]
     task.sensors.reset(lanes, samples)
@@ -66,8 +69,12 @@ def reset(
         _run_in(task, lanes[run_in > 0], run_in[run_in > 0], results)
 
 
-def _begin(task: TaskState, lanes: Any, end: Array) -> None:
-    """Begin episodes in lanes at their present positions; end: plant steps from the line's start."""
+def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None:
+    """Begin episodes in lanes at their present positions.
+
+    end, counted_from: plant steps from the line's start at which they end, and after which they count.
+    Raises InputError where nothing of an episode would count.
+    """
     start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
     rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
     rows[:, TaskRow.END] = end
@@ -82,8 +89,15 @@ def _begin(task: TaskState, lanes: Any, end: Array) -> None:
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
     rows[:, TaskRow.PER_SPREAD] = 1 / spread
-    shifted = task.plant.ahead(lanes, np.stack([start[:, Row.STEP], end], axis=1))
-    steady = (end - start[:, Row.STEP]) * start[:, Row.STRIDE]
+    counted_from = np.maximum(counted_from, start[:, Row.STEP])
+    if (counted_from >= end).any():
+        raise InputError(
+            f"After the {task.settings.settle:g} spans of settle nothing of the episode is left to count; "
+            "set a distance, more spans, or a smaller settle."
+        )
+    rows[:, TaskRow.COUNTED_FROM] = counted_from
+    shifted = task.plant.ahead(lanes, np.stack([counted_from, end], axis=1))
+    steady = (end - counted_from) * start[:, Row.STRIDE]
     rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
     table[lanes] = rows
     task.running.peak[lanes] = -np.inf
@@ -97,7 +111,7 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     rows = task.episode.table[lanes]
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(ending(task, lane))
-    _begin(task, lanes, rows[:, TaskRow.END])
+    _begin(task, lanes, rows[:, TaskRow.END], rows[:, TaskRow.COUNTED_FROM])
     results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards of the run-in do not count
     if task.layout.history:
         _forget(task, lanes, rows, results)

@@ -11,7 +11,7 @@ from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array
 from ..metrics.low_pass import low_pass_sections
 from ..plant.state import ROW, Row
-from .state import NOW, RESULT, TASK_ROW, TERM, TaskRow
+from .state import NOW, TASK_ROW, TaskRow
 
 
 class RunningFigures(NamedTuple):
@@ -80,7 +80,7 @@ def figures_so_far(
 def low_pass(running, task, force):
     """Contact force (N) behind EN 50317's filter, second-order sections in direct form II transposed."""
     value, states = force, task[TASK_ROW.FILTER_STATE :]
-    if task[TASK_ROW.SAMPLES] == 0.0:  # the filter begins settled at the first sample
+    if task[TASK_ROW.FILTERED] == 0.0:  # the filter begins settled at the first sample
         for k in range(running.settled.size):
             states[k] = running.settled[k] * force
     for k in range(running.sections.shape[0]):
@@ -91,13 +91,24 @@ def low_pass(running, task, force):
         state[0] = b1 * value - a1 * out + state[1]
         state[1] = b2 * value - a2 * out
         value = out
+    task[TASK_ROW.FILTERED] += 1.0
     return value
 
 
 @inlined
 def add_sample_to_figures(running, samples, own, task, frame_before, head_before, lane):
-    """Add a plant step; frame_before, head_before: forces of the actuators in the previous step (N)."""
+    """Add a plant step; frame_before, head_before: forces of the actuators in the previous step (N).
+
+    Before what counts only the filter and the uplift go on.
+    """
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
+    if running.peak.shape[1] > 0:
+        row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
+        peak, uplift = running.peak[lane], samples.uplift[lane, row]
+        for s in range(peak.size):
+            peak[s] = max(peak[s], uplift[s])
+    if own[ROW.STEP] <= task[TASK_ROW.COUNTED_FROM]:
+        return
     between = 0.0 if task[TASK_ROW.SAMPLES] == 0.0 else 1.0  # a change lies between two samples
     frame, head = own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
     frame_change, head_change = frame - frame_before, head - head_before
@@ -109,15 +120,10 @@ def add_sample_to_figures(running, samples, own, task, frame_before, head_before
     task[TASK_ROW.SQUARED_DEVIATION] += deviation * deviation
     task[TASK_ROW.MAX] = max(filtered, task[TASK_ROW.MAX])
     task[TASK_ROW.MIN] = min(filtered, task[TASK_ROW.MIN])
-    if running.peak.shape[1] > 0:
-        row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
-        peak, uplift = running.peak[lane], samples.uplift[lane, row]
-        for s in range(peak.size):
-            peak[s] = max(peak[s], uplift[s])
 
 
 @inlined
-def add_control_step_to_figures(task, now, values):
+def add_control_step_to_figures(task, now):
     """Add the cost and the losses of a control step."""
-    task[TASK_ROW.ALL_COST] += values[RESULT.TERM + TERM.COST_FUNCTION]
+    task[TASK_ROW.ALL_COST] += now[NOW.STRIDE] * (0.5 * now[NOW.COST])
     task[TASK_ROW.ALL_LOSS_STEPS] += now[NOW.LOSS_STEPS]

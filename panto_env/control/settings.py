@@ -81,6 +81,10 @@ def _distance(value: Any) -> float | None:
     return value
 
 
+def _none_is_zero(value: Any) -> Any:
+    return 0.0 if value is None else value
+
+
 def _mean_force(value: Any) -> float | str | None:
     if value is None:
         return None
@@ -159,6 +163,11 @@ class RunSettings(Numerics):
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
         "standard's maximum; by default as the pantograph's data say: its force applied, or met by the mean",
     )
+    washout: Annotated[float, BeforeValidator(_none_is_zero), Between(0, 100, "s")] = Field(
+        0.0,
+        description="time constant (s) of the slow average of the actuator's force that is subtracted from "
+        "the action, so that it can't move the mean contact force; 0 or None: nothing is subtracted",
+    )
     run_in: Annotated[float, Between(0, 20, "spans")] = Field(
         0.0,
         description="maximum number of spans without control before the episode begins; the number is drawn "
@@ -200,6 +209,11 @@ class RunSettings(Numerics):
         validate_default=True,
         description='weights of the reward\'s terms: "paper1", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
+    )
+    settle: Annotated[float, Between(0, 20, "spans")] = Field(
+        0.0,
+        description="spans in which a policy acts before the reward and the figures of an episode count; the "
+        "episode and the line are longer by them",
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,

@@ -26,16 +26,19 @@ TERMS = tuple(term.name.lower() for term in Term)
 class TaskRow(IntEnum):
     """Rows of each lane in the task's table."""
 
-    DISTANCE = 0  # of the episode (m)
+    DISTANCE = 0  # that counts (m)
     END = 1  # number of plant steps of the episode
     ENDING = 2  # why it ended early, an ``Ending``
     LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
     MEAN_DEVIATION = 4  # running mean of contact force minus nominal force (N)
     TARGET_SHIFT = 5  # target force of the reward minus nominal force (N)
     PER_SPREAD = 6  # 1 / deviation from the target that counts as 1 (1/N)
+    COUNTED_FROM = 7  # plant step after which reward and figures count
+    WASHED_OUT = 8  # slow average of the actuator's force, in shares of its limit, one row per place
     # Running figures.
-    FILTER_STATE = 7  # of EN 50317's filter, two rows for each of three sections
-    SAMPLES = FILTER_STATE + 6
+    FILTERED = 10  # samples that went through EN 50317's filter
+    FILTER_STATE = 11  # of that filter, two rows for each of three sections
+    SAMPLES = FILTER_STATE + 6  # that count
     DEVIATION = FILTER_STATE + 7  # sum of filtered contact force minus nominal force (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum of the squares (N^2)
     MAX = FILTER_STATE + 9  # of the filtered contact force (N)
@@ -51,7 +54,7 @@ class TaskRow(IntEnum):
 class Now(IntEnum):
     """Rows of a lane's values within a control step."""
 
-    COST = 0  # sum of deviations at both ends of each interval (N)
+    COST = 0  # sum of deviations from the nominal force at both ends of each interval (N)
     LOSS_STEPS = 1  # plant steps without contact
     SIGNED_DEVIATION = 2  # sum of contact force minus nominal force (N)
     EFFORT = 3  # term of the reward
@@ -61,7 +64,8 @@ class Now(IntEnum):
     STRIDE = 7  # mean distance covered in a plant step (m)
     DEVIATION_BEFORE = 8  # ``TaskRow.DEVIATION`` at the start of the control step (N)
     SQUARED_BEFORE = 9  # ``TaskRow.SQUARED_DEVIATION`` at the start of the control step (N^2)
-    READING = 10  # what the sensors read, one row per ``Reading``
+    TARGET_COST = 10  # as COST, of deviations from the reward's target (N)
+    READING = 11  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):

@@ -12,26 +12,34 @@ from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .observation import begin_history, entry_of, prepare_entries, remember
-from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge
+from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge, forget_reward
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
 from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 
 @inlined
-def take_action(run, episode, task, now, lane):
-    """Clip a lane's action, and set the requested forces and the reward's terms for the action."""
+def take_action(run, episode, own, task, now, lane):
+    """Clip a lane's action, and set the requested forces and the reward's terms for the action.
+
+    With a washout the slow average of the actuator's force is subtracted first, so that the action can't move
+    the mean contact force.
+    """
     for c in range(run.command.shape[0]):
         run.command[c, lane, PLACE.FRAME] = 0.0
         run.command[c, lane, PLACE.HEAD] = 0.0
     now[NOW.EFFORT] = 0.0
     now[NOW.RATE] = 0.0
     for a in range(episode.places.size):
-        action = min(1.0, max(-1.0, episode.action[lane, a]))
+        action, place = min(1.0, max(-1.0, episode.action[lane, a])), episode.places[a]
+        if episode.washout_share > 0.0:
+            row = TASK_ROW.WASHED_OUT + place
+            task[row] += episode.washout_share * own[ROW.FRAME_FORCE + place] * (1.0 / episode.force_limit)
+            action = min(1.0, max(-1.0, action - task[row]))
         change = 0.5 * (action - task[TASK_ROW.ACTION + a])
         now[NOW.EFFORT] += action * action
         now[NOW.RATE] += change * change
         task[TASK_ROW.ACTION + a] = action
-        run.command[CONTROLLED, lane, episode.places[a]] = action * episode.force_limit
+        run.command[CONTROLLED, lane, place] = action * episode.force_limit
 
 
 @inlined
@@ -46,8 +54,7 @@ def end_episode(line, wire, episode, own, task, values, flags, lane):
         ending = ENDING.DIVERGED
     early, at_end = ending > 0, own[ROW.STEP] >= task[TASK_ROW.END]
     if ending == ENDING.DIVERGED:
-        for k in range(RESULT.REWARD, RESULT.CONTACT_FORCE):  # reward and its terms
-            values[k] = 0.0
+        forget_reward(values)
     charge = early_end_charge(episode, own, task) if early else 0.0
     values[RESULT.REWARD] -= charge
     task[TASK_ROW.ENDING] = ending
@@ -75,11 +82,12 @@ def control_lane(packed, entries, values, flags, lane):
     """
     line, wire, pantographs, actuators, run, sensors, samples, episode, running = open_packed(packed)
     own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
-    take_action(run, episode, task, now, lane)
+    take_action(run, episode, own, task, now, lane)
     ended = False
     for _ in range(episode.steps[lane]):
         if own[ROW.STEP] >= task[TASK_ROW.END]:
             break  # beyond the end there are neither line nor rows of samples
+        counts = own[ROW.STEP] >= task[TASK_ROW.COUNTED_FROM]
         begin_terms(task, now)
         now[NOW.STRIDE] = mean_stride(run, CONTROLLED, lane, float(episode.control_steps))
         for step in range(1, episode.control_steps + 1):
@@ -90,7 +98,10 @@ def control_lane(packed, entries, values, flags, lane):
             add_sample_to_figures(running, samples, own, task, frame, head, lane)
             take_readings(sensors, CONTROLLED, step, own, now[NOW.READING :], lane)
         compute_reward(episode, own, task, now, values)
-        add_control_step_to_figures(task, now, values)
+        if counts:
+            add_control_step_to_figures(task, now)
+        else:
+            forget_reward(values)
         ended = end_episode(line, wire, episode, own, task, values, flags, lane)
         if ended:
             break

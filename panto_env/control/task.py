@@ -144,6 +144,7 @@ class Task(TaskState):
             channels=tuple(int(place) for place in self.actuator.places),
             force_limit=self.actuator.force_limit,
             control_interval=self.length.control_interval,
+            washout=self.settings.washout,
             speed=float(self.speed[lane]),
             alignment=self.plant.alignment,
             nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),

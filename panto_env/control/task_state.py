@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..base.arrays import Array
 from ..plant.actuators import ActuatorSettings
 from .length import EpisodeLength
@@ -32,7 +34,8 @@ class TaskState(Stepping):
         Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
         """
         if self.passive is None:
-            return nominal, nominal
+            required = [target_mean(self.settings, speed) for speed in speeds.tolist()]
+            return nominal if None in required else np.array(required, dtype=float), nominal
         return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
 
     def target_mean(self, lane: int) -> float:
