@@ -20,9 +20,9 @@ from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 @inlined
 def take_action(run, episode, task, now, lane):
     """Clip a lane's action, and set the requested forces and the reward's terms for the action."""
-    for c in range(run.command.shape[0]):
-        run.command[c, lane, PLACE.FRAME] = 0.0
-        run.command[c, lane, PLACE.HEAD] = 0.0
+    for c in range(len(run.distance)):
+        for place in (PLACE.FRAME, PLACE.HEAD):
+            run.table[c, lane, ROW.COMMAND + place] = 0.0
     now[NOW.EFFORT] = 0.0
     now[NOW.RATE] = 0.0
     for a in range(episode.places.size):
@@ -31,7 +31,7 @@ def take_action(run, episode, task, now, lane):
         now[NOW.EFFORT] += action * action
         now[NOW.RATE] += change * change
         task[TASK_ROW.ACTION + a] = action
-        run.command[CONTROLLED, lane, episode.places[a]] = action * episode.force_limit
+        run.table[CONTROLLED, lane, ROW.COMMAND + episode.places[a]] = action * episode.force_limit
 
 
 @inlined
