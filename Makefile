@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -42,7 +42,7 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 test: $(READY) lint
-	$(BIN)/pytest -n auto --dist worksteal -m 'not slow'
+	$(BIN)/pytest -n auto --dist worksteal -m 'not slow and not study'
 
 # The documentation as a site, warnings as errors. `make proofs` builds it too, and follows every link within it.
 SITE := docs/_build/html
@@ -74,9 +74,13 @@ CASES := 2000
 proofs: $(READY)
 	CASES=$(CASES) $(BIN)/pytest -n auto --dist worksteal -m slow
 
+# Studies of minutes each: papers 1 and 2 against what the documents say of them, and learning from whole data sets.
+studies: $(READY)
+	$(BIN)/pytest -n auto --dist worksteal -m study
+
 # Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
 coverage: $(READY)
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m 'plain and not slow'
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m 'plain and not slow and not study'
 	$(BIN)/coverage report
 
 # Share of generated mutants that the tests notice, room by room; ROOMS= for some of the rooms.

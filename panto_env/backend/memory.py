@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+import itertools
 import math
 from typing import Any, NamedTuple, Self
 
@@ -14,8 +15,16 @@ CACHE_LINE = 64
 PAGE = 4096
 
 
-def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int = 0) -> NDArray[Any]:
-    """Zeros that begin ``place`` bytes after the start of a page, a whole number of cache lines."""
+_places = itertools.cycle(range(2 * CACHE_LINE, PAGE, 5 * CACHE_LINE))
+
+
+def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int | None = None) -> NDArray[Any]:
+    """Zeros that begin ``place`` bytes after the start of a page, a whole number of cache lines.
+
+    By default each array gets another place: a processor takes a read for one of what was just written where
+    both have the same place in their pages.
+    """
+    place = next(_places) if place is None else place
     item, count = np.dtype(kind).itemsize, math.prod(shape)
     spare = np.zeros(count + 2 * PAGE // item, dtype=kind)
     first = (place - spare.ctypes.data) % PAGE // item
@@ -71,7 +80,7 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
     number = {key: block for block, key in enumerate(used)}
 
     def field(value: Any) -> Any:
-        if isinstance(value, tuple):
+        if hasattr(value, "_fields"):
             return _apart(value)[1][0]
         if not isinstance(value, np.ndarray):
             return value

@@ -6,7 +6,7 @@ import os
 import time
 import weakref
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 
 from ..base.machine import cores
 from .compile import JIT
@@ -50,10 +50,10 @@ class LaneThreads:
             self._pool.submit(self._run, *work, limits[k], limits[k + 1]) for k in range(1, self._threads)
         ]
         try:
-            answer = self._run(*work, 0, limits[1])
+            answers = [self._run(*work, 0, limits[1])]
         finally:
-            wait(shares)
-        return max(answer, *(share.result() for share in shares))
+            answers += [share.result() for share in shares]
+        return max(answers)
 
     def _try(self, work: tuple[object, ...]) -> int:
         """Make a step in one thread and time it; the last trial decides whether more threads pay off."""

@@ -24,22 +24,22 @@ def take_action(run, episode, own, task, now, lane):
     With a washout the slow average of the actuator's force is subtracted first, so that the action can't move
     the mean contact force.
     """
-    for c in range(run.command.shape[0]):
-        run.command[c, lane, PLACE.FRAME] = 0.0
-        run.command[c, lane, PLACE.HEAD] = 0.0
+    for c in range(len(run.distance)):
+        for place in (PLACE.FRAME, PLACE.HEAD):
+            run.table[c, lane, ROW.COMMAND + place] = 0.0
     now[NOW.EFFORT] = 0.0
     now[NOW.RATE] = 0.0
     for a in range(episode.places.size):
-        action, place = min(1.0, max(-1.0, episode.action[lane, a])), episode.places[a]
+        action, acted = min(1.0, max(-1.0, episode.action[lane, a])), episode.places[a]
         if episode.washout_share > 0.0:
-            row = TASK_ROW.WASHED_OUT + place
-            task[row] += episode.washout_share * own[ROW.FRAME_FORCE + place] * (1.0 / episode.force_limit)
+            row = TASK_ROW.WASHED_OUT + acted
+            task[row] += episode.washout_share * own[ROW.FRAME_FORCE + acted] * (1.0 / episode.force_limit)
             action = min(1.0, max(-1.0, action - task[row]))
         change = 0.5 * (action - task[TASK_ROW.ACTION + a])
         now[NOW.EFFORT] += action * action
         now[NOW.RATE] += change * change
         task[TASK_ROW.ACTION + a] = action
-        run.command[CONTROLLED, lane, place] = action * episode.force_limit
+        own[ROW.COMMAND + acted] = action * episode.force_limit
 
 
 @inlined

@@ -19,7 +19,7 @@ from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
-from .state import SAMPLE_ROWS, Place, Row, Run, Samples, Scratch
+from .state import SAMPLE_ROWS, Place, Row, Run, Samples
 from .step import advance
 from .train import Train
 
@@ -70,11 +70,8 @@ class Plant:
         self.actuators = actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
-            table=aligned_zeros((count, lanes, Row.STATE + size)),
-            distance=np.array([collector.distance for collector in train.collectors]),
-            command=aligned_zeros((count, lanes, len(Place))),
-            scratch=aligned_zeros((count, lanes, len(Scratch))),
-            free_state=aligned_zeros((count, lanes, size)),
+            table=aligned_zeros((count, lanes, Row.STATE + 2 * size)),
+            distance=tuple(collector.distance for collector in train.collectors),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
             lowest_force=-np.inf if bilateral else 0.0,
@@ -167,7 +164,7 @@ class Plant:
         table[:, Row.STRIDE] = speeds * self.time_step
         table[:, Row.NOMINAL_FORCE] = nominal_forces
         table[:, Row.CONTACT_FORCE] = forces
-        table[:, Row.STATE :] = state
+        table[:, Row.STATE : Row.STATE + state.shape[1]] = state
         table[:, Row.HEAD_HEIGHT] = state[:, 0]
         table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip

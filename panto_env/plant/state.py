@@ -34,18 +34,15 @@ class Row(IntEnum):
     STEP = 8  # steps since the start
     STRIDE = 9  # distance covered in one step (m), the mean where the speed drifts
     NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
-    STATE = 11  # displacements (m), then velocities (m/s) of the pantograph, head first
+    COMMAND = 11  # of the actuators (N), a row per ``Place``
+    IRREGULARITY = 13  # of the contact wire's height, at mid-step (m)
+    WIRE_BEFORE = 14  # height of the wire where it is touched, at the step's start (m)
+    WIRE_MIDDLE = 15  # its height at mid-step, without the forces of this step (m)
+    STATE = 16  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
+    # same at the step's end, without the contact force
 
 
-class Scratch(IntEnum):
-    """Rows of a collector's scratch values within a step."""
-
-    IRREGULARITY = 0  # of the contact wire's height, at mid-step (m)
-    WIRE_BEFORE = 1  # height of the wire where it is touched, at the step's start (m)
-    WIRE_MIDDLE = 2  # its height at mid-step, without the forces of this step (m)
-
-
-ROW, PLACE, SCRATCH = constants(Row), constants(Place), constants(Scratch)
+ROW, PLACE = constants(Row), constants(Place)
 SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 """Rows of a sample: the first ones."""
 
@@ -53,11 +50,8 @@ SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 class Run(NamedTuple):
     """State of all lanes: position of each train, motion of its pantographs, contact forces."""
 
-    table: Array  # (collectors, lanes, STATE + 2n): the rows above
-    distance: Array  # (collectors,): behind the first collector (m)
-    command: Array  # (collectors, lanes, places): of the actuators (N)
-    scratch: Array  # (collectors, lanes, rows of ``Scratch``)
-    free_state: Array  # (collectors, lanes, 2n): at the step's end, without the contact force
+    table: Array  # (collectors, lanes, STATE + 4n): the rows above
+    distance: tuple[float, ...]  # of each collector behind the first (m); kernels know a tuple's length
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     lowest_force: float  # 0, or -inf for a contact that may pull (N)

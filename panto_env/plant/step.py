@@ -15,7 +15,7 @@ from .catenary.protocol import (
 )
 from .contact import contact_force
 from .pantograph.step import PART, add_contact_force, move_freely
-from .state import PLACE, ROW, SAMPLE_ROWS, SCRATCH, own_row
+from .state import PLACE, ROW, SAMPLE_ROWS, own_row
 from .train import mean_stride, position
 from .trigonometry import cosine_of_turns
 
@@ -32,14 +32,14 @@ def irregularity(run, x, lane):
 @inlined
 def approach(line, wire, pantographs, actuators, run, contact, lane):
     """Begin the step of one collector: everything except the contact force."""
-    own, scratch = run.table[contact, lane], run.scratch[contact, lane]
-    drive(actuators, pantographs, contact, own, run.command[contact, lane], lane)
-    move_freely(pantographs, contact, own, run.free_state[contact, lane], lane)
+    own = run.table[contact, lane]
+    drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
+    move_freely(pantographs, contact, own, lane)
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)
-    scratch[SCRATCH.IRREGULARITY] = irregularity(run, x, lane)
+    own[ROW.IRREGULARITY] = irregularity(run, x, lane)
     before, middle = place_contact(line, wire, lane, contact, x)
-    scratch[SCRATCH.WIRE_BEFORE] = before
-    scratch[SCRATCH.WIRE_MIDDLE] = middle
+    own[ROW.WIRE_BEFORE] = before
+    own[ROW.WIRE_MIDDLE] = middle
 
 
 @inlined
@@ -55,20 +55,18 @@ def rise_along(line, wire, run, contact, own, lane):
 @inlined
 def meet(line, wire, pantographs, run, contact, lane):
     """Compute the contact force over the step, from head and wire as they would move without it."""
-    own, scratch = run.table[contact, lane], run.scratch[contact, lane]
-    free_head, parts = (
-        run.free_state[contact, lane, 0],
-        pantographs.table[contact, own_row(pantographs.table[contact], lane)],
-    )
+    own = run.table[contact, lane]
+    parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
+    free_head = own[ROW.STATE + pantographs.size]
     contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, own, lane)
     free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, contact, x)
-    before, irregular = scratch[SCRATCH.WIRE_BEFORE], scratch[SCRATCH.IRREGULARITY]
+    before, irregular = own[ROW.WIRE_BEFORE], own[ROW.IRREGULARITY]
     head = own[ROW.STATE]
-    middle = share * 0.5 * (before + free_wire) + (1.0 - share) * scratch[SCRATCH.WIRE_MIDDLE]
+    middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.WIRE_MIDDLE]
     middle_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
     force = contact_force(
         parts[PART.STRIP_COMPLIANCE] + spring,
@@ -92,7 +90,7 @@ def finish(pantographs, run, contact, lane):
     frame, head_speed = ROW.STATE + pantographs.size // 2 - 1, ROW.STATE + pantographs.size // 2
     frame_speed = ROW.STATE + pantographs.size - 1
     frame_before, head_speed_before, frame_speed_before = own[frame], own[head_speed], own[frame_speed]
-    add_contact_force(pantographs, contact, own, run.free_state[contact, lane], lane)
+    add_contact_force(pantographs, contact, own, lane)
     own[ROW.FRAME_HEIGHT] = 0.5 * (frame_before + own[frame])
     own[ROW.HEAD_VELOCITY] = 0.5 * (head_speed_before + own[head_speed])
     own[ROW.FRAME_VELOCITY] = 0.5 * (frame_speed_before + own[frame_speed])
@@ -101,14 +99,14 @@ def finish(pantographs, run, contact, lane):
 
 @inlined
 def step_lane(line, wire, pantographs, actuators, run, lane):
-    """One step of one lane under ``run.command``."""
-    for c in range(run.table.shape[0]):
+    """One step of one lane under the commands in its rows."""
+    for c in range(len(run.distance)):
         approach(line, wire, pantographs, actuators, run, c, lane)
     advance_wire(line, wire, lane)
-    for c in range(run.table.shape[0]):
+    for c in range(len(run.distance)):
         meet(line, wire, pantographs, run, c, lane)
     end_step(line, wire, lane)
-    for c in range(run.table.shape[0]):
+    for c in range(len(run.distance)):
         finish(pantographs, run, c, lane)
 
 
@@ -118,7 +116,7 @@ def record_lane(line, wire, run, samples, lane):
     rows, uplift, tension = samples.rows, samples.uplift, samples.tension
     n = int(run.table[0, lane, ROW.STEP]) & NOT_NEGATIVE
     if rows.shape[1] > 1:
-        for c in range(run.table.shape[0]):
+        for c in range(len(run.distance)):
             own = run.table[c, lane]
             for k in range(SAMPLE_ROWS):
                 rows[lane, n, c, k] = own[k]
@@ -136,9 +134,9 @@ def advance(packed, samples, command, steps, first, last):
     """
     line, wire, pantographs, actuators, run = open_packed(packed)
     for lane in range(first, last):
-        for c in range(run.table.shape[0]):
+        for c in range(len(run.distance)):
             for place in (PLACE.FRAME, PLACE.HEAD):
-                run.command[c, lane, place] = command[lane, c, place]
+                run.table[c, lane, ROW.COMMAND + place] = command[lane, c, place]
         for _ in range(steps):
             step_lane(line, wire, pantographs, actuators, run, lane)
             record_lane(line, wire, run, samples, lane)

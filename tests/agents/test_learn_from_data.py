@@ -1,4 +1,4 @@
-"""What the examples learn from data alone: small here, as their pages say in `make proofs`."""
+"""What the examples learn from data alone: small here, as their pages say in `make studies`."""
 
 import importlib.util
 from pathlib import Path
@@ -65,7 +65,7 @@ def test_sigma_is_learnt_from_a_few_designs(tmp_path):
     assert errors["trees"] < 0.7 * errors["mean"]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_from_the_whole_data_a_clone_does_what_its_teacher_does_and_sigma_is_known_to_some_percent(tmp_path):
     """Half an hour on two cores: the numbers of docs/datasets.md."""
     pytest.importorskip("torch")

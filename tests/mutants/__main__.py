@@ -41,7 +41,7 @@ class Workbench:
         self.environment = os.environ | {"PYTHONPATH": str(folder / "names"), "PYTHONDONTWRITEBYTECODE": "1"}
         if room.get("plain"):
             self.environment["NUMBA_DISABLE_JIT"] = "1"
-        self.marks = "plain and not slow" if room.get("plain") else "not slow"
+        self.marks = "not slow and not study" + " and plain" * room.get("plain", False)
         self.data = CoverageData(str(folder / "coverage"))
 
     def _python(self, *words: str, seconds: float | None = None) -> subprocess.CompletedProcess[str]:

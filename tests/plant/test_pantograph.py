@@ -83,9 +83,10 @@ def test_scatter_is_of_its_size_and_leaves_nothing_out():
 @kernel
 def swing(pantographs, run, heights):
     """Free motion of a pantograph of one mass, from where it is."""
-    own, after = run.table[0, 0], run.free_state[0, 0]
+    own = run.table[0, 0]
+    after = own[ROW.STATE + 2 :]
     for k in range(heights.size):
-        move_freely(pantographs, 0, own, after, 0)
+        move_freely(pantographs, 0, own, 0)
         own[ROW.STATE] = after[0]
         own[ROW.STATE + 1] = after[1]
         heights[k] = own[ROW.STATE]
@@ -99,7 +100,7 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
     plant = Plant(load_catenary("en50318-2002"), Train.of(data), numerics=Numerics(time_step=2e-4, window=3))
     plant.start(0, 50.0)
     _, _, pantographs, _, run = plant.arrays
-    run.table[0, 0, Row.STATE :] = 0.02, 0.0
+    run.table[0, 0, Row.STATE : Row.STATE + 2] = 0.02, 0.0
     height = np.zeros(6000 if JIT else 1500)
     swing(pantographs, run, height)
     up = np.diff(height) > 0

@@ -1,11 +1,5 @@
 """Trainings and benchmarks that come with the project, by name, from a wheel too."""
 
-import os
-import shutil
-import subprocess
-import sys
-import tomllib
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -43,34 +37,3 @@ def test_unknown_names_are_refused_with_those_that_are_known():
         load_training("pp0")
     with pytest.raises(InputError, match=r"benchmark file ppo does not exist; .* known are benchmark, "):
         load_benchmark("ppo")
-
-
-def test_wheel_carries_every_module_and_every_toml_file(tmp_path):
-    pytest.importorskip("setuptools", minversion="77")
-    project, out = tmp_path / "project", tmp_path / "out"
-    folders = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"]
-    for folder in folders.values():
-        shutil.copytree(ROOT / folder, project / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, project)
-    code = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"
-    subprocess.run([sys.executable, "-c", code, out], cwd=project, check=True, capture_output=True)
-    (wheel,) = out.glob("*.whl")
-    unpacked = tmp_path / "unpacked"
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(unpacked)
-    for package, folder in folders.items():
-        wanted = {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.py")}
-        wanted |= {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.toml")}
-        wanted |= {path.relative_to(ROOT / folder) for path in (ROOT / folder).glob("report/templates/*.*")}
-        found = {path.relative_to(unpacked / package) for path in (unpacked / package).rglob("*.*")}
-        assert wanted - found == set(), package
-    code = (
-        "import panto_configs; from panto_baselines.benchmark.settings import load_benchmark;"
-        "print(panto_configs.__file__, load_benchmark('benchmark').seeds)"
-    )
-    environment = os.environ | {"PYTHONPATH": str(unpacked)}
-    told = subprocess.run(
-        [sys.executable, "-c", code], env=environment, cwd=out, check=True, capture_output=True, text=True
-    )
-    assert told.stdout.startswith(str(unpacked))

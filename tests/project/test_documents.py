@@ -74,6 +74,7 @@ BY_HAND = {
     "lint": "part of test",
     "notebook": "two minutes; a slow test runs it, too",
     "nonsense": "any number of lines; proofs run some",
+    "studies": "ten minutes; quick tests run parts of each",
     "ptx": "wants an environment of its own",
     "ray": "wants an environment of its own",
     "rllib": "wants an environment of its own",

@@ -187,7 +187,7 @@ def outcome(told: list[float]) -> Outcome:
     return find_study("paper1-control")(lambda what, share: told.append(share))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_every_comparison_is_what_the_documents_say(outcome: Outcome) -> None:
     ours = {item.quantity: item.ours for item in outcome.comparisons}
     assert set(ours) == set(EXPECTED)
@@ -197,7 +197,7 @@ def test_every_comparison_is_what_the_documents_say(outcome: Outcome) -> None:
     assert all(item.note for item in outcome.comparisons if not item.agrees)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_gains_are_chosen_by_the_rules_that_their_comments_give(outcome: Outcome) -> None:
     """Least gain without loss; least of the largest losses with the realistic actuator."""
     rows = [[float(cell) for cell in row] for row in table(outcome, "over the gain").rows]
@@ -208,7 +208,7 @@ def test_gains_are_chosen_by_the_rules_that_their_comments_give(outcome: Outcome
     assert [row[0] for row in rows] == list(GAINS)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_two_fifths_of_the_loss_at_400_kmh_are_saved_by_pressing_harder_alone(outcome: Outcome) -> None:
     found = table(outcome, "Control and its parts")
     rows = {row[0]: row for row in found.rows if row[1] == "400"}
@@ -218,7 +218,7 @@ def test_two_fifths_of_the_loss_at_400_kmh_are_saved_by_pressing_harder_alone(ou
     assert float(passive[loss]) == pytest.approx(3.16, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_frame_damping_as_shipped_loses_contact_through_the_realistic_actuator(outcome: Outcome) -> None:
     """At 400 km/h alone, and on both grids: a coarser grid with delays of whole steps found no loss."""
     found = table(outcome, "Time step and grid")
@@ -231,7 +231,7 @@ def test_frame_damping_as_shipped_loses_contact_through_the_realistic_actuator(o
             assert cells[f"{LINE}, realistic: {name}", speed] == (0.0, 0.0), name
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_feedback_with_frame_damping_stands_delay_but_not_every_lag(outcome: Outcome) -> None:
     """The largest loss at 300, 350 and 400 km/h: ideal, delay of 5 ms, lag of 15 ms, realistic."""
     rows = {
@@ -245,7 +245,7 @@ def test_feedback_with_frame_damping_stands_delay_but_not_every_lag(outcome: Out
     assert rows[STRONG] == [0, 0, 0, 0]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_lower_gain_with_twice_the_damping_keeps_contact_at_all_speeds(outcome: Outcome) -> None:
     """With the realistic actuator and on both grids; so do the dampings beside it."""
     found = table(outcome, "pd over gain and damping")
@@ -258,7 +258,7 @@ def test_a_lower_gain_with_twice_the_damping_keeps_contact_at_all_speeds(outcome
     assert {row[column] for row in over_speed.rows} == {"0.00"}
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_other_line_is_lost_at_400_kmh(outcome: Outcome) -> None:
     found = table(outcome, "The same on")
     loss = found.headings.index("CL (%)")
@@ -270,7 +270,7 @@ def test_the_other_line_is_lost_at_400_kmh(outcome: Outcome) -> None:
     assert min(loss for (_, speed), loss in cells.items() if speed == "400") > 15  # whatever the control
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_frame_damping_as_shipped_does_harm_on_the_other_line(outcome: Outcome) -> None:
     """At 300 km/h through the realistic actuator, where nothing is lost without control, on both grids."""
     found = table(outcome, "Time step and grid")
@@ -282,7 +282,7 @@ def test_frame_damping_as_shipped_does_harm_on_the_other_line(outcome: Outcome) 
         assert cells[f"{OTHER_LINE}, realistic: {STRONG}", speed] == (0.0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_finer_grid_and_time_step_say_the_same(outcome: Outcome) -> None:
     """But of the strong feedback through the realistic actuator, which hammers the wire."""
     found = table(outcome, "Time step and grid")
@@ -297,7 +297,7 @@ def test_a_finer_grid_and_time_step_say_the_same(outcome: Outcome) -> None:
         assert fine_cost == pytest.approx(cost, rel=0.005), (name, speed)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_finer_grid_and_time_step_say_the_same_over_speed_gain_and_angle(outcome: Outcome) -> None:
     for words in ("over speed on both grids", "pd over gain and damping"):
         rows = table(outcome, words).rows
@@ -323,7 +323,7 @@ def test_a_row_of_the_page_is_known_by_every_cell() -> None:
     assert not same(["a", "31.49", "50.1"], ["a", "31.49", "53.0"])
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     """Each table of the page with a title above it, cell by cell."""
     printed = {each.title: each for each in outcome.tables}
@@ -334,7 +334,7 @@ def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     check_page(PAGE, printed)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_outcome_is_written_with_a_picture_a_figure(
     outcome: Outcome, told: list[float], tmp_path: Path
 ) -> None:

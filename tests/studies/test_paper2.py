@@ -48,7 +48,7 @@ DIFFER = {
     "σ on the rig with all links real, over passive, 350 km/h",
 }
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.study
 
 
 @pytest.fixture(scope="module")

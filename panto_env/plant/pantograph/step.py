@@ -74,13 +74,14 @@ def move_apart(pantographs, collector, own, place, first, lane):
 
 
 @inlined
-def move_freely(pantographs, collector, own, free_state, lane):
-    """Write the state of a lane's pantograph after a step without contact force to ``free_state``."""
+def move_freely(pantographs, collector, own, lane):
+    """Write the state of a lane's pantograph after a step without contact force behind its present state."""
     size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
     on_frame, on_head = own[ROW.NOMINAL_FORCE] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+    free_state = own[ROW.STATE + size :]
     for r in range(0, size, 2):  # in pairs, which a processor computes side by side
         total = frame_input[r] * on_frame + head_input[r] * on_head
         other = frame_input[r + 1] * on_frame + head_input[r + 1] * on_head
@@ -95,10 +96,10 @@ def move_freely(pantographs, collector, own, free_state, lane):
 
 
 @inlined
-def add_contact_force(pantographs, collector, own, free_state, lane):
+def add_contact_force(pantographs, collector, own, lane):
     """End the step: add the effect of the contact force to the free motion."""
     parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     state, force = own[ROW.STATE :], own[ROW.CONTACT_FORCE]
-    contact_input = parts[PART.CONTACT_INPUT :]
+    contact_input, free_state = parts[PART.CONTACT_INPUT :], own[ROW.STATE + pantographs.size :]
     for r in range(pantographs.size):
         state[r] = free_state[r] + contact_input[r] * force

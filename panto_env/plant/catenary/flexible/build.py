@@ -167,7 +167,7 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
     wire = FlexibleWire(
         # The leapfrog reads and writes both side by side. Were they at the same place of a page, a processor
         # would take a read of one for a read of what it has just written to the other, and wait.
-        displacement=aligned_zeros((lanes, *wires), real),
+        displacement=aligned_zeros((lanes, *wires), real, place=0),
         increment=aligned_zeros((lanes, *wires), real, place=21 * CACHE_LINE),
         first_span=np.zeros(lanes, dtype=np.int64),
         contact_row=np.zeros((lanes, collectors), dtype=np.int64),
