@@ -153,7 +153,7 @@ class Task(TaskState):
         )
 
     def figures(self, lane: int) -> Figures:
-        """Figures of a lane's control steps so far, the same as its trajectory's summary.
+        """Figures of a lane's control steps so far that count, as its trajectory's summary gives them.
 
         Raises InputError where the computation diverged.
         """

@@ -51,7 +51,9 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={{"place": "both"}}`: share of the actuator's
     force limit (100 N by default), up on the frame or up on the head and down on the mass
     below it. Held for one control interval (10 ms). Values outside are clipped; NaN, infinite or
-    wrongly shaped actions raise an error and do not change the environment.
+    wrongly shaped actions raise an error and do not change the environment. With `washout`, as in
+    `Pantograph-v0`, the slow average of the actuator's force is subtracted from the action, so that no policy
+    can gain by a larger or smaller mean contact force; `washout=None` for policies that command forces.
 
     ## Observation Space
     `Box(-10, 10, (n,), float32)`; each entry is a physical value minus its centre, divided by its scale. In
@@ -70,12 +72,14 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Rewards
     Minus the cost function CF over the control step (relative to the nominal force) and minus the
-    share of the step without contact (paper 1, Eqs 13-14); weights by `reward`, where terms for
-    effort and rate of the action and for the mean force have weight 0 except in `Pantograph-v0`. Your own
-    `reward` replaces all its weights. `reward="agent"` is what the benchmark measures: the squared deviation
-    of the low-passed contact force from the passive run's mean, over its variance there, with terms that hold
-    the mean and prevent chattering. `info["reward_terms"]` holds the unweighted terms: over an episode
-    "cost_function" sums to CF (N m) and "contact_loss" to CL (%).
+    share of the step without contact (paper 1, Eqs 13-14), and further terms that have weight 0 in
+    `reward="paper1"`, the default of the class. `Pantograph-v0` has `reward="benchmark"`, whose return ranks
+    policies as the benchmark does: CF and CL, beside them the squared deviation of the low-passed contact
+    force over its variance in a passive run, and a tenth of the squared rate of the action, all from the mean
+    of a passive run. Your own `reward` replaces all weights. `info["reward_terms"]` holds the unweighted
+    terms: over an episode "cost_function" sums to CF (N m), about the reward's target, and "contact_loss" to
+    CL (%). In the spans of `settle`, six in `Pantograph-v0`, waves build up about the train: a policy acts,
+    and the reward and its terms are 0.
 
     ## Starting State
     At the start of the line, at rest under the nominal force; with `run_in`, up to that many spans later.
@@ -87,10 +91,12 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
-    actuators (N), position (m), speed (km/h), the reward's terms. `info["figures"]` holds the episode's
-    figures when it ends, those of `Trajectory.summary()`. Until then they are infinite; a figure that the run
-    does not have, such as uplift where no support is passed, stays infinite. A `TimeLimit` ends episodes
-    without the environment's knowledge: `trajectory.summary()` has the figures then, too.
+    actuators (N), position (m), speed (km/h), the reward's terms. `info["figures"]` holds the figures of
+    an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
+    end. `trajectory.summary()` has those of whole spans after the start has died out, which the benchmark
+    compares. Until the end they are infinite; a figure that the run does not have, such as uplift where no
+    support is passed, stays infinite. A `TimeLimit` ends episodes without the environment's knowledge:
+    `trajectory.summary("all")` has the figures of all of it then, too.
 
     ## Arguments
     {arguments}
