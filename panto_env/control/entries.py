@@ -28,7 +28,7 @@ CENTRES = {
     "frame displacement": (0.084, 0.013),
     "head velocity": (0.0, 0.1),
     "frame velocity": (0.0, 0.1),
-    "speed": (70.0, 10.0),
+    "speed": (76.0, 12.0),
     "nominal force": (120.0, 30.0),
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""

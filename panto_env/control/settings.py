@@ -163,7 +163,7 @@ class RunSettings(Numerics):
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
         "standard's maximum; by default as the pantograph's data say: its force applied, or met by the mean",
     )
-    washout: Annotated[float, BeforeValidator(_none_is_zero), Between(0, 100, "s")] = Field(
+    washout: Annotated[float, Between(0, 100, "s"), BeforeValidator(_none_is_zero)] = Field(
         0.0,
         description="time constant (s) of the slow average of the actuator's force that is subtracted from "
         "the action, so that it can't move the mean contact force; 0 or None: nothing is subtracted",

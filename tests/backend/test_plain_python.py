@@ -18,20 +18,21 @@ from panto_env.catalog import load_catenary
 pytestmark = pytest.mark.plain
 
 DEFECTS = {"broken_droppers": [(1, 2)], "miscut_droppers": [(1, 4, 0.02)], "irregularity": 1.0}
+LIGHT = {"precision": "double", "reward": "paper1", "settle": 0.0}  # without passive runs, in plain Python
 CASES = {
     "stiffness": ("PantographStiffness-v0", {"sensors": "realistic", "pantograph_scatter": 0.1}),
     "three spans": ("PantographThreeSpan-v0", {"speed_kmh": 340, "control_interval": 0.05}),
-    "flexible": ("Pantograph-v0", {"precision": "double", "window": 3, "actuator": "realistic"}),
+    "flexible": ("Pantograph-v0", LIGHT | {"window": 3, "actuator": "realistic"}),
     "both actuators": (
         "PantographStiffness-v0",
         {"observation": "full", "actuator": {"place": "both", "delay": 0.01}, "sensors": {"delay": 0.02}},
     ),
     "motors": ("PantographStiffness-v0", {"actuator": {"kind": "motor", "place": "both"}}),
     "loose motors": ("PantographStiffness-v0", {"actuator": "head-motor:backlash=0.014"}),
-    "defects": ("Pantograph-v0", {"precision": "double", "window": 3, "line_condition": DEFECTS}),
+    "defects": ("Pantograph-v0", LIGHT | {"window": 3, "line_condition": DEFECTS}),
     "clamps": (
         "Pantograph-v0",
-        {"catenary": "re330", "precision": "double", "window": 3, "observation": "full"},
+        LIGHT | {"catenary": "re330", "window": 3, "observation": "full"},
     ),
 }
 STEPS = {"three spans": 20, "stiffness": 30}

@@ -43,7 +43,7 @@ def actions():
 
 @pytest.mark.parametrize("name", ["panto_env:PantographStiffness-v0", "panto_env:Pantograph-v0"])
 def test_effort_and_rate_are_those_of_the_clipped_actions(name, actions):
-    env = gymnasium.make(name, actuator=BOTH).unwrapped
+    env = gymnasium.make(name, actuator=BOTH, settle=0.0, washout=None).unwrapped
     effort, rate = effort_and_rate(actions)
     for seed in (0, 1):  # a second episode begins from no action too
         _, terms, _ = play(env, actions, seed)
@@ -184,7 +184,7 @@ def test_presets_of_the_reward():
     )
     assert usual == preset != other
     assert REWARDS["agent"].low_passed > 0
-    with pytest.raises(InputError, match="reward must be 'paper1' or 'agent'"):
+    with pytest.raises(InputError, match="reward must be 'paper1' or 'benchmark' or 'agent'"):
         gymnasium.make(NAME, reward="papr1")
 
 

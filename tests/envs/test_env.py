@@ -42,7 +42,7 @@ def test_gymnasium_and_stable_baselines_find_no_fault(name, settings):
 
 @pytest.mark.parametrize("name", IDS)
 def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
-    env = gymnasium.make(name, speed_kmh=320, run_in=0.0)
+    env = gymnasium.make(name, speed_kmh=320, run_in=0.0, settle=0.0, reward="paper1")
     _, infos, terminated = run_episode(env)
     assert not terminated
     run = env.unwrapped.trajectory

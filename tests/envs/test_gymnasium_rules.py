@@ -11,7 +11,13 @@ from gymnasium.wrappers import TimeAwareObservation
 
 from panto_env.envs import IDS
 
-LIVELY = {"sensors": "realistic", "line_condition": "fair", "speed_kmh": (200, 300), "distance": 20.0}
+LIVELY = {
+    "sensors": "realistic",
+    "line_condition": "fair",
+    "speed_kmh": (200, 300),
+    "distance": 20.0,
+    "settle": 0.0,
+}
 
 
 @pytest.fixture(autouse=True)
@@ -73,7 +79,7 @@ def test_every_info_has_the_same_keys(name):
 
 @pytest.mark.parametrize("name", IDS)
 def test_environment_is_made_again_from_its_spec(name):
-    env = gymnasium.make(name, speed_kmh=250, distance=100.0)
+    env = gymnasium.make(name, speed_kmh=250, distance=100.0, settle=0.0)
     again = gymnasium.make(env.spec)
     assert again.spec == env.spec
     assert env.spec.max_episode_steps == 144  # 100 m at 0.694 m

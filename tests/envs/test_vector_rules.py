@@ -13,7 +13,13 @@ from panto_env import InputError
 from panto_env.envs import IDS
 from panto_env.plant.state import Row
 
-LIVELY = {"sensors": "realistic", "line_condition": "fair", "speed_kmh": (200, 300), "distance": 20.0}
+LIVELY = {
+    "sensors": "realistic",
+    "line_condition": "fair",
+    "speed_kmh": (200, 300),
+    "distance": 20.0,
+    "settle": 0.0,
+}
 MODES = list(AutoresetMode)
 
 

@@ -121,7 +121,7 @@ def test_more_tension_raises_the_wire_in_the_middle_of_a_span():
 def test_each_lane_has_its_own_line_as_a_single_environment_has():
     """Over the ends of episodes, bit for bit, and each its own tension."""
     name = "panto_env:Pantograph-v0"
-    settings = {"distance": 20.0, "spans": 6, "run_in": 0.5}
+    settings = {"distance": 20.0, "spans": 6, "run_in": 0.5, "settle": 0.0}
     ran = check_lanes_are_singles(name, settings, steps=70)
     assert ran.ends >= 5
     stencil = ran.vector.unwrapped.task.plant.model.line.stencil

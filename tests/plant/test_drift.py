@@ -96,7 +96,7 @@ def test_figures_kept_as_it_runs_are_those_of_the_record(line, tmp_path):
 
 
 def test_terms_of_an_episode_sum_to_its_figures_after_a_run_in():
-    env = gymnasium.make(NAMES[0], **DRIFT, distance=200.0).unwrapped
+    env = gymnasium.make(NAMES[0], **DRIFT, distance=200.0, settle=0.0, reward="paper1").unwrapped
     for seed in range(3):
         _, info = env.reset(seed=seed)
         start, terms, ended = info["position"], np.zeros(2), False
@@ -127,7 +127,7 @@ def test_without_drift_nothing_changes_and_nothing_is_drawn():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_lanes_drift_each_on_its_own_as_single_environments_do(name):
-    settings = {**DRIFT, "distance": 25.0, "speed_kmh": (200.0, 300.0)}
+    settings = {**DRIFT, "distance": 25.0, "speed_kmh": (200.0, 300.0), "settle": 0.0}
     assert check_lanes_are_singles(name, settings, steps=90).ends >= 5
 
 

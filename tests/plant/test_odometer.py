@@ -147,7 +147,7 @@ def test_each_episode_has_another_wheel():
 @pytest.mark.parametrize("name", ["panto_env:Pantograph-v0", NAME])
 @pytest.mark.parametrize("drift", [0.0, 4.0])
 def test_lanes_have_odometers_of_their_own_as_single_environments_do(name, drift):
-    settings = {"sensors": "realistic", "distance": 25.0, "run_in": 1.5, "speed_drift": drift}
+    settings = {"sensors": "realistic", "distance": 25.0, "run_in": 1.5, "speed_drift": drift, "settle": 0.0}
     assert check_lanes_are_singles(name, settings, steps=130).ends >= 8
 
 
