@@ -5,7 +5,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from panto_env import simulate
-from panto_env.analysis.plots import plot_forces, plot_run, say_what_is_hidden
+from panto_env.analysis.plots import mark_supports, plot_forces, plot_run, say_what_is_hidden
+from panto_env.analysis.sweep import sweep
+from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_pantograph
 from panto_env.metrics.low_pass import low_pass, zero_phase_low_pass
 
@@ -102,3 +104,19 @@ def test_a_panel_of_fixed_limits_says_what_it_hides():
     full.plot([0, 1, 2], [10.0, 20.0, 30.0])
     say_what_is_hidden(full)
     assert len(full.texts) == 0
+
+
+def test_supports_are_marked_up_to_the_end_of_the_last_span(run):
+    axis = Figure().subplots()
+    mark_supports(axis, run)
+    marked = [line.get_xdata()[0] for line in axis.lines]
+    last = run.alignment.span_of(run.position[-1])
+    assert marked == pytest.approx(run.alignment.support(np.arange(last + 1)))
+
+
+def test_a_sweep_s_limit_of_sigma_is_three_tenths_of_the_mean():
+    rows = sweep({"speed_kmh": [200.0, 250.0]}, catenary="periodic-stiffness", pantograph="three-mass")
+    figure = plot_sweep(rows, ["speed_kmh"])
+    limits = [0.3 * row["mean"] for row in rows]
+    drawn = [line.get_ydata() for axis in figure.axes for line in axis.lines]
+    assert any(len(values) == 2 and values == pytest.approx(limits) for values in map(list, drawn))

@@ -8,6 +8,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, parameter_names
 from panto_env.analysis.sweep import labels, sweep
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.cli.sweep import _print as print_sweep
 from panto_env.cli.sweep import parse_values
 from panto_env.plant.actuators.lagged import LaggedActuator
 
@@ -279,3 +280,10 @@ def test_what_is_bright_on_a_map_is_bad():
         brightness = mesh.cmap(mesh.norm(values))[:, :3].sum(axis=1)
         worst = values.argmin() if "minimum" in axis.get_title() else values.argmax()
         assert brightness.argmax() == worst
+
+
+def test_the_table_s_title_says_what_all_rows_share(capsys):
+    rows = sweep({"pantograph.masses.0": [6.0]}, catenary="periodic-stiffness", pantograph="three-mass")
+    print_sweep(rows, ["pantograph.masses.0"])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "three-mass on periodic-stiffness at 300 km/h, spans 10-19" in printed

@@ -14,9 +14,11 @@ from matplotlib.figure import Figure
 from panto_env import InputError, simulate
 from panto_env.analysis.options import parse_spans
 from panto_env.analysis.plots import plot_run, save
+from panto_env.base import machine
 from panto_env.base.files import read_toml, write_whole
 from panto_env.base.inline import parse_inline
-from panto_env.base.shown import LONGEST_LINE
+from panto_env.base.settings import Settings, parse
+from panto_env.base.shown import LONGEST_LINE, shown
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.envs import IDS
 from panto_env.policies import find_policy
@@ -124,6 +126,40 @@ def test_a_name_that_no_file_can_have_is_refused(name, message):
 def test_a_value_that_is_no_literal_is_a_word():
     for text in ("(" * 5000, "-" * 5000 + "1", "{[]: 1}"):
         assert parse_inline(f"a={text}") == {"a": text}
+
+
+def test_commas_outside_brackets_separate_also_behind_one_that_closes_nothing():
+    assert parse_inline("b=[1, (2, 3)],c='x,y'") == {"b": [1, (2, 3)], "c": "x,y"}
+    assert parse_inline("a=),b=1") == {"a": ")", "b": 1}
+
+
+def test_values_are_shown_whole_up_to_300_letters():
+    assert shown("x" * 298) == repr("x" * 298)
+    assert shown("x" * 299) == f"'{'x' * 149}...{'x' * 99}'"
+
+
+def test_a_machine_that_does_not_report_its_memory_has_no_limit(monkeypatch):
+    for error in (OSError, ValueError, AttributeError):
+
+        def refuse(name, error=error):
+            raise error
+
+        monkeypatch.setattr("os.sysconf", refuse)
+        assert machine.memory() == float("inf")
+
+
+def test_a_missing_table_is_named_with_its_keys():
+    class Inner(Settings):
+        mass: float
+
+    class Outer(Settings):
+        wire: Inner
+        count: int
+
+    with pytest.raises(
+        InputError, match="'wire' is missing: a table of mass; key 'count' is missing: a value"
+    ):
+        parse(Outer, {}, "the file")
 
 
 def test_a_name_that_is_no_mathematics_is_drawn_as_it_is(tmp_path):

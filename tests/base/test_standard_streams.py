@@ -1,5 +1,7 @@
 """Standard output and error on a full disk, closed, or read by nobody: no traceback, no result lost."""
 
+import errno
+import io
 import json
 import os
 import subprocess
@@ -7,7 +9,8 @@ import sys
 
 import pytest
 
-from panto_env import Trajectory
+from panto_env import InputError, Trajectory
+from panto_env.base.standard_streams import guarded_streams
 
 from ..fuzz.lines import SHORT
 
@@ -83,3 +86,21 @@ def test_closed_output_is_no_error(words, tmp_path):
     done = shell(f"{words} >&-", tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_within_the_body_output_that_fails_is_told_and_streams_are_put_back(monkeypatch):
+    class Full(io.StringIO):
+        def write(self, text):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    full, remarks = Full(), Full()
+    monkeypatch.setattr(sys, "stdout", full)
+    monkeypatch.setattr(sys, "stderr", remarks)
+    with guarded_streams():
+        with pytest.raises(
+            InputError, match=r"^Standard output cannot be written: No space left on device\.$"
+        ):
+            print("a result")
+        print("a remark", file=sys.stderr)  # dropped
+    assert sys.stdout is full
+    assert sys.stderr is remarks

@@ -24,6 +24,19 @@ def test_validate_prints_the_table_and_passes():
     assert "All figures inside." in table.stdout
 
 
+def test_validate_prints_every_table_that_it_made(monkeypatch, capsys):
+    from panto_env.base.table import Table
+    from panto_env.cli import validate
+
+    kind, more = validate.study.Validation, [Table(name, ("x",), (("1",),)) for name in ("lines", "wear")]
+    usual = kind.tables.fget
+    monkeypatch.setattr(kind, "tables", property(lambda self: [*usual(self), *more]))
+    validate.validate()
+    printed = capsys.readouterr().out
+    assert "lines" in printed
+    assert "wear" in printed
+
+
 def test_validate_fails_where_a_figure_lies_outside(monkeypatch, capsys):
     import typer
 

@@ -1,6 +1,7 @@
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -10,6 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import panto_env
 from panto_env import InputError
 from panto_env.envs import BARE, IDS
+from panto_env.envs.settings import frames_per_second
 
 
 @pytest.fixture(autouse=True)
@@ -321,3 +323,15 @@ def test_user_s_own_toml_works_as_a_catalogue_name_does(tmp_path):
     run = panto_env.simulate(str(mine), distance=60)
     assert run.catenary == "mine"
     np.testing.assert_array_equal(run.contact_force, panto_env.simulate(distance=60).contact_force)
+
+
+def test_frames_per_second_are_whole_where_they_nearly_are():
+    assert 1 / (1 / 49) != 49
+    assert [frames_per_second(1 / n, 1.0) for n in range(1, 200)] == list(range(1, 200))
+    assert frames_per_second(0.03, 2.0) == pytest.approx(1 / 0.06)
+
+
+def test_the_page_of_the_default_id_names_its_speeds():
+    low, high = IDS["Pantograph-v0"]["speed_kmh"]
+    page = Path(panto_env.__file__).parents[1] / "docs" / "environments" / "pantograph.md"
+    assert f"at {low:g} to {high:g} km/h" in page.read_text(encoding="utf-8")

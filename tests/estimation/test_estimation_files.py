@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from panto_env import simulate
+from panto_env import InputError, simulate
 from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
@@ -31,6 +31,12 @@ def record(motion, tmp_path_factory):
     path = tmp_path_factory.mktemp("train") / "record.csv"
     write_motion(motion, path)
     return path
+
+
+def shortened(motion, count):
+    """The first samples of a motion."""
+    series = {name: value[:count] for name, value in vars(motion).items() if isinstance(value, np.ndarray)}
+    return dataclasses.replace(motion, **series)
 
 
 def test_a_measurement_is_the_run_with_noise(run):
@@ -85,6 +91,14 @@ def test_a_motion_survives_its_file(motion, record):
     again = read_motion(record, lift=120.0, speed=motion.speed, span=60.0)
     for name in ("head", "frame", "head_velocity", "frame_velocity", "frame_force", "contact_force", "time"):
         np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
+
+
+def test_twenty_samples_are_the_fewest_of_a_record(motion, tmp_path):
+    for count in (19, 20):
+        write_motion(shortened(motion, count), tmp_path / f"{count}.csv")
+    assert len(read_motion(tmp_path / "20.csv", 120.0).head) == 20
+    with pytest.raises(InputError, match="20"):
+        read_motion(tmp_path / "19.csv", 120.0)
 
 
 def test_the_command_prints_compares_and_writes(record, tmp_path):

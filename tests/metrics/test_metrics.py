@@ -38,6 +38,13 @@ def test_low_pass_starts_settled():
     assert low_pass(np.full(100, 120.0), 1e-3) == pytest.approx(120.0)
 
 
+def test_series_are_low_passed_one_by_one():
+    forces = np.random.default_rng(0).normal(100, 20, (3, 2, 200))
+    together = low_pass(forces, 1e-3)
+    for own, expected in zip(together.reshape(6, 200), forces.reshape(6, 200), strict=True):
+        np.testing.assert_allclose(own, low_pass(expected, 1e-3), rtol=1e-12)
+
+
 def test_low_pass_refuses_samples_too_far_apart():
     with pytest.raises(InputError, match="cannot be low-passed at 20 Hz"):
         low_pass(np.ones(10), 0.025)

@@ -77,3 +77,8 @@ def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
 def test_spans_outside_the_run_are_refused(run, spans):
     with pytest.raises(InputError, match="spans"):
         run.summary(spans)
+
+
+def test_a_steady_train_is_at_a_place_after_its_way_over_its_speed(run):
+    for place in (0.0, 0.3 * run.stride, 40.0, run.distance):
+        assert run.time_at(place) == pytest.approx(place / run.speed, abs=1e-12)

@@ -25,6 +25,7 @@ PACKAGES = {
     "panto_env": "panto_env",
     **{f"panto_{name}": name for name in ("agents", "baselines", "configs")},
 }
+OF_EVERY_ROOM = "tests/project/test_defaults.py"
 KERNEL = re.compile(r"^@(kernel|inlined|implements)\b", re.MULTILINE)
 LEFT_OUT = shutil.ignore_patterns(".git", ".venv*", "__pycache__", "runs", "build", "_build", ".*_cache")
 
@@ -33,7 +34,8 @@ class Workbench:
     """A copy of the checkout, and how tests run in it."""
 
     def __init__(self, folder: Path, python: str, room: dict[str, Any]) -> None:
-        self.root, self.python, self.room = folder / "checkout", python, room
+        self.root, self.python = folder / "checkout", python
+        self.room = room | {"tests": [*room["tests"], OF_EVERY_ROOM]}
         shutil.copytree(ROOT, self.root, ignore=LEFT_OUT)
         (folder / "names").mkdir()
         for name, source in PACKAGES.items():

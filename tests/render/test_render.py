@@ -21,7 +21,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
 from panto_env.render.film import excerpt, frames
-from panto_env.render.filmed import policy_pass
+from panto_env.render.filmed import check_together, policy_pass
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
 from panto_env.render.picture import Picture
@@ -279,6 +279,26 @@ def test_a_film_shows_the_pass_that_simulate_makes():
     task = Task(run_settings(settings))
     assert first.shape == (360, 640, 3)
     assert task.plant.time_step == filmed.run.time_step
+
+
+def test_a_film_has_every_so_many_control_steps_that_no_frame_comes_too_fast():
+    """25 frames per second at most: every fourth step of 10 ms, each one in a film slowed down by four."""
+    filmed = policy_pass("pd", {"catenary": "periodic-stiffness", "pantograph": "three-mass"}, 0)
+    for slow_motion, every, rate in ((1.0, 4, 25.0), (4.0, 1, 25.0), (10.0, 1, 10.0)):
+        what = excerpt(filmed, 2, 0.2, slow_motion)
+        assert (what.every, what.rate) == (every, pytest.approx(rate))
+
+
+def test_passes_of_other_speeds_or_control_intervals_are_not_filmed_above_each_other():
+    line = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 100.0}
+    first, same, fast, rare = (
+        policy_pass("p", line | more, 0)
+        for more in ({}, {"sensors": "realistic"}, {"speed_kmh": 250.0}, {"control_interval": 0.02})
+    )
+    check_together([first, same])
+    for other, name in ((fast, "speed"), (rare, "control_interval")):
+        with pytest.raises(InputError, match=f"must have the same {name}"):
+            check_together([first, other])
 
 
 def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):

@@ -18,7 +18,7 @@ from panto_env.cli import make_app
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.report import save
 from panto_env.report.findings import Findings
-from panto_env.report.page import page
+from panto_env.report.page import digits, page
 from panto_env.report.words import LEFT_OUT
 
 from ..catalog.test_catalog import STEP, wire_stiffness
@@ -225,3 +225,13 @@ def test_runs_that_share_a_name_stay_apart(run):
     assert captions == ["300 km/h (a)", "300 km/h (c)"]
     values = re.findall(r"<code>span_length</code></th><td[^>]*>([\d.]+)<", text)
     assert values == ["60.0", "61.0"]
+
+
+def test_numbers_below_ten_have_three_decimals():
+    assert [digits(value) for value in (9.9996, 10.0, -12.34, 0.05, float("nan"))] == [
+        "10.000",
+        "10.0",
+        "-12.3",
+        "0.050",
+        "–",
+    ]

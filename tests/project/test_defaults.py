@@ -1,0 +1,65 @@
+"""A default is part of the interface: whoever changes one changes results, and says so here.
+
+python -m tests.project.test_defaults   # writes defaults.txt anew
+"""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+from panto_env.base.settings import Settings
+from panto_env.control.reward import REWARDS
+from panto_env.envs import IDS
+from panto_env.estimation.settings import ESTIMATORS
+from panto_env.plant.actuators import ACTUATOR_PRESETS
+from panto_env.plant.line_condition import LINE_CONDITIONS
+from panto_env.plant.sensors import SENSOR_PRESETS
+
+STORED = Path(__file__).with_name("defaults.txt")
+PACKAGES = ("panto_env", "panto_baselines", "panto_agents")
+PRESETS = {
+    "actuator": ACTUATOR_PRESETS,
+    "estimator": ESTIMATORS,
+    "line condition": LINE_CONDITIONS,
+    "reward": REWARDS,
+    "sensors": SENSOR_PRESETS,
+}
+
+
+def kinds(parent=Settings):
+    """All classes of settings, whose modules have been imported."""
+    for each in parent.__subclasses__():
+        yield each
+        yield from kinds(each)
+
+
+def defaults():
+    """One line per class of settings, preset and id: its name, and what it sets."""
+    for package in map(importlib.import_module, PACKAGES):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if "__main__" not in module.name:
+                importlib.import_module(module.name)
+    told = {
+        f"{kind.__module__}.{kind.__qualname__}": {
+            name: field.get_default(call_default_factory=True)
+            for name, field in kind.model_fields.items()
+            if not field.is_required() and name != "version"
+        }
+        for kind in kinds()
+        if kind.__module__.partition(".")[0] in PACKAGES
+    }
+    told |= {f"{name} {key}": each for name, preset in PRESETS.items() for key, each in preset.items()}
+    told |= {f"id {name}": each for name, each in IDS.items()}
+    return "".join(f"{name}: {value}\n" for name, value in sorted(told.items()))
+
+
+@pytest.mark.plain
+def test_defaults_are_those_that_are_stored():
+    pytest.importorskip("stable_baselines3")
+    assert defaults() == STORED.read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    STORED.write_text(defaults(), encoding="utf-8")
