@@ -15,7 +15,7 @@ from panto_env.metrics import spans
 from panto_env.metrics.criterion import Criterion
 from panto_env.metrics.figures import Figures
 
-NOT_OF_A_PASS = ("speed_kmh", "reward", "distance", "spans", "run_in", "settle")
+NOT_OF_A_PASS = ("speed_kmh", "reward", "cost", "distance", "spans", "run_in", "settle")
 """Arguments of an environment that do not apply to a pass: it has its own speed and no reward, and runs from
 the line's start until the start has died out."""
 

@@ -31,6 +31,7 @@ class Episode(NamedTuple):
     table: Array  # (lanes, ACTION + actions + history): rows of ``TaskRow``
     now: Array  # (lanes, rows of ``Now``): of the present control step
     weights: Array  # (terms,): of the reward
+    cost_weights: Array  # (terms,): of the cost
     idle: Flags  # (lanes,): lanes that the next call skips
     steps: Index  # (lanes,): control steps per call
     writers: Index  # (entries, 2): writer and number of each entry of the observation
@@ -61,6 +62,7 @@ def new_episode(
         table=aligned_zeros((lanes, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
         now=aligned_zeros((lanes, NOW_ROWS)),
         weights=settings.reward.weights,
+        cost_weights=settings.cost.weights,
         idle=np.zeros(lanes, dtype=np.bool_),
         steps=np.ones(lanes, dtype=np.int64),
         writers=layout.writers,

@@ -15,7 +15,7 @@ from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
 
-NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "settle")
+NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "cost", "settle")
 """Settings that only concern policies; the distance of a run includes what settles."""
 
 

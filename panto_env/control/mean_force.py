@@ -26,7 +26,16 @@ MOST_RUNS = 10
 KNOT_DISTANCE = 5.0
 """Maximum distance (km/h) between the speeds at which a range is trimmed. Between them the force is
 interpolated, and the mean is within about 0.3 N of its target."""
-NO_MATTER = {*OBSERVATION_SETTINGS, "reward", "settle", "actuator", "sensors", "washout", "mean_force"}
+NO_MATTER = {
+    *OBSERVATION_SETTINGS,
+    "reward",
+    "cost",
+    "settle",
+    "actuator",
+    "sensors",
+    "washout",
+    "mean_force",
+}
 """Settings on which the mean force of a passive run does not depend."""
 
 PassiveMean = Callable[[float], float]

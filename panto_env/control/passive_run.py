@@ -31,6 +31,7 @@ NO_MATTER = (
     "estimator",
     "known_pantograph",
     "reward",
+    "cost",
     "settle",
     "actuator",
     "sensors",

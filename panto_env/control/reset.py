@@ -15,6 +15,7 @@ from ..plant.valid_range import Ending
 from .episode import Results
 from .record import ending
 from .running_figures import no_figures
+from .safety import limits
 from .start import LaneGenerators, draw_starts
 from .state import CONTROLLED, Result, TaskRow
 from .task_state import TaskState
@@ -89,6 +90,8 @@ def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
     rows[:, TaskRow.PER_SPREAD] = 1 / spread
+    uplift, force = limits(task.settings.catenary, task.speed[lanes])
+    rows[:, TaskRow.UPLIFT_LIMIT], rows[:, TaskRow.FORCE_LIMIT] = uplift, force
     counted_from = np.maximum(counted_from, start[:, Row.STEP])
     if (counted_from >= end).any():
         raise InputError(
@@ -112,7 +115,8 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(ending(task, lane))
     _begin(task, lanes, rows[:, TaskRow.END], rows[:, TaskRow.COUNTED_FROM])
-    results.values[lanes, : Result.CONTACT_FORCE] = 0.0  # rewards of the run-in do not count
+    # What the run-in would have earned and cost does not count.
+    results.values[lanes, : Result.CONTACT_FORCE] = results.values[lanes, Result.COST] = 0.0
     if task.layout.history:
         _forget(task, lanes, rows, results)
 

@@ -80,6 +80,8 @@ def begin_terms(task, now):
     now[NOW.TARGET_COST] = 0.0
     now[NOW.LOSS_STEPS] = 0.0
     now[NOW.SIGNED_DEVIATION] = 0.0
+    now[NOW.UPLIFT_STEPS] = 0.0
+    now[NOW.FORCE_STEPS] = 0.0
 
 
 @inlined
@@ -134,16 +136,22 @@ def compute_reward(episode, own, task, now, values):
 
 @inlined
 def forget_reward(values):
-    """Set the reward and its terms to 0."""
+    """Set the reward, its terms and the cost to 0."""
+    values[RESULT.COST] = 0.0
     for k in range(RESULT.REWARD, RESULT.CONTACT_FORCE):
         values[k] = 0.0
 
 
 @inlined
-def early_end_charge(episode, own, task):
-    """Charge of an early end: as for the rest of the run without contact, so that ending does not pay."""
+def steps_left(episode, own, task):
+    """Control steps that count between here and the end of the run."""
     from_here = max(own[ROW.STEP], task[TASK_ROW.COUNTED_FROM])
-    left = (task[TASK_ROW.END] - from_here) * (1.0 / episode.control_steps)
+    return (task[TASK_ROW.END] - from_here) * (1.0 / episode.control_steps)
+
+
+@inlined
+def early_end_charge(episode, own, task, left):
+    """Charge of an early end: as for the ``left`` steps without contact, so that ending does not pay."""
     missing = (own[ROW.NOMINAL_FORCE] + task[TASK_ROW.TARGET_SHIFT]) * task[TASK_ROW.PER_SPREAD]
     weights = episode.weights
     return left * (

@@ -11,6 +11,7 @@ from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array
 from ..metrics.low_pass import low_pass_sections
 from ..plant.state import ROW, Row
+from .safety import add_to_limits
 from .state import NOW, TASK_ROW, TaskRow
 
 
@@ -96,17 +97,20 @@ def low_pass(running, task, force):
 
 
 @inlined
-def add_sample_to_figures(running, samples, own, task, frame_before, head_before, lane):
+def add_sample_to_figures(running, samples, own, task, now, frame_before, head_before, lane):
     """Add a plant step; frame_before, head_before: forces of the actuators in the previous step (N).
 
     Before what counts only the filter and the uplift go on.
     """
+    highest = 0.0
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
     if running.peak.shape[1] > 0:
         row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
         peak, uplift = running.peak[lane], samples.uplift[lane, row]
         for s in range(peak.size):
             peak[s] = max(peak[s], uplift[s])
+            highest = max(highest, uplift[s])
+    add_to_limits(task, now, filtered, highest)
     if own[ROW.STEP] <= task[TASK_ROW.COUNTED_FROM]:
         return
     between = 0.0 if task[TASK_ROW.SAMPLES] == 0.0 else 1.0  # a change lies between two samples

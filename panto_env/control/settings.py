@@ -33,6 +33,7 @@ from ..plant.sensors import SensorSettings, sensor_settings
 from ..plant.train import Train
 from .observation import OBSERVATIONS
 from .reward import REWARDS, Reward
+from .safety import CostWeights
 
 R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9
@@ -55,6 +56,10 @@ def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
 
 def _weights(value: Any) -> Reward:
     return parse(Reward, {} if value is None else value, "reward", REWARDS)
+
+
+def _cost(value: Any) -> CostWeights:
+    return parse(CostWeights, {} if value is None else value, "cost")
 
 
 def _observation(value: Any) -> str:
@@ -209,6 +214,12 @@ class RunSettings(Numerics):
         validate_default=True,
         description='weights of the reward\'s terms: "paper1", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
+    )
+    cost: Annotated[CostWeights, BeforeValidator(_cost)] = Field(
+        None,
+        validate_default=True,
+        description='weights of the terms of `info["cost"]`, for safe learning: a table of contact_loss, '
+        "uplift and max_force; by default 1 each",
     )
     settle: Annotated[float, Between(0, 20, "spans")] = Field(
         0.0,

@@ -35,9 +35,11 @@ class TaskRow(IntEnum):
     PER_SPREAD = 6  # 1 / deviation from the target that counts as 1 (1/N)
     COUNTED_FROM = 7  # plant step after which reward and figures count
     WASHED_OUT = 8  # slow average of the actuator's force, in shares of its limit, one row per place
+    UPLIFT_LIMIT = 10  # of the contact wire at a support, above which a step costs (m)
+    FORCE_LIMIT = 11  # of the low-passed contact force, above which a step costs (N)
     # Running figures.
-    FILTERED = 10  # samples that went through EN 50317's filter
-    FILTER_STATE = 11  # of that filter, two rows for each of three sections
+    FILTERED = 12  # samples that went through EN 50317's filter
+    FILTER_STATE = 13  # of that filter, two rows for each of three sections
     SAMPLES = FILTER_STATE + 6  # that count
     DEVIATION = FILTER_STATE + 7  # sum of filtered contact force minus nominal force (N)
     SQUARED_DEVIATION = FILTER_STATE + 8  # sum of the squares (N^2)
@@ -65,7 +67,9 @@ class Now(IntEnum):
     DEVIATION_BEFORE = 8  # ``TaskRow.DEVIATION`` at the start of the control step (N)
     SQUARED_BEFORE = 9  # ``TaskRow.SQUARED_DEVIATION`` at the start of the control step (N^2)
     TARGET_COST = 10  # as COST, of deviations from the reward's target (N)
-    READING = 11  # what the sensors read, one row per ``Reading``
+    UPLIFT_STEPS = 11  # plant steps with an uplift above its limit
+    FORCE_STEPS = 12  # plant steps with a low-passed contact force above its limit
+    READING = 13  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):
@@ -79,6 +83,7 @@ class Result(IntEnum):
     FRAME_FORCE = CONTACT_FORCE + 3  # of the actuator (N)
     HEAD_FORCE = CONTACT_FORCE + 4  # of the actuator (N)
     POSITION = CONTACT_FORCE + 5  # of the pantograph along the line (m)
+    COST = CONTACT_FORCE + 6  # of limits broken, beside the reward
 
 
 class Flag(IntEnum):
@@ -94,5 +99,5 @@ TASK_ROW, TERM, NOW = constants(TaskRow), constants(Term), constants(Now)
 RESULT, FLAG = constants(Result), constants(Flag)
 NOW_ROWS = int(Now.READING) + len(Reading)
 """Rows of ``Now``."""
-RESULT_ROWS = int(Result.POSITION) + 1
+RESULT_ROWS = int(Result.COST) + 1
 """Rows of ``Result``."""

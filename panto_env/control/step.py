@@ -12,8 +12,16 @@ from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .observation import begin_history, entry_of, prepare_entries, remember
-from .reward import add_sample_to_terms, begin_terms, compute_reward, early_end_charge, forget_reward
+from .reward import (
+    add_sample_to_terms,
+    begin_terms,
+    compute_reward,
+    early_end_charge,
+    forget_reward,
+    steps_left,
+)
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
+from .safety import compute_cost
 from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 
@@ -44,7 +52,7 @@ def take_action(run, episode, own, task, now, lane):
 
 @inlined
 def end_episode(line, wire, episode, own, task, values, flags, lane):
-    """Whether a lane's episode ends here; an early end is charged to the reward."""
+    """Whether a lane's episode ends here; an early end is charged to reward and cost."""
     ending = ending_by_wire(line, wire, lane)
     if task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit:
         ending = ENDING.LOSS
@@ -55,8 +63,9 @@ def end_episode(line, wire, episode, own, task, values, flags, lane):
     early, at_end = ending > 0, own[ROW.STEP] >= task[TASK_ROW.END]
     if ending == ENDING.DIVERGED:
         forget_reward(values)
-    charge = early_end_charge(episode, own, task) if early else 0.0
-    values[RESULT.REWARD] -= charge
+    left = steps_left(episode, own, task) if early else 0.0
+    values[RESULT.REWARD] -= early_end_charge(episode, own, task, left) if early else 0.0
+    values[RESULT.COST] += left * episode.cost_weights[0]
     task[TASK_ROW.ENDING] = ending
     flags[FLAG.TERMINATED] = early
     flags[FLAG.TRUNCATED] = at_end and not early
@@ -95,9 +104,10 @@ def control_lane(packed, entries, values, flags, lane):
             step_lane(line, wire, pantographs, actuators, run, lane)
             record_lane(line, wire, run, samples, lane)
             add_sample_to_terms(own, task, now, force)
-            add_sample_to_figures(running, samples, own, task, frame, head, lane)
+            add_sample_to_figures(running, samples, own, task, now, frame, head, lane)
             take_readings(sensors, CONTROLLED, step, own, now[NOW.READING :], lane)
         compute_reward(episode, own, task, now, values)
+        compute_cost(episode, task, now, values)
         if counts:
             add_control_step_to_figures(task, now)
         else:

@@ -21,7 +21,7 @@ from .lanes import Answer, ended_figures
 REWARD, TERM = int(Result.REWARD), int(Result.TERM)
 CONTACT_FORCE, HEAD, WIRE = int(Result.CONTACT_FORCE), int(Result.HEAD_HEIGHT), int(Result.WIRE_HEIGHT)
 FRAME_FORCE, HEAD_FORCE = int(Result.FRAME_FORCE), int(Result.HEAD_FORCE)
-POSITION = int(Result.POSITION)
+POSITION, COST = int(Result.POSITION), int(Result.COST)
 
 FIGURES_TO_COME = {field.name: math.inf for field in fields(Figures)}
 """Figures of an episode that has not ended. Recorders require the same keys in every info; nan would make two
@@ -55,6 +55,8 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
         "_head_force": lanes,
         "position": rows[POSITION],
         "_position": lanes,
+        "cost": rows[COST],
+        "_cost": lanes,
         "speed_kmh": speed_kmh,
         "_speed_kmh": lanes,
         "reward_terms": {

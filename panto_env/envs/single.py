@@ -91,8 +91,10 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
-    actuators (N), position (m), speed (km/h), the reward's terms. `info["figures"]` holds the figures of
-    an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
+    actuators (N), position (m), speed (km/h), the reward's terms, and the cost of safe learning: the share of
+    the step without contact, with an uplift beyond half the room at a support, and with a low-passed contact
+    force beyond EN 50367's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
+    of an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
     end. `trajectory.summary()` has those of whole spans after the start has died out, which the benchmark
     compares. Until the end they are infinite; a figure that the run does not have, such as uplift where no
     support is passed, stays infinite. A `TimeLimit` ends episodes without the environment's knowledge:
@@ -202,7 +204,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         terminated, truncated = self._flags.tolist()
         values = self._values.tolist()
         reward, cost_function, contact_loss, effort, rate, mean_force, low_passed = values[:CONTACT_FORCE]
-        contact_force, head, wire, frame_force, head_force, position = values[CONTACT_FORCE:]
+        contact_force, head, wire, frame_force, head_force, position, cost = values[CONTACT_FORCE:]
         info: dict[str, Any] = {
             "contact_force": contact_force,
             "head": head,
@@ -210,6 +212,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "frame_force": frame_force,
             "head_force": head_force,
             "position": position,
+            "cost": cost,
             "speed_kmh": self._speed_kmh,
             "reward_terms": {
                 "cost_function": cost_function,
