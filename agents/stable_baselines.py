@@ -30,7 +30,8 @@ def save_policy(model: Any, path: str | Path) -> None:
     if name not in ALGORITHMS:
         raise InputError(f"A model of {' or '.join(ALGORITHMS)} is needed, not of {type(model).__name__}.")
     activation = ACTIVATIONS.get(model.policy.activation_fn.__name__)
-    if activation is None or type(model.policy.features_extractor).__name__ != "FlattenExtractor":
+    part = model.policy.actor if name == "sac" else model.policy
+    if activation is None or type(part.features_extractor).__name__ != "FlattenExtractor":
         raise InputError("A model with an MlpPolicy of tanh or relu is needed, without layers of its own.")
     environment = _environment(model.get_env())
     actor = ALGORITHMS[name](activation=activation).actor(model)

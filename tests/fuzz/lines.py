@@ -53,6 +53,7 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("export",): ("agent.safetensors", "model.safetensors"),
     ("oracle",): (*QUICK, "--spans", "1-1", "--hops", "0"),
     ("report",): ("benchmark.json",),
+    ("returns",): ("benchmark.json", "--episodes", "2", "--workers", "1"),
     ("train",): ("training.toml", "--output", "run"),
     ("trainings",): ("training.toml", "--workers", "1"),
     ("tune",): (

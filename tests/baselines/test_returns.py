@@ -1,0 +1,118 @@
+"""Returns beside the benchmark: each is the sum of an episode's rewards, and the correlation is of ranks."""
+
+import json
+from types import SimpleNamespace
+
+import gymnasium
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return, rank_correlation, returns
+from panto_baselines.benchmark.returns_command import returns as command
+from panto_baselines.benchmark.run import run
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_env import InputError
+from panto_env.control.settings import read_settings
+from panto_env.envs import IDS
+from panto_env.envs.settings import EnvironmentSettings
+from panto_env.policies import find_policy
+
+SHORT = {"distance": 120.0, "accuracy": "fast", "settle": 1.0, "speed_kmh": (250.0, 300.0)}
+
+
+class Mean:
+    """Pushes all the time: without a washout it moves the mean."""
+
+    washout = 1.0
+
+    def reset(self, context):
+        self.washout_there = context.washout
+
+    def act(self, observation):
+        assert self.washout_there == 1.0
+        return np.array([0.2])
+
+
+def returned(policy, mean, change, disqualified=""):
+    return Returned(policy, mean, 0.0, change, disqualified)
+
+
+def test_the_correlation_is_spearman_s_and_disqualified_policies_share_the_last_rank():
+    found = [
+        returned("best", -1.0, -40.0),
+        returned("second", -2.0, -30.0),
+        returned("loud", -3.0, -60.0, "moves the mean"),
+        returned("passive", -4.0, 0.0),
+        returned("lost", -5.0, -50.0, "ended early"),
+    ]
+    # Ranks by return 1 2 3 4 5, by the benchmark 1 2 4.5 3 4.5: Pearson's correlation of the ranks by hand.
+    a, b = np.array([1.0, 2, 3, 4, 5]), np.array([1.0, 2, 4.5, 3, 4.5])
+    assert rank_correlation(found) == pytest.approx(np.corrcoef(a, b)[0, 1])
+    assert rank_correlation(found[:2]) == pytest.approx(1.0)
+    assert rank_correlation([found[0], returned("second", 0.0, -30.0)]) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("washout", [0.0, 1.0])
+def test_a_return_is_the_sum_of_the_rewards_of_an_episode(washout):
+    policy = "pd"
+    env = gymnasium.make("panto_env:Pantograph-v0", **SHORT | {"washout": washout})
+    observation, _ = env.reset(seed=5)
+    driver = find_policy(policy)
+    driver.reset(env.unwrapped.context)
+    total, ended = 0.0, False
+    while not ended:
+        observation, reward, terminated, truncated, _ = env.step(driver.act(observation))
+        total, ended = total + reward, terminated or truncated
+    given = SHORT | ({"washout": washout} if washout else {})
+    assert one_return("Pantograph-v0", given, policy, 5) == pytest.approx(total)
+
+
+def test_a_policy_has_the_washout_that_it_asks_for(monkeypatch):
+    monkeypatch.setattr("panto_baselines.benchmark.returns.find_policy", lambda _: Mean())
+    assert np.isfinite(one_return("Pantograph-v0", SHORT, "mean", 0))
+
+
+@pytest.fixture(scope="module")
+def result():
+    line = Line(speeds_kmh=(250.0, 300.0), distance=310.0, spans=(3, 5))
+    return run(BenchmarkSettings(policies=("pd", "p:gain=0.1"), lines=(line,), seeds=(0, 1)), workers=1)
+
+
+def test_every_policy_of_the_result_has_the_mean_of_its_episodes(result):
+    found = returns(result, episodes=2, arguments=SHORT, workers=1)
+    assert [each.policy for each in found] == ["passive", "pd", "p:gain=0.1"]
+    given = {"catenary": "en50318-2002", "pantograph": "en50318-2002"} | SHORT
+    for each, standing in zip(found, result.standings, strict=True):
+        single = [one_return("Pantograph-v0", given, each.policy, seed) for seed in (0, 1)]
+        assert each.mean == pytest.approx(np.mean(single))
+        assert each.error == pytest.approx(abs(single[0] - single[1]) / 2)
+        assert each.change == standing.change
+
+
+def test_the_command_prints_policies_by_return_and_the_correlation(result, tmp_path):
+    file = tmp_path / "result.json"
+    result.save(file)
+    app = typer.Typer()
+    app.command()(command)
+    printed = CliRunner().invoke(app, [str(file), "--episodes", "2", "--workers", "1", "--json"])
+    assert printed.exit_code == 0, printed.output
+    table = json.loads(printed.stdout)["all"]
+    assert [each["policy"] for each in table["policies"]] == ["passive", "pd", "p:gain=0.1"]
+    assert -1 <= table["rank_correlation"] <= 1
+
+
+@pytest.mark.parametrize("name", INGREDIENTS)
+def test_every_ingredient_is_a_valid_change_of_the_id(name):
+    usual = read_settings(IDS["Pantograph-v0"], EnvironmentSettings)
+    changed = read_settings(IDS["Pantograph-v0"] | INGREDIENTS[name], EnvironmentSettings)
+    assert (changed == usual) == (name == "all")
+
+
+def test_results_of_several_lines_and_unknown_ids_are_refused():
+    cells = [SimpleNamespace(catenary=name, pantograph="p", speed_kmh=300.0) for name in ("a", "b")]
+    with pytest.raises(InputError, match="one line"):
+        returns(SimpleNamespace(cells=cells))
+    with pytest.raises(InputError, match="Unknown id"):
+        returns(SimpleNamespace(cells=cells[:1]), "Pantograph-v9")
