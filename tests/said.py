@@ -17,8 +17,8 @@ def said(value: Any) -> str:
         value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
-    if isinstance(value, dict):
-        return str({key: said(each) for key, each in value.items()})
+    if isinstance(value, dict):  # the order of a table's keys says nothing, in JSON and in TOML
+        return str({key: said(each) for key, each in sorted(value.items(), key=str)})
     if isinstance(value, tuple | list):
         return str([said(each) for each in value])
     return repr(value)
