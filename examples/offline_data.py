@@ -4,7 +4,7 @@
 
 printed
 
-    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -198.3 and -211.0
+    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -801.1 and -687.3
     replayed from seed and actions: the same rewards to the last bit
 """
 

@@ -33,6 +33,9 @@ TASK: dict[str, Any] = {
     "speed_kmh": 300.0,
     "line_condition": "fair",
     "pantograph_scatter": 0.0,
+    # Forces as commanded, counted from the start: the reward "agent" holds the mean by itself.
+    "washout": None,
+    "settle": 0.0,
     "actuator": "realistic",
     "sensors": "realistic",
     "observation": "measured",

@@ -152,12 +152,23 @@ class Stage:
     def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
         """Begin an episode. Raises InputError if the policy cannot begin it."""
         policy = find_policy(name)
+        self._check_washout(policy, name)
         twin = self._twin(policy)
         observation, info = self._env.reset(seed=seed, options=options)
         seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
         with errors_name(name, "reset"):
             policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
         return Beginning(policy, twin, observation, seen, info)
+
+    def _check_washout(self, policy: Policy, name: str) -> None:
+        """Raise InputError for a policy that needs another washout: its actions would mean other forces."""
+        offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
+        needed, there = wishes(policy)["washout"], offered.washout
+        if needed != there:
+            raise InputError(
+                f"The policy '{name}' needs washout = {needed:g}, and the data set's environment has "
+                f"{there:g}; set washout = {needed:g} in its environment, or leave the policy out."
+            )
 
     def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
         """Environment with the observation that a policy requests; None if that is the recorded one."""

@@ -36,7 +36,7 @@ KNOWN = {"catenary": "en50318-2002", "pantograph": "en50318-2002", "speed_kmh": 
 OTHER = {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": [240, 260]}
 TABLE = {
     "title": "tiny",
-    "environment": {"distance": 60.0},
+    "environment": {"distance": 60.0, "washout": 0.0, "settle": 0.0},
     "places": [KNOWN],
     "sets": [{"name": "noisy-pd", "policies": ["pd"], "noise": [0.0, 0.2], "episodes": 2}],
 }
@@ -115,6 +115,7 @@ class TestSettings:
     def test_what_cannot_be_run_is_refused_before_anything_is_made(self, tmp_path, minari):
         for changes, message in (
             ({"environment": {"distanse": 60}}, "arguments of the environment"),
+            ({"environment": {"distance": 60.0}}, "needs washout = 0, and the data set's environment has 1"),
             ({"sets": [TABLE["sets"][0] | {"policies": ["pdd"]}]}, "Unknown policy 'pdd'"),
             ({"places": [KNOWN | {"catenary": "nowhere"}]}, "nowhere"),
             (

@@ -84,9 +84,9 @@ BY_HAND = {
 """Targets of the Makefile that CI does not run, and why."""
 SHORTENED = {
     "README.md": {
-        "num_envs=256": "num_envs=2",
-        "batch_size=4096": "batch_size=64",
-        "learn(1_000_000)": "learn(100)",
+        "num_envs=32": "num_envs=2",
+        "n_steps=512, batch_size=4096": "n_steps=64, batch_size=64",
+        "learn(500_000)": "learn(100)",
     },
 }
 """Text in the Python of a page, and what runs instead."""

@@ -226,7 +226,7 @@ def test_a_window_shows_each_step_and_closes(monkeypatch):
 def test_record_video_writes_an_episode(tmp_path):
     pytest.importorskip("moviepy")
     env = gymnasium.make(
-        "Pantograph-v0", render_mode="rgb_array", render_size=SIZE, distance=60.0, run_in=0.0
+        "Pantograph-v0", render_mode="rgb_array", render_size=SIZE, distance=60.0, run_in=0.0, settle=0.0
     )
     env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), disable_logger=True)
     env.reset(seed=0)
