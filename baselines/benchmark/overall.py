@@ -186,7 +186,7 @@ def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clust
         interval=interval_of_mean(100 * changes, clusters),
         worst_quarter=mean("worst_quarter"),
         worst=worst.worst,
-        worst_at=f"{worst.worst_at}, {worst.policy}",
+        worst_at=worst.worst_at,
         improved=mean("improved"),
         effort=mean("effort"),
         power=mean("power"),

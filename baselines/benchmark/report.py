@@ -18,7 +18,7 @@ from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 170
+WIDTH = 180
 """Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # with the decimals shown
     "std": 2,
@@ -77,7 +77,7 @@ def _overall(outcome: Benchmark) -> Table:
     headings = ["rank", "Δσ (%)", "worst quarter (%)", "worst cell (%)", "passes improved", "of oracle"]
     headings += ["power (W)", "at limit", "mean moved in", "better than the next in"]
     for heading in [*headings, *(["beaten by the first in"] if best else [])]:
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
     after = next_in_ranking(found)
     method_of = {name: each.policy for each in found for name in each.trainings}
     for each in found:

@@ -132,7 +132,8 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
         return None
     x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
     y_ticks, y = _axis(min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP)
-    taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in known]
+    labelled = [point for point in known if not point.training]
+    taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in labelled]
     drawn = []
     for policy, across, up, hollow, training in known:
         at, height, width = x(across), y(up), LETTER * len(policy)

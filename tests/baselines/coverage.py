@@ -27,6 +27,8 @@ OF_SEEDS = 0.5
 """Share of that variance that a seed's passes have in common: 0.3 to 0.6 there, up to 0.9 on other tracks."""
 WON = 0.7
 """Share of passes that a policy wins against another: those below this quantile of all changes."""
+TRAININGS, BETWEEN_TRAININGS = 5, 2.0
+"""Number of trainings of a method, and the standard deviation between their means (%)."""
 MANY = 400_000
 
 
@@ -59,6 +61,17 @@ def mean_by_cell(many, resamples=499):
     return interval, stats.trim_mean(many, 0.25)
 
 
+def mean_of_trainings(many):
+    """The benchmark's interval of a method's mean over ``TRAININGS`` trainings, drawn here, and the truth."""
+    random = np.random.default_rng(2)
+
+    def interval(changes):
+        trainings = BETWEEN_TRAININGS * random.standard_normal((TRAININGS, 1))
+        return interval_of_mean(changes.ravel() + trainings, Clusters.of_one_line(*changes.shape))
+
+    return interval, stats.trim_mean(many, 0.25)
+
+
 def share(many):
     """The benchmark's interval of the share of changes below a value, and the truth."""
     below = np.quantile(many, WON)
@@ -70,7 +83,12 @@ def share(many):
     return interval, WON
 
 
-FIGURES = {"mean, by cell": mean_by_cell, "mean": mean, "share of 0.7": share}
+FIGURES = {
+    "mean, by cell": mean_by_cell,
+    "mean": mean,
+    f"mean of {TRAININGS} trainings": mean_of_trainings,
+    f"share of {WON}": share,
+}
 
 
 def coverage(figure, kind, seeds, speeds, repetitions=4000):

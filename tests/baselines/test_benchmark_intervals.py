@@ -125,6 +125,10 @@ def test_intervals_cover_the_truth_in_95_percent_of_draws(kind, seeds, speeds):
     assert coverage("share of 0.7", kind, seeds, speeds, repetitions=2500) >= 93
 
 
+def test_the_interval_of_a_method_covers_the_truth():
+    assert 93 <= coverage("mean of 5 trainings", "normal", 16, 5, repetitions=1000) <= 97
+
+
 def test_a_bootstrap_of_each_cell_by_itself_covers_far_less():
     """So that the simulation has the power to show what is wrong."""
     assert coverage("mean, by cell", "normal", 8, 5, repetitions=500) < 85

@@ -217,7 +217,7 @@ def test_a_method_s_result_is_over_its_trainings():
     assert list(found) == ["passive", "other", "1", "2", "3", "method"]
     assert method.trainings == pytest.approx({"1": -30.0, "2": -40.0, "3": -20.0})
     assert method.change == pytest.approx(-30.0)
-    assert (method.worst, method.worst_at) == (pytest.approx(-5.0), "hard, 300 km/h, 3")
+    assert (method.worst, method.worst_at) == (pytest.approx(-5.0), "hard, 300 km/h")
     assert method.worst_quarter == pytest.approx((-10 - 20 + 0) / 3)
     assert (method.passes, method.moved) == (12, 0)
     assert [found[name].rank for name in found] == [3, 1, None, None, None, 1]
