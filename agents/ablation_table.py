@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_baselines.benchmark.intervals import Clusters, interquartile_mean, interval_of_mean
 from panto_baselines.benchmark.run import Benchmark
-from panto_baselines.benchmark.statistics import bootstrap_interval, interquartile_mean
 from panto_env.base.table import Table
 
 from .ablation import REFERENCE
@@ -26,7 +26,7 @@ class Variant:
     name: str
     changes: tuple[float, ...]  # of sigma from the passive pantograph at the same mean force, by run (%)
     change: float  # interquartile mean of the changes (%)
-    interval: Interval | None  # 95 % interval of ``change``, runs resampled
+    interval: Interval | None  # 95 % interval of ``change``, for what runs draw
     lost: Interval | None  # 95 % interval of the gain lost against the unchanged training (points)
     worse: float | None  # share of pairs of runs in which the unchanged training gains more; None: it is that
     qualified: float  # share of runs whose mean force stays within its range in every cell
@@ -53,7 +53,7 @@ def _variant(name: str, changes: Array, base: Array, disqualified: Sequence[bool
         name=name,
         changes=tuple(changes.tolist()),
         change=interquartile_mean(changes),
-        interval=bootstrap_interval(changes),
+        interval=interval_of_mean(changes, Clusters.of_one_line(len(changes))),
         lost=None if is_base else _difference(changes, base),
         worse=None if is_base else float(np.mean(changes[:, None] > base)),
         qualified=1.0 - float(np.mean(disqualified)),

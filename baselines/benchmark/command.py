@@ -78,6 +78,7 @@ def benchmark(
         config,
         line=line | {"speeds_kmh": speed or None},
         policies=policies or None,
+        trainings={} if policies else None,
         seeds=seeds,
         **given,
     )

@@ -13,11 +13,12 @@ from rich.text import Text
 from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
+from .overall import next_in_ranking, without_feedback
 from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 150
+WIDTH = 180
 """Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # with the decimals shown
     "std": 2,
@@ -37,10 +38,13 @@ OWN_LABELS = {
     "saturation": Label("share of commands at the limit", "at limit", "-"),
 }
 LEGEND = (
-    "Interquartile means over the seeds. Δσ and ΔCF are relative to a passive pantograph at the same mean "
-    "force, pass by pass, with a 95 % bootstrap interval; ΔF_m is relative to the unchanged passive one. σ, "
-    "max and min are those of the force low-passed at 20 Hz. Policies are ranked by Δσ; one that moves the "
-    "mean force by more than 1.5 % is not ranked."
+    "Interquartile means over the seeds, or over all passes. Δσ and ΔCF are relative to a passive pantograph "
+    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. Intervals are for "
+    "95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of the force "
+    "low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is highest. "
+    "Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a cell or "
+    "in a third of all passes, or by more than 5 % in any pass. A method's figures are means over its "
+    "trainings, and its intervals cover their spread."
 )
 
 ORACLE = (
@@ -56,34 +60,45 @@ def tables(outcome: Benchmark) -> RenderableType:
     for (names, cells_of_line), (first, last) in zip(cells, outcome.spans, strict=True):
         title = f"{' on '.join(reversed(names))}, spans {first}–{last}"
         parts += [*_table_of_line(list(cells_of_line), title), ""]
+    out = [each for each in outcome.standings if each.disqualified]
+    reasons = [Text(f"{each.policy} is not ranked: {each.disqualified}.", style="red") for each in out]
     legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
-    return Group(*parts, _overall(outcome), Text(legend, style="dim"))
+    return Group(*parts, _overall(outcome), *reasons, Text(legend, style="dim"))
 
 
 def _overall(outcome: Benchmark) -> Table:
     """Table of the overall results, one row per policy."""
+    found = outcome.standings
     title = f"{outcome.settings.title}: all lines, speeds and seeds"
+    title = "; ".join(filter(None, (title, without_feedback(found))))
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("policy", overflow="fold")
-    best = next((each for each in outcome.standings if each.rank == 1), None)
-    headings = ["rank", "Δσ (%)", "worst cell (%)", "passes improved", "of oracle", "power (W)", "at limit"]
+    best = next((each for each in found if each.rank == 1), None)
+    headings = ["rank", "Δσ (%)", "worst quarter (%)", "worst cell (%)", "passes improved", "of oracle"]
+    headings += ["power (W)", "at limit", "mean moved in", "better than the next in"]
     for heading in [*headings, *(["beaten by the first in"] if best else [])]:
-        table.add_column(heading, justify="right")
-    for each in outcome.standings:
+        table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
+    after = next_in_ranking(found)
+    method_of = {name: each.policy for each in found for name in each.trainings}
+    for each in found:
         low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
         values = [
             "–" if each.rank is None else str(each.rank),
             f"{number(each.change, 1)}{low_high}",
+            number(each.worst_quarter, 1),
             f"{number(each.worst, 1)} at {each.worst_at}",
             _share(each.improved),
             "–" if each.oracle_share is None else _share(each.oracle_share),
             number(each.power, 1),
             number(each.saturation, 2),
+            f"{each.moved} of {each.passes}",
+            str(each.better_than.get(after.get(each.policy, ""), "–")),
         ]
         if best is not None:
-            values.append("–" if each is best else _share(best.better_than[each.policy]))
+            values.append(str(best.better_than.get(each.policy, "–")))
         style = "red" if each.disqualified else "bold" if each is best else ""
-        table.add_row(each.policy, *values, style=style)
+        method = method_of.get(each.policy)
+        table.add_row(f"{method}: {each.policy}" if method else each.policy, *values, style=style)
     return table
 
 

@@ -68,7 +68,7 @@ def returns(
     speeds = [cell.speed_kmh for cell in result.cells]
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": (min(speeds), max(speeds))}
     given |= arguments or {}
-    standings = [each for each in result.standings if not control_of(each.policy)]
+    standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     jobs = [
         partial(one_return, identifier, given, each.policy, seed)
         for each in standings

@@ -103,7 +103,7 @@ def run(
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
     cells = compare(rows, stored_bounds(settings, spans))
-    return Benchmark(settings, spans, rows, cells, standings(rows, cells), traces)
+    return Benchmark(settings, spans, rows, cells, standings(rows, cells, settings.trainings), traces)
 
 
 def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:

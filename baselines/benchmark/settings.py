@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
@@ -87,6 +88,11 @@ class BenchmarkSettings(Settings):
         "'blind of pd' sees nothing, 'tape of pd' plays its actions from another line; the passive "
         "pantograph always runs",
     )
+    trainings: dict[str, tuple[str, ...]] = Field(
+        {},
+        description="two or more policies that are trainings of one method, by the method's name; they run "
+        "on every line, and the method's result is over all of them",
+    )
     lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, with pantograph and speeds")
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
         tuple(range(5)),
@@ -110,7 +116,8 @@ class BenchmarkSettings(Settings):
 
     def policies_on(self, line: Line) -> tuple[str, ...]:
         """All policies that run on a line."""
-        return tuple(dict.fromkeys((*self.policies, *line.policies)))
+        trainings = chain.from_iterable(self.trainings.values())
+        return tuple(dict.fromkeys((*self.policies, *trainings, *line.policies)))
 
     @field_validator("seeds", mode="before")
     @classmethod
@@ -139,6 +146,19 @@ class BenchmarkSettings(Settings):
     @classmethod
     def _with_reference(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         return value if REFERENCE in value else (REFERENCE, *value)
+
+    @field_validator("trainings")
+    @classmethod
+    def _of_several(cls, value: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        few = next((method for method, trainings in value.items() if len(trainings) < 2), None)
+        if few is not None:
+            raise ValueError(f"{shown(few)} must have two trainings or more; a single one is a policy")
+        return value
+
+    @model_validator(mode="after")
+    def _with_distinct_names(self) -> Self:
+        _checked_distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
+        return self
 
     @model_validator(mode="after")
     def _without_repeated_line(self) -> Self:

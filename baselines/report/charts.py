@@ -32,9 +32,10 @@ class Curve(NamedTuple):
 
 
 class Dot(NamedTuple):
-    """One policy's point, with the label beside it, "" if there is no room."""
+    """One policy's point, with the label beside it, "" if there is no room or it is a training's."""
 
     policy: str
+    training: str  # of the policy, which is then a method; "" for the policy itself
     x: float
     y: float
     label: str
@@ -86,6 +87,7 @@ class Point(NamedTuple):
     x: float
     y: float
     hollow: bool
+    training: str = ""  # of the policy, which is then a method
 
 
 def curves(
@@ -121,21 +123,26 @@ def curves(
 
 
 def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart | None:
-    """A chart of one point per policy, labelled where there is room; None if no point is finite."""
+    """A chart of one point per policy, labelled where there is room; None if no point is finite.
+
+    Points of trainings have no label.
+    """
     known = [point for point in points if math.isfinite(point.x) and math.isfinite(point.y)]
     if not known:
         return None
     x_ticks, x = _axis(0.0, max(point.x for point in known), LEFT, WIDTH - RIGHT)
     y_ticks, y = _axis(min(point.y for point in known), max(point.y for point in known), HEIGHT - BOTTOM, TOP)
-    taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in known]
+    labelled = [point for point in known if not point.training]
+    taken = [(x(point.x) - RADIUS, x(point.x) + RADIUS, y(point.y)) for point in labelled]
     drawn = []
-    for policy, across, up, hollow in known:
+    for policy, across, up, hollow, training in known:
         at, height, width = x(across), y(up), LETTER * len(policy)
         sides = ((at + GAP, False), (at - GAP - width, True))
-        free = [side for side in sides if _is_free(side[0], side[0] + width, height, taken)]
+        free = [side for side in sides if not training and _is_free(side[0], side[0] + width, height, taken)]
         if free:
             taken.append((free[0][0], free[0][0] + width, height))
-        drawn.append(Dot(policy, at, height, policy if free else "", bool(free) and free[0][1], hollow))
+        label, before = (policy, free[0][1]) if free else ("", False)
+        drawn.append(Dot(policy, training, at, height, label, before, hollow))
     return Chart(title, *labels, x_ticks, y_ticks, [], drawn, [], None)
 
 

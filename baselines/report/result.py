@@ -20,6 +20,8 @@ from pydantic import (
 from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 
+from ..benchmark.intervals import Share
+from ..benchmark.overall import without_feedback
 from ..benchmark.statistics import LineAtSpeed
 
 Number = Annotated[
@@ -62,6 +64,7 @@ class StoredCell(AtPlace):
     interval: Interval
     cost_change: Number
     mean_change: Number
+    moved: int
     improved: Number
     disqualified: str
     rank: int | None
@@ -91,13 +94,18 @@ class StoredStanding(ResultTable):
     policy: str
     change: Number
     interval: Interval
+    worst_quarter: Number
     worst: Number
     worst_at: str
     improved: Number
     effort: Number
     power: Number
     saturation: Number
-    better_than: dict[str, Number]
+    passes: int
+    moved: int
+    most_moved: Number
+    better_than: dict[str, Share]
+    trainings: dict[str, Number]
     disqualified: str
     rank: int | None
     oracle_share: float | None = None
@@ -119,9 +127,32 @@ class Result(ResultTable):
         return str(self.settings.get("title", "benchmark"))
 
     @property
+    def heading(self) -> str:
+        """The title, and that a tape is nearly as good as the best policy where it is."""
+        return "; ".join(filter(None, (self.title, without_feedback(self.standings))))
+
+    @property
     def policies(self) -> list[str]:
         """Names of all policies that ran, in the order of the settings."""
         return list(dict.fromkeys(cell.policy for cell in self.cells))
+
+    @property
+    def method_of(self) -> dict[str, str]:
+        """Methods by the names of their trainings."""
+        return {name: one.policy for one in self.standings for name in one.trainings}
+
+    @property
+    def by_rank(self) -> list[StoredStanding]:
+        """Standings, the best first, each method before its trainings, and last those without a rank."""
+        method_of = self.method_of
+        ranked = sorted(self.standings, key=lambda one: (one.rank is None, one.rank or 0))
+        own = {one.policy: one for one in self.standings}
+        return [
+            each
+            for one in ranked
+            if one.policy not in method_of
+            for each in (one, *(own[name] for name in one.trainings))
+        ]
 
     @property
     def places(self) -> list[LineAtSpeed]:
@@ -132,9 +163,11 @@ class Result(ResultTable):
     def _whole(self) -> Self:
         if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
             raise ValueError("must have cells, and spans for each of their lines")
-        named = {one.policy for one in self.standings} | {one.policy for one in self.traces}
-        if not named <= set(self.policies):
+        standing = {one.policy for one in self.standings if not one.trainings}
+        if not standing | {one.policy for one in self.traces} <= set(self.policies):
             raise ValueError("must have a cell for every policy")
+        if not set(self.method_of) <= standing:
+            raise ValueError("must have a standing for every training")
         return self
 
 

@@ -2,53 +2,75 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isnan
+from statistics import mean
 
 from panto_env.base.table import Table
 
+from ..benchmark.overall import next_in_ranking, without_feedback
 from ..benchmark.statistics import LineAtSpeed
-from .result import Result, StoredCell
+from .result import Result, StoredCell, StoredStanding
+
+OVERALL = ("all", "95 %", "worst quarter", "better than next", "mean moved in")
+"""Headings of the columns over all passes."""
+TRAINING = "· "
+"""Before the name of a method's training."""
 
 
 def summary(result: Result) -> Table:
     """Table of policies, by rank, over lines and speeds; the best policy of each column is marked with *.
 
     Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
-    shows by how much the policy moves the mean, or that it ended early.
+    shows by how much the policy moves the mean, or that it ended early. The last columns are over all passes:
+    the change with its 95 % interval, the mean of the worst quarter of passes, the share of passes in which
+    the policy is better than the next one, with its interval, and in how many it moves the mean by more than
+    1.5 %. A method's trainings follow it.
     """
     lines = {place[:2] for place in result.places}
-    headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), "all")
+    headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
-    overall = {one.policy: one for one in result.standings}
-    order = sorted(
-        (policy for policy in result.policies if policy in overall),
-        key=lambda policy: (overall[policy].rank is None, overall[policy].rank or 0),
-    )
-    rows = [
-        (
-            policy,
-            *(_text(cells[policy, place]) for place in result.places),
-            f"{overall[policy].change:.1f}" if overall[policy].rank is not None else "–",
-        )
-        for policy in order
-    ]
+    after = next_in_ranking(result.standings)
+    rows = []
+    for one in result.by_rank:
+        name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
+        own = [[cells[run, place] for run in one.trainings or (one.policy,)] for place in result.places]
+        rows.append((name, *map(_text, own), *_overall(one, after.get(one.policy))))
     oracles = [_oracle(result, place) for place in result.places]
     if any(oracles):
-        rows.append(("*oracle*", *(each or "–" for each in oracles), "–"))
+        rows.append(("*oracle*", *(each or "–" for each in oracles), *["–"] * len(OVERALL)))
     seeds = result.cells[0].seeds
-    return Table(f"{result.title}: Δσ (%), {seeds} seeds", headings, tuple(rows))
+    feedback = without_feedback(result.standings)
+    title = f"{result.title}: Δσ (%), {seeds} seeds{f'; {feedback}' if feedback else ''}"
+    return Table(title, headings, tuple(rows))
+
+
+def _overall(one: StoredStanding, after: str | None) -> tuple[str, ...]:
+    """The columns ``OVERALL`` of a policy; after: the policy ranked next."""
+    moved = f"{one.moved} of {one.passes}"
+    if one.disqualified:
+        return "–", "–", "–", "–", moved
+    return (
+        f"{one.change:.1f}",
+        "–" if one.interval is None else f"{one.interval[0]:.1f} to {one.interval[1]:.1f}",
+        f"{one.worst_quarter:.1f}",
+        str(one.better_than.get(after or "", "–")),
+        moved,
+    )
 
 
 def _heading(place: LineAtSpeed, several_lines: bool) -> str:
     return f"{place.catenary}, {place.speed_kmh:g}" if several_lines else f"{place.speed_kmh:g} km/h"
 
 
-def _text(cell: StoredCell) -> str:
-    if isnan(cell.change):
+def _text(cells: Sequence[StoredCell]) -> str:
+    """Change in a policy's cell, or the mean over the cells of a method's trainings."""
+    change, moved = mean(cell.change for cell in cells), mean(cell.mean_change for cell in cells)
+    if isnan(change):
         return "ended early"
-    if cell.disqualified:
-        return f"({cell.change:.1f}; mean {cell.mean_change:+.1f})"
-    return f"{cell.change:.1f}{' *' if cell.rank == 1 else ''}"
+    if any(cell.disqualified for cell in cells):
+        return f"({change:.1f}; mean {moved:+.1f})"
+    return f"{change:.1f}{' *' if cells[0].rank == 1 and len(cells) == 1 else ''}"
 
 
 def _oracle(result: Result, place: LineAtSpeed) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
+from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 from panto_env.metrics.labels import LABELS
 from panto_env.terminal import number
 
+from ..benchmark.overall import next_in_ranking
 from ..benchmark.report import FIGURES, OWN_LABELS
 from .charts import Scale
 from .result import Result, StoredCell, StoredStanding
@@ -66,20 +68,20 @@ class Table:
 
 def leaderboard(result: Result) -> Table:
     """Table of the policies that ran on every line, over all lines, speeds and seeds."""
-    moved = {
-        policy: max(_of(result, policy), key=lambda cell: _size(cell.mean_change))
-        for policy in result.policies
-    }
+    after = next_in_ranking(result.standings)
     columns: list[Column[StoredStanding]] = [
-        *_first_columns(result.standings),
+        *_first_columns(result.standings, result.method_of),
+        Column("worst quarter, Δσ (%)", lambda one: _signed(one.worst_quarter, 1)),
         Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
+        Column("better than the next in", lambda one: _better(one, after.get(one.policy))),
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
         Column("power (W)", lambda one: _figure(one.power, 1)),
         Column("at limit", lambda one: _share(one.saturation)),
-        Column("maximum ΔF_m (%)", lambda one: _signed(moved[one.policy].mean_change, 1)),
+        Column("mean moved in", lambda one: _moved(one.moved, one.passes)),
+        Column("maximum ΔF_m of a pass (%)", lambda one: _signed(one.most_moved, 1)),
     ]
-    return _table("All lines, speeds and seeds", columns, result.standings)
+    return _table("All lines, speeds and seeds", columns, result.by_rank)
 
 
 def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
@@ -88,18 +90,27 @@ def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
         *_first_columns(cells),
         Column("passes improved", lambda one: _share(one.improved)),
         Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
+        Column("mean moved in", lambda one: _moved(one.moved, one.seeds)),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
         *(_of_figure(name, decimals) for name, decimals in FIGURES.items()),
     ]
-    return _table(caption, columns, cells)
+    return _table(caption, columns, sorted(cells, key=lambda one: (one.rank is None, one.rank or 0)))
 
 
-def _first_columns(rows: Sequence[R]) -> list[Column[R]]:
-    """Columns of rank, policy and change of sigma, and of the oracle's gain if there is a stored oracle."""
+def _first_columns(rows: Sequence[R], method_of: Mapping[str, str] = MappingProxyType({})) -> list[Column[R]]:
+    """Columns of rank, policy and change of sigma, and of the oracle's gain if there is a stored oracle.
+
+    method_of: methods by the names of their trainings, which the policies' names show.
+    """
+
+    def name(one: R) -> Entry:
+        method = method_of.get(one.policy)
+        return Entry(one.policy, one.policy, f"a training of {method}" if method else "")
+
     scale = _scale(rows)
     columns: list[Column[R]] = [
         Column("rank", lambda one: Entry("–") if one.rank is None else Entry(str(one.rank), str(one.rank))),
-        Column("policy", lambda one: Entry(one.policy, one.policy)),
+        Column("policy", name),
         Column("Δσ (%)", lambda one: _change(one, scale)),
     ]
     if any(one.oracle_share is not None for one in rows):
@@ -108,24 +119,14 @@ def _first_columns(rows: Sequence[R]) -> list[Column[R]]:
 
 
 def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Table:
-    """Table with rows by rank, the best first; disqualified policies come last, in the order of the file."""
-    ranked = sorted(rows, key=lambda one: (one.rank is None, one.rank or 0))
     return Table(
         caption=caption,
         headings=[column.heading for column in columns],
         rows=[
             Row(one.policy, one.disqualified, one.rank == 1, [column.entry(one) for column in columns])
-            for one in ranked
+            for one in rows
         ],
     )
-
-
-def _of(result: Result, policy: str) -> list[StoredCell]:
-    return [cell for cell in result.cells if cell.policy == policy]
-
-
-def _size(value: float) -> float:
-    return abs(value) if isfinite(value) else 0.0
 
 
 def _of_figure(name: str, decimals: int) -> Column[StoredCell]:
@@ -156,6 +157,15 @@ def _share(value: float | None) -> Entry:
     if value is None or not isfinite(value):
         return Entry("–")
     return Entry(f"{100 * value:.0f} %", _key(value))
+
+
+def _better(one: StoredStanding, other: str | None) -> Entry:
+    share = one.better_than.get(other or "")
+    return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
+
+
+def _moved(passes: int, of: int) -> Entry:
+    return Entry(f"{passes} of {of}", _key(passes / of))
 
 
 def _key(value: float) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
 
+from ..benchmark.intervals import Share
 from ..benchmark.settings import REFERENCE
 from ..benchmark.statistics import LineAtSpeed
 from .charts import Chart, Line, Point, curves, dots
@@ -26,6 +27,7 @@ class Shade:
     text: str
     strength: float
     disqualified: bool = False
+    note: str = ""
 
     @property
     def kind(self) -> str:
@@ -58,6 +60,7 @@ class About:
     worst: StoredCell
     disqualified: list[StoredCell]
     everywhere: bool
+    method: str  # of which it is a training, or ""
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,14 @@ class Track:
 
 def track(result: Result) -> Track:
     """Contents of the page for a result."""
-    ranked = sorted((one for one in result.standings if one.rank), key=lambda one: one.rank or 0)
-    first = {REFERENCE, *(one.policy for one in ranked[:3])}
+    ranked = [one for one in result.by_rank if one.rank]
+    first = {REFERENCE, *(next(iter(one.trainings), one.policy) for one in ranked[:3])}
+    method_of = result.method_of
+    methods = dict.fromkeys(method_of.values())
     return Track(
         result=result,
         settings=as_toml(result.settings),
-        numbers={policy: number for number, policy in enumerate(result.policies)},
+        numbers={policy: number for number, policy in enumerate([*result.policies, *methods])},
         shown_first=first if len(ranked) > 2 else set(result.policies[:4]) | first,
         leaderboard=leaderboard(result),
         lines=[
@@ -96,7 +101,13 @@ def track(result: Result) -> Track:
         overview=dots(
             "Δσ over effort, all lines and speeds",
             ("effort, mean over lines and speeds (N)", "Δσ (%)"),
-            [Point(one.policy, one.effort, one.change, bool(one.disqualified)) for one in result.standings],
+            [
+                Point(method_of[one.policy], *at, one.policy)
+                if one.policy in method_of
+                else Point(one.policy, *at)
+                for one in result.standings
+                for at in [(one.effort, one.change, bool(one.disqualified))]
+            ],
         ),
         sections=[_section(result, place) for place in result.places],
         policies=[_about(result, policy) for policy in result.policies],
@@ -123,13 +134,15 @@ def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
 
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
     """Share of passes in which the row's policy has a smaller change of σ than the column's."""
+    compared = [one for one in result.standings if one.policy not in result.method_of]
     table: dict[str, list[Shade | None]] = {}
-    for one in result.standings:
-        shares = [one.better_than.get(other.policy, nan) for other in result.standings]
-        table[one.policy] = [
-            Shade(f"{100 * share:.0f} %", 1 - 2 * share) if isfinite(share) else None for share in shares
-        ]
+    for one in compared:
+        table[one.policy] = [_shade_of_share(one.better_than.get(other.policy)) for other in compared]
     return table
+
+
+def _shade_of_share(one: Share | None) -> Shade | None:
+    return None if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
 
 
 def _section(result: Result, place: LineAtSpeed) -> Section:
@@ -192,4 +205,5 @@ def _about(result: Result, policy: str) -> About:
         worst=max(own, key=lambda cell: cell.change if isfinite(cell.change) else -float("inf")),
         disqualified=[cell for cell in own if cell.disqualified],
         everywhere=standing is not None,
+        method=result.method_of.get(policy, ""),
     )

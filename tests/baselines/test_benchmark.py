@@ -48,6 +48,11 @@ class Lost(ForceLaw):
 class Nan:
     def reset(self, context): pass
     def act(self, observation): return np.array([float("nan")])
+
+class Less(ForceLaw):
+    "Presses less, by what just qualifies."
+    def force(self, observation):
+        return -0.013 * self.context.nominal_force
 """
 
 
@@ -67,7 +72,7 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     info = tmp_path / "site" / "plugin-1.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
-    names = ("Half", "Bad", "Lost", "Nan")
+    names = ("Half", "Bad", "Lost", "Nan", "Less")
     points = "".join(f"{name.lower()} = panto_test_plugin:{name}\n" for name in names)
     (info / "entry_points.txt").write_text(f"[panto_env.policies]\n{points}")
     (tmp_path / "site" / "panto_test_plugin.py").write_text(PLUGIN)
@@ -144,6 +149,31 @@ def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> Non
     assert passive.rank == 1
 
 
+def test_a_bias_within_what_qualifies_gains_nothing(plugin: None) -> None:
+    """It lowers sigma, by as much as the passive pantograph's falls at that mean."""
+    done = benchmark.run(settings(policies=["less"]), workers=1)
+    passive, less = done.cells
+    assert less.disqualified == ""
+    assert -1.5 < less.mean_change < -1.2
+    fall = 100 * (less.figures["std"] / passive.figures["std"] - 1)
+    assert fall < -0.1
+    assert abs(less.change) < 0.2 * abs(fall)
+
+
+# --- trainings -----------------------------------------------------------------------------------
+
+
+def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Path) -> None:
+    given = settings(policies=["passive"], trainings={"p's": [P, "p:gain=0.2"]})
+    done = benchmark.run(given, workers=1)
+    assert [cell.policy for cell in done.cells] == ["passive", P, "p:gain=0.2"]
+    assert [(each.policy, each.rank is None) for each in done.standings] == [
+        *(("passive", False), (P, True), ("p:gain=0.2", True), ("p's", False))
+    ]
+    done.save(tmp_path / "out.json")
+    assert "a training of p&#39;s" in page([read_result(tmp_path / "out.json")])
+
+
 # --- what is not valid ---------------------------------------------------------------------------
 
 
@@ -154,6 +184,10 @@ def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> Non
         ({"policies": ["p:gain=-1"]}, "'p:gain=-1' cannot be made"),
         ({"policies": ["p", "p"]}, "key 'policies': 'p' is given twice"),
         ({"policies": ["model.safetensors"]}, "model.safetensors does not exist"),
+        ({"trainings": {"p's": ["p"]}}, "key 'trainings': \"p's\" must have two trainings or more"),
+        ({"trainings": {"x": ["p", "p"]}}, "'p' is given twice"),
+        ({"trainings": {"x": [P, "p"]}}, f"'{P}' is given twice"),
+        ({"trainings": {P: ["p", "pd"]}}, f"'{P}' is given twice"),
         ({"seeds": 0}, "key 'seeds'"),
         ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
         ({"seeds": [-1]}, "key 'seeds.0'"),

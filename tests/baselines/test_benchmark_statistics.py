@@ -1,4 +1,4 @@
-"""The benchmark's statistics on passes made up by hand: means, paired intervals, who is ranked and how."""
+"""The benchmark's cells and standings of passes made up by hand: means, pairs, who is ranked and how."""
 
 from dataclasses import fields, replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import statistics
-from panto_baselines.benchmark.overall import standings
+from panto_baselines.benchmark.overall import standings, without_feedback
 from panto_baselines.benchmark.single_pass import Row
 from panto_env.metrics.figures import Figures
 
@@ -21,32 +21,6 @@ def row(policy="passive", seed=0, *, line="line", speed_kmh=300.0, pressed=(1.0,
     own = (figures.std, figures.cost_function) if policy == "passive" else pressed
     place = (policy, line, "pantograph", speed_kmh, seed, 120.0, terminated)
     return Row(*place, figures, rate, saturation, power, *own)
-
-
-def test_interquartile_mean_leaves_out_the_ends():
-    assert statistics.interquartile_mean(np.array([0.0, 1.0, 3.0, 100.0])) == 2
-    assert statistics.interquartile_mean(np.array([1.0, 3.0, 8.0])) == 4
-    assert np.isnan(statistics.interquartile_mean(np.array([1.0, 3.0, np.nan, 3.0, 3.0])))
-
-
-def test_interval_is_that_of_resampled_interquartile_means():
-    """Against a bootstrap written out with other random numbers."""
-    values = np.random.default_rng(3).exponential(1.0, 12)  # skewed: mean and trimmed mean differ
-    draws = np.random.default_rng(4).choice(values, (100_000, 12))
-    means = np.sort(draws)[:, 3:9].mean(axis=1)
-    expected = np.quantile(means, [0.025, 0.975])
-    assert statistics.bootstrap_interval(values) == pytest.approx(tuple(expected), rel=0.03)
-    # Wide enough apart to tell a confidence of 95 % from one of 90 %.
-    assert np.quantile(means, 0.95) < 0.95 * expected[1]
-
-
-def test_interval_repeats_and_is_missing_where_nothing_is_known():
-    values = np.random.default_rng(3).normal(5.0, 1.0, 40)
-    low, high = statistics.bootstrap_interval(values)
-    assert low < 5 < high
-    assert statistics.bootstrap_interval(values) == (low, high)
-    for nothing in ([1.0], [2.0, 2.0, 2.0], [1.0, np.nan]):
-        assert statistics.bootstrap_interval(np.array(nothing)) is None
 
 
 def test_the_mean_force_may_move_by_a_little():
@@ -70,6 +44,41 @@ def test_the_qualified_are_ranked_by_sigma_and_the_others_are_not():
     assert "1 of 1 runs ended early" in cells[5].disqualified
     assert "no passive pantograph can reach its mean force" in cells[6].disqualified
     assert cells[0].disqualified == ""
+
+
+def moved(policy, changes):
+    """Passes of a policy that moves the mean force by these shares, one per seed, with half of sigma."""
+    return [row(policy, seed, mean=110 * (1 + change), std=0.5) for seed, change in enumerate(changes)]
+
+
+def judged(changes):
+    """Cell and standing of a policy that moves the mean force by these shares on one line at one speed."""
+    rows = [*moved("passive", np.zeros(len(changes))), *moved("a", changes)]
+    cells = statistics.compare(rows)
+    return cells[1], standings(rows, cells)[1]
+
+
+def test_a_policy_that_presses_in_one_pass_of_four_is_not_ranked():
+    """The interquartile mean of its passes does not move at all."""
+    for repeated in (1, 4):
+        cell, standing = judged(repeated * [0.0, 0.2, 0.0, 0.0])
+        assert (cell.mean_change, cell.rank, standing.rank) == (0.0, None, None)
+        assert cell.disqualified == "it moves the mean force by +20.0 % in one pass, more than 5 %"
+    cell, standing = judged([0.0] * 30 + [-0.0501])  # and however seldom it does
+    assert (cell.rank, standing.rank) == (None, None)
+    cell, standing = judged([0.0] * 30 + [-0.0499])
+    assert (cell.rank, standing.rank, cell.most_moved) == (1, 1, pytest.approx(-4.99))
+
+
+def test_a_policy_that_moves_the_mean_a_little_too_far_in_a_third_of_passes_is_not_ranked():
+    cell, standing = judged([0.016, -0.016, 0.016, -0.016] + [0.0149] * 8)
+    assert (cell.disqualified, cell.moved, standing.moved, standing.passes) == ("", 4, 4, 12)
+    assert standing.rank is None
+    assert standing.disqualified == (
+        "it moves the mean force by more than 1.5 % in 4 of 12 passes, a third of them or more"
+    )
+    _, standing = judged([0.016, -0.016, 0.016] + [0.0149] * 9)
+    assert (standing.rank, standing.moved) == (1, 3)
 
 
 def test_equal_changes_share_a_rank():
@@ -113,7 +122,7 @@ def test_change_of_sigma_is_paired_by_seed():
     passive, active = statistics.compare(rows)
     assert active.change == pytest.approx(-10.0)
     low, high = active.interval
-    assert -11.01 < low < -10.0 < high < -8.99
+    assert -12.0 < low < -10.0 < high < -8.0
     assert (passive.change, passive.interval) == (0.0, None)
     assert (active.seeds, active.improved) == (4, 1.0)
     assert passive.spread == pytest.approx(100 * sigma.std(ddof=1) / sigma.mean())
@@ -149,8 +158,9 @@ def test_standings_are_over_all_cells():
     assert a.change == pytest.approx(100 * (np.mean([0.6, 0.9]) - 1))  # without the best and the worst
     assert (a.worst, a.worst_at) == (pytest.approx(5.0), "hard, 300 km/h")
     assert (a.improved, b.improved) == (0.75, 1.0)
-    assert a.better_than == {"passive": 0.75, "b": 0.5}
-    assert b.better_than["a"] == 0.5
+    assert {name: one.share for name, one in a.better_than.items()} == {"passive": 0.75, "b": 0.5}
+    assert b.better_than["a"].share == 0.5
+    assert (a.worst_quarter, b.worst_quarter) == (pytest.approx(20.0), pytest.approx(-10.0))
     assert [found[name].rank for name in ("passive", "a", "b")] == [3, 1, 1]
     low, high = a.interval
     assert low < a.change < high
@@ -195,3 +205,56 @@ def test_share_of_a_stored_oracle():
     assert [each.oracle_share for each in standings(rows, cells)] == [None, None]
     both = {(line, "pantograph", 300.0): -40.0 for line in ("easy", "hard")}
     assert standings(rows, statistics.compare(rows, both))[1].oracle_share == pytest.approx(0.375)
+
+
+def test_a_method_s_result_is_over_its_trainings():
+    trainings = {"1": ([0.5, 0.6], [0.9, 0.8]), "2": ([0.4, 0.5], [0.8, 0.7]), "3": ([0.6, 0.7], [1.0, 0.9])}
+    rows = two_cells("passive", [1.0, 1.0], [1.0, 1.0]) + two_cells("other", [0.5, 0.6], [0.9, 0.8])
+    rows += [each for name, passes in trainings.items() for each in two_cells(name, *passes)]
+    cells = statistics.compare(rows)
+    found = {each.policy: each for each in standings(rows, cells, {"method": tuple(trainings)})}
+    method, other = found["method"], found["other"]
+    assert list(found) == ["passive", "other", "1", "2", "3", "method"]
+    assert method.trainings == pytest.approx({"1": -30.0, "2": -40.0, "3": -20.0})
+    assert method.change == pytest.approx(-30.0)
+    assert (method.worst, method.worst_at) == (pytest.approx(-5.0), "hard, 300 km/h")
+    assert method.worst_quarter == pytest.approx((-10 - 20 + 0) / 3)
+    assert (method.passes, method.moved) == (12, 0)
+    assert [found[name].rank for name in found] == [3, 1, None, None, None, 1]
+    # The second is better than the other in all passes, the first and the third in none; the first is equal.
+    assert method.better_than["other"].share == pytest.approx(1 / 3)
+    assert other.better_than["method"].share == pytest.approx(1 / 3)
+    assert set(method.better_than) == {"passive", "other"}
+    assert found["1"].better_than == {}
+
+
+def test_a_method_s_interval_covers_that_trainings_differ():
+    def width(*changes):
+        rows = [row(seed=seed) for seed in range(8)]
+        for name, change in enumerate(changes):
+            rows += [row(str(name), seed, std=1 + (change + 0.1 * (seed % 4)) / 100) for seed in range(8)]
+        names = tuple(map(str, range(len(changes))))
+        return np.ptp(standings(rows, statistics.compare(rows), {"method": names})[-1].interval)
+
+    assert width(-30.0, -30.0, -30.0) < 0.3
+    assert width(-40.0, -30.0, -20.0) == pytest.approx(2 * 4.303 * 10 / 3**0.5, rel=0.01)
+
+
+def test_a_method_is_ranked_if_all_of_its_trainings_qualify():
+    rows = [row(), row("1", std=0.5), row("2", std=0.5, mean=120.0)]
+    *_, second, method = standings(rows, statistics.compare(rows), {"method": ("1", "2")})
+    assert (second.rank, method.rank) == (None, None)
+    assert method.disqualified == f"2: {second.disqualified}"
+
+
+def test_a_track_on_which_a_tape_does_nearly_as_well_says_so():
+    def words(**changes):
+        rows = [row()] + [row(name, std=1 + change / 100) for name, change in changes.items()]
+        return without_feedback(standings(rows, statistics.compare(rows)))
+
+    tape, blind = "tape of the best", "blind of the best"
+    assert words(best=-30.0, **{tape: -25.1}) == "needs no feedback: tape of the best -25.1 %, best -30.0 %"
+    assert words(best=-30.0, **{tape: -35.0}) == "needs no feedback: tape of the best -35.0 %, best -30.0 %"
+    assert words(best=-30.0, **{tape: -24.9}) == ""
+    assert words(best=-30.0, **{blind: -30.0}) == ""
+    assert words(best=-30.0) == ""

@@ -29,6 +29,7 @@ HOSTILE = "</title><script>alert('\"1')</script>&amp;"
 VOID = {"meta", "input"}
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 POLICIES = {"passive": (0.0, ""), "p": (-10.0, ""), "pd": (-9.0, ""), HOSTILE: (-20.0, "it cheats")}
+SHARE = {"share": 0.75, "interval": [0.5, 0.9]}
 CHROMIUM = [
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"),
     *("--virtual-time-budget=2000", "--dump-dom"),
@@ -47,6 +48,7 @@ def result(**changes):
                 where
                 | {"seeds": 2, "nominal_force": 120.0, "figures": figures, "change": change, "interval": None}
                 | {"cost_change": change, "mean_change": 0.5, "improved": 1.0, "disqualified": reason}
+                | {"moved": 1}
                 | {"rank": None if reason else rank, "spread": 1.0}
             )
             along = {"position": [0.0, 50.0, 100.0], "force": [100.0, 120.0 + change, 140.0]}
@@ -55,7 +57,8 @@ def result(**changes):
         standings.append(
             {"policy": policy, "change": change, "interval": [change - 1, change + 1], "worst": change}
             | {"worst_at": "ln2, 250 km/h", "improved": 1.0, "effort": abs(change), "power": 2.0}
-            | {"saturation": 0.25, "better_than": {other: 0.75 for other in names if other != policy}}
+            | {"saturation": 0.25, "worst_quarter": change + 3, "passes": 4, "moved": 2, "most_moved": -1.6}
+            | {"better_than": {other: SHARE for other in names if other != policy}, "trainings": {}}
             | {"disqualified": reason, "rank": None if reason else 4 - rank}
         )
     settings = BenchmarkSettings(title=HOSTILE).model_dump(mode="json")
@@ -105,8 +108,10 @@ def test_leaderboard_shows_the_ranked_first_and_why_others_are_not():
     assert [row[0] for row in rows] == ["1", "2", "3", "–"]
     assert [row[1] for row in rows] == ["pd", "p", "passive", f"{HOSTILE}disqualified: it cheats"]
     assert rows[1][2:] == [
-        *("-10.0-11.0 to -9.0", "-10.0at ln2, 250 km/h", "100 %", "10.0", "2.0", "25 %", "+0.5")
+        *("-10.0-11.0 to -9.0", "-7.0", "-10.0at ln2, 250 km/h", "100 %", "75 %50 to 90"),
+        *("10.0", "2.0", "25 %", "2 of 4", "-1.6"),
     ]
+    assert rows[2][headings.index("better than the next in")] == "–"  # the last of the ranked
 
 
 def test_the_share_of_an_oracle_is_shown_where_there_was_one():
@@ -125,7 +130,49 @@ def test_heat_map_and_pairs_are_tables():
     assert heat[1] == ["policy", "250 km/h", "300 km/h"]
     assert heat[3] == ["p", "-10.0", "-10.0"]
     assert heat[5] == [HOSTILE, "(-20.0)", "(-20.0)"]
-    assert pairs[2] == ["p", "75 %", "", "75 %", "75 %"]
+    assert pairs[2] == ["p", *("75 %50 to 90", "", "75 %50 to 90", "75 %50 to 90")]
+
+
+def with_trainings():
+    """The result with p and pd as trainings of one method."""
+    table = result()
+    trainings = {one["policy"]: one for one in table["standings"] if one["policy"] in ("p", "pd")}
+    for one in trainings.values():
+        one |= {"rank": None, "better_than": {}}
+    changes = {name: one["change"] for name, one in trainings.items()}
+    method = trainings["p"] | {"policy": "<ppo>", "change": -9.5, "rank": 1, "trainings": changes}
+    table["standings"].append(method)
+    return table
+
+
+def test_a_method_stands_before_its_trainings_and_each_has_its_point():
+    reader = Reader(html(with_trainings()))
+    rows = reader.tables[0][1:]
+    assert [row[:2] for row in rows[:3]] == [
+        *(["1", "<ppo>"], ["–", "pa training of <ppo>"], ["–", "pda training of <ppo>"])
+    ]
+    pairs = next(table for table in reader.tables if table[0][0] == "better than")
+    assert pairs[0] == ["better than", "passive", HOSTILE, "<ppo>"]
+    radii = [attributes["r"] for tag, attributes in reader.tags if tag == "circle" and "cx" in attributes]
+    assert radii.count("2.5") == 2
+    boxes = [attributes for tag, attributes in reader.tags if tag == "input"]
+    assert len(boxes) == len(POLICIES)  # those that ran
+    assert "A training of &lt;ppo&gt;, which is ranked in its place." in html(with_trainings())
+    rows = summary(parse_result(with_trainings(), "it")).cells
+    assert [row[0] for row in rows[:3]] == ["<ppo>", "· p", "· pd"]
+    assert rows[0][1] == "-9.5"
+    table = with_trainings()
+    table["standings"] = [one for one in table["standings"] if one["policy"] != "p"]
+    with pytest.raises(InputError, match="do not fit together"):
+        parse_result(table, "it")
+
+
+def test_a_track_on_which_a_tape_is_nearly_as_good_says_so_in_its_heading():
+    table = json.loads(json.dumps(result()).replace('"p"', '"tape of pd"'))
+    words = "needs no feedback: tape of pd -10.0 %, pd -9.0 %"
+    assert f"; {words}</h2>" in html(table)
+    assert summary(parse_result(table, "it")).title.endswith(f"Δσ (%), 2 seeds; {words}")
+    assert "needs no feedback" not in html()
 
 
 def test_charts_draw_every_policy_in_its_place():
@@ -310,11 +357,15 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
     table["cells"][1]["oracle_share"] = 0.5  # of p at 250 km/h, whose change is -10
     table["cells"][2] |= {"disqualified": "it presses", "mean_change": 3.2}  # pd at 250 km/h
     made = summary(parse_result(table, "it"))
-    assert made.headings == ("policy", "250 km/h", "300 km/h", "all")
-    assert made.cells[0] == ("pd", "(-9.0; mean +3.2)", "-9.0", "-9.0")  # by the standings' ranks
-    assert ("p", "-10.0", "-10.0", "-10.0") in made.cells
+    overall = ("all", "95 %", "worst quarter", "better than next", "mean moved in")
+    assert made.headings == ("policy", "250 km/h", "300 km/h", *overall)
+    over_all = ("-9.0", "-10.0 to -8.0", "-6.0", "75 % (50 to 90)", "2 of 4")
+    assert made.cells[0] == ("pd", "(-9.0; mean +3.2)", "-9.0", *over_all)  # by the standings' ranks
+    over_all = ("-10.0", "-11.0 to -9.0", "-7.0", "75 % (50 to 90)", "2 of 4")
+    assert ("p", "-10.0", "-10.0", *over_all) in made.cells
     assert made.cells[-2][0] == HOSTILE  # not ranked
-    assert made.cells[-1] == ("*oracle*", "-20.0", "–", "–")
+    assert made.cells[-2][-5:] == ("–", "–", "–", "–", "2 of 4")
+    assert made.cells[-1] == ("*oracle*", "-20.0", *["–"] * 6)
     passive = next(row for row in made.cells if row[0] == "passive")
     assert passive[1] == "0.0 *"  # the first in the cells of this result by hand
 
@@ -326,5 +377,5 @@ def test_panto_report_prints_it_and_writes_no_page(tmp_path):
     app.command()(report)
     told = CliRunner().invoke(app, [str(file), "--markdown"])
     assert told.exit_code == 0, told.output
-    assert "| policy | 250 km/h | 300 km/h | all |" in told.output
+    assert "| policy | 250 km/h | 300 km/h | all | 95 % |" in told.output
     assert list(tmp_path.iterdir()) == [file]
