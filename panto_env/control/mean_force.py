@@ -51,7 +51,7 @@ def target_mean(settings: RunSettings, speed: float) -> float | None:
     """Required mean force (N) at a speed (m/s); None where the pantograph's force is applied as it is."""
     required = settings.mean_force
     if required == "en50367":
-        return largest_mean(speed, settings.catenary.system)
+        return largest_mean(speed, settings.line.system)
     if required is not None:
         return float(required)
     return settings.pantograph.nominal_force(speed) if settings.pantograph.force == "mean" else None
@@ -74,7 +74,8 @@ def trim_of_pass(
         "seed": seed,
         "spans": spans,
     }
-    force = kept("mean_force", inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
+    line = settings.line.name
+    force = kept("mean_force", line, inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
     return Trim((low,), (force,))
 
 
@@ -115,6 +116,6 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
         force += missing / (slope if slope > 0 else 1.0)
     raise InputError(
         f"No static force of '{settings.pantograph.name}' was found that gives a mean force of "
-        f"{target:.1f} N on '{settings.catenary.name}' at {settings.speed_kmh[0]:g} km/h; set the static "
+        f"{target:.1f} N on '{settings.line.name}' at {settings.speed_kmh[0]:g} km/h; set the static "
         "force itself."
     )

@@ -6,8 +6,7 @@ sources and of the run's settings.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -42,30 +41,54 @@ RunPassively = Callable[[RunSettings], Trajectory]
 """Function from settings to the record of a run without control."""
 
 
-@dataclass(frozen=True)
 class PassiveRun:
-    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``."""
+    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``.
 
-    speeds: Array  # (speeds,): m/s, rising
-    means: Array  # (speeds, rows): in the unit of each
-    spreads: Array  # (speeds, rows): standard deviation
+    Each run is made when a value first needs it.
+    """
+
+    def __init__(self, settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> None:
+        """speeds: the range (m/s)."""
+        low, high = speeds
+        count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
+        self.speeds = np.linspace(low, high, count)  # (speeds,): of the runs (m/s), rising
+        self._settings, self._run = settings, run
+        self._table = np.zeros((count, 2, LOW_PASSED + 1))  # means, then standard deviations
+        self._made = np.zeros(count, dtype=np.bool_)
+
+    @property
+    def means(self) -> Array:
+        """Means, (speeds, rows), in the unit of each. Raises InputError as ``mean`` does."""
+        return self._with(range(len(self.speeds)))[:, 0]
+
+    @property
+    def spreads(self) -> Array:
+        """Standard deviations, (speeds, rows). Raises InputError as ``mean`` does."""
+        return self._with(range(len(self.speeds)))[:, 1]
 
     def mean(self, row: int, speed: Any) -> Any:
-        """Mean at a speed (m/s), or at each of an array."""
-        return np.interp(speed, self.speeds, self.means[:, row])
+        """Mean at a speed (m/s), or at each of an array.
+
+        Raises InputError where a run leaves the valid range.
+        """
+        return np.interp(speed, self.speeds, self._around(speed)[:, 0, row])
 
     def spread(self, row: int, speed: Any) -> Any:
-        """Standard deviation at a speed (m/s), or at each of an array."""
-        return np.interp(speed, self.speeds, self.spreads[:, row])
+        """Standard deviation at a speed (m/s), or at each of an array. Raises InputError as ``mean`` does."""
+        return np.interp(speed, self.speeds, self._around(speed)[:, 1, row])
 
+    def _around(self, speed: Any) -> Array:
+        """The table with the runs below and above each speed (m/s)."""
+        above = np.atleast_1d(np.searchsorted(self.speeds, speed)).tolist()
+        return self._with({max(0, place - below) for place in above for below in (0, 1)})
 
-def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> PassiveRun:
-    """Passive runs over a range of speeds (m/s). Raises InputError where one leaves the valid range."""
-    low, high = speeds
-    count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
-    knots = np.linspace(low, high, count)
-    table = np.array([_at_speed(settings, speed, run) for speed in knots.tolist()])
-    return PassiveRun(knots, table[:, 0], table[:, 1])
+    def _with(self, needed: Iterable[int]) -> Array:
+        """The table, (speeds, 2, rows), with the runs of these places in it."""
+        for place in needed:
+            if not self._made[place]:
+                self._table[place] = _at_speed(self._settings, float(self.speeds[place]), self._run)
+                self._made[place] = True
+        return self._table
 
 
 def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[list[float]]:
@@ -74,7 +97,8 @@ def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[li
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
     inputs = designed.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
-    values: list[list[float]] = kept("passive_run", inputs, lambda: _measured(run(designed)))
+    line = designed.line.name
+    values: list[list[float]] = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
     return values
 
 
