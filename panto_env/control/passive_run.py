@@ -6,17 +6,16 @@ sources and of the run's settings.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import partial
 from typing import Any
-
-import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.sensors import Reading
+from .by_speed import BySpeed
 from .kept import kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
@@ -25,6 +24,8 @@ KNOT_DISTANCE = 25.0
 """Maximum distance (km/h) between the speeds of the runs; between them values are interpolated."""
 LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
+SPREADS = LOW_PASSED + 1
+"""Number of rows of means, after which those of spreads begin."""
 NO_MATTER = (
     *OBSERVATION_SETTINGS,
     "estimator",
@@ -44,62 +45,40 @@ RunPassively = Callable[[RunSettings], Trajectory]
 class PassiveRun:
     """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``.
 
-    Each run is made when a value first needs it.
+    Its methods raise InputError where a run leaves the valid range.
     """
 
     def __init__(self, settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> None:
         """speeds: the range (m/s)."""
-        low, high = speeds
-        count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
-        self.speeds = np.linspace(low, high, count)  # (speeds,): of the runs (m/s), rising
-        self._settings, self._run = settings, run
-        self._table = np.zeros((count, 2, LOW_PASSED + 1))  # means, then standard deviations
-        self._made = np.zeros(count, dtype=np.bool_)
+        self._table = BySpeed(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
+        self.speeds = self._table.speeds  # (speeds,): of the runs, rising (m/s)
 
-    @property
-    def means(self) -> Array:
-        """Means, (speeds, rows), in the unit of each. Raises InputError as ``mean`` does."""
-        return self._with(range(len(self.speeds)))[:, 0]
+    def means(self, row: int) -> Array:
+        """Mean at each of the speeds, (speeds,)."""
+        return self._table.column(row)
 
-    @property
-    def spreads(self) -> Array:
-        """Standard deviations, (speeds, rows). Raises InputError as ``mean`` does."""
-        return self._with(range(len(self.speeds)))[:, 1]
+    def spreads(self, row: int) -> Array:
+        """Standard deviation at each of the speeds, (speeds,)."""
+        return self._table.column(SPREADS + row)
 
     def mean(self, row: int, speed: Any) -> Any:
-        """Mean at a speed (m/s), or at each of an array.
-
-        Raises InputError where a run leaves the valid range.
-        """
-        return np.interp(speed, self.speeds, self._around(speed)[:, 0, row])
+        """Mean at a speed (m/s), or at each of an array."""
+        return self._table.at(speed, row)
 
     def spread(self, row: int, speed: Any) -> Any:
-        """Standard deviation at a speed (m/s), or at each of an array. Raises InputError as ``mean`` does."""
-        return np.interp(speed, self.speeds, self._around(speed)[:, 1, row])
-
-    def _around(self, speed: Any) -> Array:
-        """The table with the runs below and above each speed (m/s)."""
-        above = np.atleast_1d(np.searchsorted(self.speeds, speed)).tolist()
-        return self._with({max(0, place - below) for place in above for below in (0, 1)})
-
-    def _with(self, needed: Iterable[int]) -> Array:
-        """The table, (speeds, 2, rows), with the runs of these places in it."""
-        for place in needed:
-            if not self._made[place]:
-                self._table[place] = _at_speed(self._settings, float(self.speeds[place]), self._run)
-                self._made[place] = True
-        return self._table
+        """Standard deviation at a speed (m/s), or at each of an array."""
+        return self._table.at(speed, SPREADS + row)
 
 
-def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[list[float]]:
-    """Means and spreads at one speed (m/s), from the disk where they are cached."""
+def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[float]:
+    """Means, then spreads at one speed (m/s), from the disk where they are cached."""
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
     inputs = designed.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
     line = designed.line.name
-    values: list[list[float]] = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
-    return values
+    means, spreads = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
+    return [*means, *spreads]
 
 
 def _measured(run: Trajectory) -> list[list[float]]:

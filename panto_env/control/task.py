@@ -22,7 +22,7 @@ from .entries import ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
-from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
+from .mean_force import PassiveMean, Trim, TrimAsDesigned, target_mean
 from .normalise import normalised
 from .observation import layout
 from .passive_run import PassiveRun
@@ -45,7 +45,7 @@ class Task(TaskState):
         lanes: int = 1,
         keep_samples: bool = True,
         record_droppers: bool = False,
-        trim: Trim | None = None,
+        trim: Trim | TrimAsDesigned | None = None,
         threads: int | None = None,
     ) -> None:
         """Build the plant and the arrays of an episode; ``cost`` is that of the longest one.
@@ -131,7 +131,7 @@ class Task(TaskState):
         if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
-            self.trim = trim_as_designed(self.settings, self.length.speed_range, passive_mean)
+            self.trim = TrimAsDesigned(self.settings, self.length.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
 
     def end(self, lane: int) -> int:
