@@ -14,10 +14,9 @@ from ..base.table import Alarm, Table
 from ..base.units import to_kmh
 from ..catalog.family import LineFamily
 from ..control.lines import on_drawn_line
-from ..control.settings import RunSettings
+from ..control.settings import run_settings
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
-from ..plant.pantograph.schema import PantographData
 from .pool import Progress, in_processes
 from .simulation import simulate
 
@@ -45,7 +44,7 @@ class DrawnLine:
 
     def outside(self, family: LineFamily) -> list[str]:
         """Names of the values that lie outside the family's bands; all of a run that ended early."""
-        bands = {name: getattr(family.plausible, name) for name in type(family.plausible).model_fields}
+        bands = family.plausible.model_dump(exclude={"pantograph"})
         return [name for name, (low, high) in bands.items() if not low <= getattr(self, name) <= high]
 
 
@@ -67,9 +66,9 @@ LABELS = {
 }
 
 
-def drawn_line(family: LineFamily, pantograph: PantographData, seed: int) -> DrawnLine:
+def drawn_line(family: LineFamily, seed: int) -> DrawnLine:
     """The line of a seed, the one that an environment with this seed has, and a run on it."""
-    settings = RunSettings(catenary=family, pantograph=pantograph, speed_kmh=(0.0, family.max_speed_kmh))
+    settings = run_settings({"catenary": family, "speed_kmh": (0.0, family.max_speed_kmh)})
     begun = time.perf_counter()
     drawn = on_drawn_line(settings, lambda: np.random.default_rng(seed))
     milliseconds = 1e3 * (time.perf_counter() - begun)
@@ -77,7 +76,7 @@ def drawn_line(family: LineFamily, pantograph: PantographData, seed: int) -> Dra
     assert isinstance(line, FlexibleCatenaryData)
     (own,) = np.random.default_rng(seed).spawn(1)
     draws = 1 + next(k for k, one in enumerate(family.drawn(own, settings.speed_kmh)) if one is not None)
-    run = simulate(line, pantograph, speed_kmh, record_droppers=False)
+    run = simulate(line, family.plausible.pantograph, speed_kmh, record_droppers=False)
     figures = None if run.terminated else run.summary()
     _, yields = elasticity(line, run.nominal_force)
     return DrawnLine(
@@ -101,10 +100,10 @@ def drawn_line(family: LineFamily, pantograph: PantographData, seed: int) -> Dra
 
 
 def drawn_lines(
-    family: LineFamily, pantograph: PantographData, seeds: Sequence[int], progress: Progress | None = None
+    family: LineFamily, seeds: Sequence[int], progress: Progress | None = None
 ) -> list[DrawnLine]:
     """The lines of all seeds, on all cores; with progress as ``in_processes`` reports it."""
-    return in_processes([partial(drawn_line, family, pantograph, seed) for seed in seeds], progress=progress)
+    return in_processes([partial(drawn_line, family, seed) for seed in seeds], progress=progress)
 
 
 def table(family: LineFamily, lines: Sequence[DrawnLine]) -> Table:

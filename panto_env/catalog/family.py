@@ -148,6 +148,7 @@ class DampingRanges(Settings):
 class Bands(Settings):
     """What a passive run and the elasticity of a drawn line may be; `panto family` checks it."""
 
+    pantograph: str = Field(description="of that run, which is at the highest speed of the line's trains")
     force_deviation: Range[Share] = Field(
         description="standard deviation of the contact force over its mean (-)"
     )

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ..catalog import load_family, load_pantograph
+from ..catalog import load_family
 from ..catalog.family import PREFIX
-from ..control.settings import default
 from ..terminal import Json, alert, console, counting, print_json, print_table
 
 MOST_SEEDS = 100_000
@@ -18,7 +17,6 @@ def family(
     name: Annotated[str, typer.Argument(help="Family, of the catalogue or a TOML file.")] = "high-speed",
     seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
     first: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
-    pantograph: Annotated[str, typer.Option(help="Pantograph of the runs.")] = default("pantograph"),
     json: Json = False,
 ) -> None:
     """Draw lines from a family, run a passive pantograph on each at its highest speed, and print the ranges.
@@ -27,9 +25,9 @@ def family(
     """
     from ..analysis.family import drawn_lines, facts, table
 
-    chosen, train = load_family(name.removeprefix(PREFIX)), load_pantograph(pantograph)
+    chosen = load_family(name.removeprefix(PREFIX))
     with counting("running") as progress:
-        lines = drawn_lines(chosen, train, range(first, first + seeds), progress)
+        lines = drawn_lines(chosen, range(first, first + seeds), progress)
     outside = [one for one in lines if one.outside(chosen)]
     if json:
         print_json(facts(chosen, lines))

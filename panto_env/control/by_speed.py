@@ -17,7 +17,7 @@ class BySpeed:
     def __init__(
         self, speeds: tuple[float, float], distance: float, compute: Callable[[float], Sequence[float]]
     ) -> None:
-        """speeds: the range (m/s). distance: maximum between speeds (km/h). compute: a row, by speed (m/s)."""
+        """speeds: range (m/s). distance: between speeds, at most (km/h). compute: a row by speed (m/s)."""
         low, high = speeds
         count = 1 if low == high else 2 + int(to_kmh(high - low) / distance)
         self.speeds = np.linspace(low, high, count)  # (speeds,): rising (m/s)
