@@ -18,6 +18,7 @@ def family(
     seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
     first: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     json: Json = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the table for a document.")] = False,
 ) -> None:
     """Draw lines from a family, run a passive pantograph on each at its highest speed, and print the ranges.
 
@@ -31,13 +32,13 @@ def family(
     outside = [one for one in lines if one.outside(chosen)]
     if json:
         print_json(facts(chosen, lines))
+    elif markdown:
+        print(table(chosen, lines).markdown)
     else:
         print_table(table(chosen, lines))
         if outside:
-            alert(
-                f"{len(outside)} of {len(lines)} lines are not plausible:",
-                f"seed {outside[0].seed} and others.",
-            )
+            seeds_of = ", ".join(str(one.seed) for one in outside[:10])
+            alert(f"{len(outside)} of {len(lines)} lines are not plausible.", f"First seeds: {seeds_of}.")
         else:
             console.print(f"All {len(lines)} lines hang, run and are plausible.")
     if outside:

@@ -216,7 +216,7 @@ def test_the_command_says_which_lines_are_not_plausible(tmp_path):
         assert (one["outside"] == ["force_deviation"]) == (one["force_deviation"] > 0.2)
     text = panto("family", own, "--seeds", "4", "--first", "2000").stdout
     count = sum(bool(one["outside"]) for one in found)
-    assert f"{count} of 4 lines are not plausible" in " ".join(text.split())
+    assert f"{count} of 4 lines are not plausible." in " ".join(text.split())
 
 
 def test_the_catalogue_names_its_families():
