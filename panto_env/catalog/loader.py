@@ -153,6 +153,8 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
         return next(iter(schemas.values()))
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
+    if family == "catenary" and table["kind"] == "family":
+        raise _TableError(f"it is a family of lines, so give it with '{PREFIX}' before its path")
     if not isinstance(table["kind"], str) or table["kind"] not in schemas:
         raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
     return schemas[table["kind"]]

@@ -153,11 +153,13 @@ def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message):
 
 
 @pytest.mark.plain
-def test_where_one_line_is_needed_a_family_or_a_list_is_refused():
+def test_where_one_line_is_needed_a_family_or_a_list_is_refused(tmp_path):
     with pytest.raises(InputError, match="One line is needed here"):
         _ = run_settings({"catenary": "family:high-speed"}).line
     with pytest.raises(InputError, match="A list of lines must have one line"):
         run_settings({"catenary": []})
+    with pytest.raises(InputError, match="so give it with 'family:' before its path"):
+        run_settings({"catenary": file_of(tmp_path).removeprefix("family:")})
     with pytest.raises(InputError, match="Unknown family 'hihg-speed', did you mean 'high-speed'"):
         run_settings({"catenary": "family:hihg-speed"})
 
