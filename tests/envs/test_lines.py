@@ -9,6 +9,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from panto_env import InputError
+from panto_env.backend import LaneThreads
+from panto_env.base.machine import cores
 from panto_env.catalog import load_catenary
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
@@ -252,3 +254,33 @@ def test_a_line_given_by_value_is_an_option_too():
     env = make(**FAMILY)
     env.reset(seed=0, options={"catenary": line})
     assert env.unwrapped.context.catenary == line
+
+
+def test_groups_step_on_several_threads_as_on_one(monkeypatch):
+    """Over the ends of episodes, with new lines drawn within a step."""
+    monkeypatch.setattr("panto_env.backend.threads.WORTH", 0.0)  # on threads, however short a step is
+    many, alone = (make_vec(8, lines=4, **FAMILY) for _ in range(2))
+    groups = alone.unwrapped._lanes
+    groups._threads = LaneThreads(groups._step_groups, 4, threads=1)
+    many.reset(seed=0)
+    alone.reset(seed=0)
+    ends = 0
+    for actions in np.random.default_rng(0).uniform(-1, 1, (90, 8, 1)).astype(np.float32):
+        ours, theirs = many.step(actions), alone.step(actions)
+        ends += int((ours[2] | ours[3]).sum())
+        for k in range(4):
+            np.testing.assert_array_equal(ours[k], theirs[k])
+    assert ends > 8
+    assert cores() == 1 or many.unwrapped._lanes._threads._pool
+
+
+def test_each_episode_is_drawn_with_its_own_line():
+    pytest.importorskip("PIL")
+    single, several = make(render_mode="rgb_array", **FAMILY), make_vec(2, render_mode="rgb_array", **FAMILY)
+    frames = []
+    for seed in (0, 1):
+        single.reset(seed=seed)
+        several.reset(seed=seed)
+        frames += [single.render(), *several.render()]
+    assert all(np.ptp(frame) > 0 for frame in frames)
+    assert not np.array_equal(frames[0], frames[3])
