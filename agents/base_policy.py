@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from panto_env.base.errors import InputError
 from panto_env.base.shown import shown
 from panto_env.control.settings import RunSettings
+from panto_env.envs import PantographVectorEnv
 from panto_env.policies import errors_name, find_policy, wishes
 
 Array = NDArray[np.float64]
@@ -18,16 +19,16 @@ Array = NDArray[np.float64]
 class PolicyLanes:
     """One policy per lane, all of the same name: each has its own episode and memory."""
 
-    def __init__(self, name: str, task: Any) -> None:
-        """name: see ``find_policy``. task: ``Task`` of the lanes."""
-        self.name, self._task = name, task
-        self._policies = [find_policy(name) for _ in range(task.lanes)]
+    def __init__(self, name: str, native: PantographVectorEnv) -> None:
+        """name: see ``find_policy``. native: the environment of the lanes."""
+        self.name, self._native = name, native
+        self._policies = [find_policy(name) for _ in range(native.num_envs)]
 
     def begin(self, lanes: Any) -> None:
         """Begin the episodes that the lanes, (n,), have just begun."""
         with errors_name(self.name, "reset"):
             for lane in lanes.tolist():
-                self._policies[lane].reset(self._task.context(lane))
+                self._policies[lane].reset(self._native.context(lane))
 
     def act(self, observations: NDArray[np.float32]) -> Array:
         """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""

@@ -24,15 +24,20 @@ def make_lanes(training: Training) -> Any:
     """
     arguments = {key: value for key, value in training.environment.items() if key != "id"}
     native = gymnasium.make_vec(
-        training.environment["id"], num_envs=training.lanes, autoreset_mode="SameStep", **arguments
+        training.environment["id"],
+        num_envs=training.lanes,
+        lines=training.lines,
+        episodes_per_line=training.episodes_per_line,
+        autoreset_mode="SameStep",
+        **arguments,
     )
     assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
     lanes: Any = PantographVecEnv(native)
     if training.residual_of is not None:
-        base = PolicyLanes(training.residual_of, native.task)
+        base = PolicyLanes(training.residual_of, native)
         lanes = ResidualVecEnv(lanes, base, training.residual_share)
     if training.washout is not None:
-        lanes = WashoutVecEnv(lanes, native.task.context(0), training.washout)
+        lanes = WashoutVecEnv(lanes, native.context(0), training.washout)
     return VecMonitor(lanes)
 
 

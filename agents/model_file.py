@@ -33,6 +33,7 @@ class Needs(Settings):
     observation: str  # kind of the layout
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps that are observed
+    line_values: bool = False  # whether the line's are observed
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
     entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
     channels: tuple[int, ...]  # actuator that each action drives: 0 frame, 1 head
@@ -59,6 +60,7 @@ class Needs(Settings):
             observation=layout.kind,
             harmonics=layout.harmonics,
             history=layout.history,
+            line_values=layout.line_values,
             normalise=layout.normalise,
             entries=tuple(
                 (entry.name, 0.0, 1.0) if present(entry) in names else (entry.name, entry.centre, entry.scale)

@@ -17,7 +17,8 @@ from panto_env.base.settings import Positive, Settings, parse
 from panto_env.base.shown import shown
 from panto_env.base.units import to_kmh
 from panto_env.control import Task
-from panto_env.control.settings import fields, run_settings
+from panto_env.control.lines import on_example
+from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
 
 from .algorithm import Algorithm
@@ -58,6 +59,14 @@ class Training(Settings):
     total_steps: Count = Field(description="environment steps, summed over all lanes")
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
         8, description="number of environments stepped together"
+    )
+    lines: Count | None = Field(
+        None,
+        description="lines side by side where the environment's catenary is a list or a family; by default "
+        "one per lane",
+    )
+    episodes_per_line: Count = Field(
+        1, description="episodes in each lane, on average, before the next line is drawn"
     )
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
@@ -101,7 +110,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
 
 def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
     """Minimum, middle and maximum of an environment's range of speeds, or its single speed (km/h)."""
-    low, high = Task(run_settings(arguments(environment))).length.speed_range
+    low, high = run_settings(arguments(environment)).speeds
     return tuple(sorted({round(to_kmh(v), 6) for v in (low, (low + high) / 2, high)}))
 
 
@@ -147,10 +156,9 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
 
 def _check_environment(training: Training) -> None:
     try:
-        settings = run_settings(training.arguments)
-        task = Task(settings)
-        for speed in training.evaluation.speeds_kmh or ():
-            task.length.check_speeds(speed)
+        given = training.arguments
+        for speed in (given.get("speed_kmh", default("speed_kmh")), *(training.evaluation.speeds_kmh or ())):
+            Task(on_example(run_settings(given | {"speed_kmh": speed})))
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
 

@@ -9,6 +9,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import check_output
 from panto_env.base.shown import shown
 from panto_env.control import Task
+from panto_env.control.lines import on_example
 from panto_env.control.settings import fields, run_settings
 
 from .model_file import Facts, Needs, write_policy
@@ -41,7 +42,7 @@ def save_policy(model: Any, path: str | Path) -> None:
         steps=model.num_timesteps,
         updates=model._n_updates,
         environment=environment,
-        needs=Needs.of(Task(run_settings(arguments(environment))).context(0)),
+        needs=Needs.of(Task(on_example(run_settings(arguments(environment)))).context(0)),
         activation=actor.activation,
         squashed=actor.squashed,
     )

@@ -15,6 +15,7 @@ from stable_baselines3.common.logger import configure
 from panto_baselines.benchmark.seeds import SELECTION, check_seeds
 from panto_env.base.version import commit
 from panto_env.control import Task
+from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
 
 from .base_policy import PolicyLanes
@@ -73,7 +74,7 @@ class Run:
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation since the run was begun or resumed
         self._verdict = (math.inf, False)  # of the last evaluation of all
-        self._needs = Needs.of(Task(run_settings(training.arguments)).context(0))
+        self._needs = Needs.of(Task(on_example(run_settings(training.arguments))).context(0))
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
         check_seeds(chosen_by, "selection")
@@ -106,7 +107,7 @@ class Run:
             return
         native, steps = self.model.get_env().unwrapped.env, training.cloning.steps
         seeds = lane_seeds(training)
-        policy = PolicyLanes(name, native.task)
+        policy = PolicyLanes(name, native)
         examples = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
         error = training.hyperparameters.begin_with(self.model, examples, training.cloning)
         self.folder.note_cloning(name, error)

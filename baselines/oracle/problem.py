@@ -12,6 +12,7 @@ from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import passive_mean, trim_of_pass
 from panto_env.control.extent import whole_steps
+from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.low_pass import low_pass_from, settled_at
 from panto_env.metrics.spans import SpanChoice
@@ -38,7 +39,7 @@ class Problem:
 
         Raises InputError for settings that are not valid, or if the passive run ends early.
         """
-        settings = far_enough(run_settings(given))
+        settings = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
         if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
             raise InputError("An oracle takes one speed, without run_in and without pantograph_scatter.")
         self.given, self.seed, self.settings = dict(given), seed, settings

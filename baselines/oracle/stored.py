@@ -75,7 +75,7 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
     settings = first.settings
     table: dict[str, Any] = finite(
         {
-            "catenary": settings.catenary.name,
+            "catenary": settings.line.name,
             "pantograph": settings.pantograph.name,
             "speed_kmh": settings.speed_kmh[0],
             "actuator": settings.actuator.model_dump(mode="json"),

@@ -28,7 +28,7 @@ def make_tuning(
         condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
     ]
     return Tuning(
-        catenary=settings.catenary.name,
+        catenary=settings.line.name,
         pantograph=settings.pantograph.name,
         place=settings.actuator.place,
         names=tuple(names),
@@ -57,10 +57,10 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
-    case = settings.catenary.name, settings.pantograph.name, settings.actuator.place
+    case = settings.line.name, settings.pantograph.name, settings.actuator.place
     if not force and case in map(_case, file.tunings):
         raise InputError(
-            f"{path} already holds gains for {settings.pantograph.name} on {settings.catenary.name}, "
+            f"{path} already holds gains for {settings.pantograph.name} on {settings.line.name}, "
             f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
         )
 

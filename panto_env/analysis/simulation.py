@@ -14,6 +14,7 @@ from ..base.shown import shortly, shown
 from ..control import Task, passive_mean, trim_of_pass
 from ..control.action import numbers
 from ..control.arguments import check_arguments, parameters
+from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
@@ -73,10 +74,11 @@ def simulate(
 
 def _ready(given: dict[str, Any], seed: int, evaluated: SpanChoice, record_droppers: bool) -> Task:
     """A task with these settings, its lane reset under the seed."""
-    checked = far_enough(run_settings(given))
+    random = np.random.default_rng(seed)
+    checked = far_enough(on_drawn_line(run_settings(given), lambda: random))
     trim = trim_of_pass(checked, seed, evaluated, passive_mean)
     task = Task(checked, record_droppers=record_droppers, trim=trim)
-    task.reset(0, np.random.default_rng(seed))
+    task.reset(0, random)
     return task
 
 

@@ -113,7 +113,7 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
 def _entries(settings: RunSettings) -> dict[str, Settings]:
     """Entries whose values a sweep can change, by family."""
     entries: dict[str, Settings] = {family: getattr(settings, family) for family in FAMILIES[:-1]}
-    return entries | {"line_condition": settings.line_condition[0]}
+    return entries | {"catenary": settings.line, "line_condition": settings.line_condition[0]}
 
 
 def _check(

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from ..base.errors import InputError
@@ -18,20 +19,25 @@ from ..base.settings import Settings
 from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.pantograph.schema import PantographData
+from .family import PREFIX, LineFamily
 
+Lines = CatenaryData | tuple[CatenaryData, ...] | LineFamily
+"""A line, lines to choose from, or a family to draw from."""
 FOLDERS = {
     "catenary": Path(__file__).parent / "catenaries",
     "pantograph": Path(__file__).parent / "pantographs",
+    "family": Path(__file__).parent / "families",
 }
 SCHEMAS: dict[str, Mapping[str, type[Settings]]] = {
     "catenary": {name: kind.schema for name, kind in CATENARIES.items()},
     "pantograph": {"pantograph": PantographData},
+    "family": {"family": LineFamily},
 }
 """Schemas of each family by the value of ``kind``."""
 
 
 def available(family: str) -> tuple[str, ...]:
-    """Names in the catalogue; ``family`` is "catenary" or "pantograph"."""
+    """Names in the catalogue; ``family`` is "catenary", "pantograph" or "family" (of lines)."""
     return tuple(sorted(path.stem for path in FOLDERS[family].glob("*.toml")))
 
 
@@ -40,6 +46,8 @@ def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid.
     """
+    if isinstance(source, str) and source.startswith(PREFIX):
+        raise InputError(f"One line is needed here, not the family '{source}' to draw from; name a line.")
     return source if isinstance(source, CatenaryData) else _load("catenary", source)
 
 
@@ -51,8 +59,32 @@ def load_pantograph(source: str | Path | PantographData) -> PantographData:
     return source if isinstance(source, PantographData) else _load("pantograph", source)
 
 
+def load_family(source: str | Path | LineFamily) -> LineFamily:
+    """Family of lines from a catalogue name, a TOML file, or a family that is already loaded.
+
+    Raises InputError, naming the file and the key, where it cannot be read, is not valid, or has no lines.
+    """
+    return source if isinstance(source, LineFamily) else _load("family", source)
+
+
+def load_lines(source: Any) -> Lines:
+    """A line, a list of lines, or a family by its name or TOML file after "family:".
+
+    Raises InputError as ``load_catenary`` and ``load_family`` do, and for an empty list.
+    """
+    if isinstance(source, LineFamily):
+        return source
+    if isinstance(source, list | tuple):
+        if not source:
+            raise InputError("A list of lines must have one line or more.")
+        return tuple(load_catenary(each) for each in source)
+    if isinstance(source, str) and source.startswith(PREFIX):
+        return load_family(source.removeprefix(PREFIX))
+    return load_catenary(source)
+
+
 def text_of(name: str) -> str:
-    """Text of the TOML file of a line or a pantograph of the catalogue, as a start for your own.
+    """Text of the TOML file of a line, a pantograph or a family of the catalogue, as a start for your own.
 
     Raises InputError where the catalogue does not have this name.
     """
@@ -60,7 +92,9 @@ def text_of(name: str) -> str:
         if name in available(family):
             return (FOLDERS[family] / f"{name}.toml").read_text(encoding="utf-8")
     known = [each for family in FOLDERS for each in available(family)]
-    raise InputError(f"No line or pantograph of the catalogue is called '{name}': {suggest(name, known)}.")
+    raise InputError(
+        f"No line, pantograph or family of the catalogue is called '{name}': {suggest(name, known)}."
+    )
 
 
 def _load(family: str, source: str | Path) -> Any:
@@ -103,9 +137,9 @@ def _read(family: str, path: Path, _modified: int) -> Any:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
     except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
-    if isinstance(entry, CatenaryData):
+    if isinstance(entry, CatenaryData | LineFamily):
         try:
-            check_line(entry)
+            check_line(entry) if isinstance(entry, CatenaryData) else entry.draw(np.random.default_rng(0))
         except InputError as error:
             raise InputError(f"{path} is not a valid entry: {error}") from error
     return entry
@@ -119,6 +153,8 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
         return next(iter(schemas.values()))
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
+    if family == "catenary" and table["kind"] == "family":
+        raise _TableError(f"it is a family of lines, so give it with '{PREFIX}' before its path")
     if not isinstance(table["kind"], str) or table["kind"] not in schemas:
         raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
     return schemas[table["kind"]]

@@ -96,6 +96,7 @@ def make_app() -> typer.Typer:
         catalogue,
         diagnose,
         estimate,
+        family,
         film,
         identify,
         reproduce,
@@ -119,6 +120,7 @@ def make_app() -> typer.Typer:
     app.command()(simulate.simulate)
     app.command()(film.film)
     app.command()(sweep.sweep)
+    app.command()(family.family)
     app.command()(validate.validate)
     app.command()(identify.identify)
     app.command()(estimate.estimate)

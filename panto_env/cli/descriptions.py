@@ -11,7 +11,8 @@ from pydantic import BaseModel
 from ..base.errors import InputError
 from ..base.files import read_toml
 from ..base.names import suggest
-from ..catalog import available, load_catenary, load_pantograph
+from ..catalog import available, load_catenary, load_family, load_pantograph
+from ..catalog.family import LineFamily
 from ..catalog.loader import SCHEMAS
 from ..catalog.values import values_of
 from ..plant.actuators import ACTUATOR_PRESETS
@@ -21,8 +22,12 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SENSOR_PRESETS
 from ..policies import maker_of, parameters_of, policy_names
 
-Entry = CatenaryData | PantographData
-LOADERS: Mapping[str, Callable[[str], Entry]] = {"catenary": load_catenary, "pantograph": load_pantograph}
+Entry = CatenaryData | PantographData | LineFamily
+LOADERS: Mapping[str, Callable[[str], Entry]] = {
+    "catenary": load_catenary,
+    "pantograph": load_pantograph,
+    "family": load_family,
+}
 PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
     "line_condition": LINE_CONDITIONS,
     "actuator": ACTUATOR_PRESETS,

@@ -17,6 +17,7 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
+from .line_values import LINE_CENTRES, LINE_ENTRIES
 from .state import NOW, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
@@ -30,6 +31,7 @@ CENTRES = {
     "frame velocity": (0.0, 0.1),
     "speed": (76.0, 12.0),
     "nominal force": (120.0, 30.0),
+    **LINE_CENTRES,
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
@@ -69,6 +71,7 @@ class EntryOptions(NamedTuple):
     pantograph: PantographData
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
+    line_values: bool = False  # whether the line's are among them
 
 
 Writer = Callable[..., Any]
@@ -162,6 +165,15 @@ def _span_harmonic(episode, own, task, now, number):
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, own, task, now, number):
     return now[NOW.SPEED]
+
+
+def _line_values(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    return [(*each, row) for row, each in enumerate(LINE_ENTRIES)] if options.line_values else []
+
+
+@entries(MEASURED, _line_values)
+def _line_value(episode, own, task, now, number):
+    return episode.line_values[number]
 
 
 @entry(CENTRED, "force deviation", FORCE_DEVIATION, OF_NOMINAL)

@@ -14,6 +14,7 @@ from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
+from .line_values import line_values
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
@@ -41,6 +42,7 @@ class Episode(NamedTuple):
     per_unit: Array  # (entries,): 1 / scale of the entries
     odometer: OdometerArrays  # for the trains' position and speed readings
     alignment: AlignmentArrays  # of the line
+    line_values: Array  # (values,): those in the observation, in the order of ``LINE_ENTRIES``
     time_step: float  # s
     control_steps: int  # plant steps in a control step
     mean_share: float  # weight of a control step in the running mean of the force
@@ -72,6 +74,7 @@ def new_episode(
         per_unit=1 / layout.scale,
         odometer=odometer,
         alignment=plant.alignment.arrays,
+        line_values=line_values(plant.catenary) if layout.line_values else np.zeros(0),
         time_step=plant.time_step,
         control_steps=control_steps,
         mean_share=_share(settings.control_interval, MEAN_TIME),

@@ -25,7 +25,7 @@ def runs(settings: RunSettings) -> Runs:
 
 def spans(settings: RunSettings) -> int | None:
     """Number of spans: as given, or as many as the distance needs, at least the line's own; None: its own."""
-    line = settings.catenary
+    line = settings.line
     if settings.spans is not None or settings.distance is None:
         more = math.ceil(settings.settle)
         return line.spans + more if settings.spans is None and more else settings.spans
@@ -54,7 +54,7 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
     """The plant of a run with a number of lanes. Raises InputError where they do not fit into memory."""
     make_plant = partial(
         Plant,
-        settings.catenary,
+        settings.line,
         settings.train,
         spans=spans(settings),
         numerics=settings.numerics,

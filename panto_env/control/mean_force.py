@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
+from .by_speed import BySpeed
 from .kept import kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
@@ -60,7 +61,7 @@ def target_mean(settings: RunSettings, speed: float) -> float | None:
     """Required mean force (N) at a speed (m/s); None where the pantograph's force is applied as it is."""
     required = settings.mean_force
     if required == "en50367":
-        return largest_mean(speed, settings.catenary.system)
+        return largest_mean(speed, settings.line.system)
     if required is not None:
         return float(required)
     return settings.pantograph.nominal_force(speed) if settings.pantograph.force == "mean" else None
@@ -83,23 +84,30 @@ def trim_of_pass(
         "seed": seed,
         "spans": spans,
     }
-    force = kept("mean_force", inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
+    line = settings.line.name
+    force = kept("mean_force", line, inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
     return Trim((low,), (force,))
 
 
-def trim_as_designed(
-    settings: RunSettings, speeds: tuple[float, float], passive_mean: MakePassiveMean
-) -> Trim:
-    """Trim over a range of speeds (m/s), for line and pantograph as designed, over the default spans."""
-    low, high = speeds
-    count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
-    found: list[float] = np.linspace(low, high, count).tolist()
-    forces: list[float] = []
-    for speed in found:
-        trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
-        assert trim is not None  # a mean force is required at every speed or at none
-        forces += trim.static_forces
-    return Trim(tuple(found), tuple(forces))
+class TrimAsDesigned:
+    """Trim over a range of speeds, for line and pantograph as designed, over the default spans."""
+
+    def __init__(
+        self, settings: RunSettings, speeds: tuple[float, float], passive_mean: MakePassiveMean
+    ) -> None:
+        """speeds: lowest and highest (m/s)."""
+        self._forces = BySpeed(speeds, KNOT_DISTANCE, partial(_as_designed, settings, passive_mean))
+        self.speeds = self._forces.speeds  # (speeds,): that are trimmed, rising (m/s)
+
+    def static_force(self, speed: float) -> float:
+        """Static force (N) at a speed (m/s). Raises InputError where the mean cannot be met."""
+        return float(self._forces.at(speed, 0))
+
+
+def _as_designed(settings: RunSettings, passive_mean: MakePassiveMean, speed: float) -> tuple[float, ...]:
+    trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
+    assert trim is not None  # a mean force is required at every speed or at none
+    return trim.static_forces
 
 
 def _solve(settings: RunSettings, mean: PassiveMean) -> float:
@@ -124,6 +132,6 @@ def _solve(settings: RunSettings, mean: PassiveMean) -> float:
         force += missing / (slope if slope > 0 else 1.0)
     raise InputError(
         f"No static force of '{settings.pantograph.name}' was found that gives a mean force of "
-        f"{target:.1f} N on '{settings.catenary.name}' at {settings.speed_kmh[0]:g} km/h; set the static "
+        f"{target:.1f} N on '{settings.line.name}' at {settings.speed_kmh[0]:g} km/h; set the static "
         "force itself."
     )

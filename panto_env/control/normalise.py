@@ -34,12 +34,12 @@ def _normalised(entry: Entry, run: PassiveRun) -> Entry:
     row = _ROWS.get(present(entry))
     if row is None:
         return entry
-    scale = float(np.sqrt(np.mean(run.spreads[:, row] ** 2)))
+    scale = float(np.sqrt(np.mean(run.spreads(row) ** 2)))
     if scale == 0.0:
         raise InputError(
             f"The {present(entry)} does not change in a passive run, so it cannot be scaled by its spread; "
             "leave out normalise."
         )
-    means, several = run.means[:, row], len(run.speeds) > 1
+    means, several = run.means(row), len(run.speeds) > 1
     slope, centre = np.polyfit(run.speeds, means, 1) if several else (0.0, means[0])
     return entry._replace(centre=float(centre), slope=float(slope), scale=scale)

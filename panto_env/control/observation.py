@@ -33,6 +33,7 @@ class Layout:
     entries: tuple[Entry, ...]
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
+    line_values: bool = False  # whether the line's are among the entries
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
 
     @property
@@ -86,7 +87,7 @@ class Layout:
         return entry.centre + shift + float(observation[place]) * entry.scale
 
 
-OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "normalise")
+OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "line_values", "normalise")
 """Settings of a run that determine only the observation."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
@@ -94,7 +95,8 @@ OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 
 def layout(kind: str, options: EntryOptions) -> Layout:
     """Layout of an observation; kind: one of OBSERVATIONS."""
-    return Layout(kind, tuple(entries_of(kind, options)), options.harmonics, options.history)
+    entries = tuple(entries_of(kind, options))
+    return Layout(kind, entries, options.harmonics, options.history, options.line_values)
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:

@@ -7,17 +7,15 @@ sources and of the run's settings.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
-
-import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.sensors import Reading
+from .by_speed import BySpeed
 from .kept import kept
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
@@ -26,6 +24,8 @@ KNOT_DISTANCE = 25.0
 """Maximum distance (km/h) between the speeds of the runs; between them values are interpolated."""
 LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
+SPREADS = LOW_PASSED + 1
+"""Number of rows of means, after which those of spreads begin."""
 NO_MATTER = (
     *OBSERVATION_SETTINGS,
     "estimator",
@@ -43,40 +43,43 @@ RunPassively = Callable[[RunSettings], Trajectory]
 """Function from settings to the record of a run without control."""
 
 
-@dataclass(frozen=True)
 class PassiveRun:
-    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``."""
+    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``.
 
-    speeds: Array  # (speeds,): m/s, rising
-    means: Array  # (speeds, rows): in the unit of each
-    spreads: Array  # (speeds, rows): standard deviation
+    Its methods raise InputError where a run leaves the valid range.
+    """
+
+    def __init__(self, settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> None:
+        """speeds: the range (m/s)."""
+        self._table = BySpeed(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
+        self.speeds = self._table.speeds  # (speeds,): of the runs, rising (m/s)
+
+    def means(self, row: int) -> Array:
+        """Mean at each of the speeds, (speeds,)."""
+        return self._table.column(row)
+
+    def spreads(self, row: int) -> Array:
+        """Standard deviation at each of the speeds, (speeds,)."""
+        return self._table.column(SPREADS + row)
 
     def mean(self, row: int, speed: Any) -> Any:
         """Mean at a speed (m/s), or at each of an array."""
-        return np.interp(speed, self.speeds, self.means[:, row])
+        return self._table.at(speed, row)
 
     def spread(self, row: int, speed: Any) -> Any:
         """Standard deviation at a speed (m/s), or at each of an array."""
-        return np.interp(speed, self.speeds, self.spreads[:, row])
+        return self._table.at(speed, SPREADS + row)
 
 
-def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> PassiveRun:
-    """Passive runs over a range of speeds (m/s). Raises InputError where one leaves the valid range."""
-    low, high = speeds
-    count = 1 if low == high else 2 + int(to_kmh(high - low) / KNOT_DISTANCE)
-    knots = np.linspace(low, high, count)
-    table = np.array([_at_speed(settings, speed, run) for speed in knots.tolist()])
-    return PassiveRun(knots, table[:, 0], table[:, 1])
-
-
-def _at_speed(settings: RunSettings, speed: float, run: RunPassively) -> list[list[float]]:
-    """Means and spreads at one speed (m/s), from the disk where they are cached."""
+def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[float]:
+    """Means, then spreads at one speed (m/s), from the disk where they are cached."""
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
     inputs = designed.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
-    values: list[list[float]] = kept("passive_run", inputs, lambda: _measured(run(designed)))
-    return values
+    line = designed.line.name
+    means, spreads = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
+    return [*means, *spreads]
 
 
 def _measured(run: Trajectory) -> list[list[float]]:

@@ -20,7 +20,8 @@ from ..base.ranges import Between
 from ..base.settings import parse, plain
 from ..base.shown import shown
 from ..base.units import from_kmh, to_kmh
-from ..catalog import load_catenary, load_pantograph
+from ..catalog import load_lines, load_pantograph
+from ..catalog.loader import Lines
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import CLEAR, LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
@@ -127,8 +128,11 @@ def _normalise(value: Any) -> tuple[float, float] | None:
 class RunSettings(Numerics):
     """All settings of a run. ``time_step``, ``spacing``, ``window``, ``precision``: see ``Numerics``."""
 
-    catenary: Annotated[CatenaryData, BeforeValidator(load_catenary)] = Field(
-        "en50318-2002", validate_default=True, description="line: a name of the catalogue or a TOML file"
+    catenary: Annotated[Lines, BeforeValidator(load_lines)] = Field(
+        "en50318-2002",
+        validate_default=True,
+        description="line: a name of the catalogue or a TOML file; from a list of lines, or from a family of "
+        'them such as "family:high-speed", one is drawn per episode',
     )
     pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
         "en50318-2002",
@@ -192,6 +196,11 @@ class RunSettings(Numerics):
     history: Annotated[int, Between(0, 8)] = Field(
         0, description="earlier control steps whose readings and actions are also observed (-)"
     )
+    line_values: bool = Field(
+        False,
+        description="whether a policy also observes what the line is: span, wave speed, tensions and masses "
+        "of both wires, number of droppers",
+    )
     normalise: Annotated[tuple[_Speed, _Speed] | None, BeforeValidator(_normalise)] = Field(
         None,
         description="speed or range of speeds (km/h) of passive runs, with line and pantograph as designed, "
@@ -238,6 +247,13 @@ class RunSettings(Numerics):
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @property
+    def line(self) -> CatenaryData:
+        """The line. Raises InputError where one is yet to be drawn."""
+        if not isinstance(self.catenary, CatenaryData):
+            raise InputError("One line is needed here, not a list or a family to draw from; name a line.")
+        return self.catenary
+
+    @property
     def train(self) -> Train:
         """The train: one collector."""
         return Train.of(self.pantograph, self.actuator, self.sensors)
@@ -264,7 +280,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
 
     The line gets as many spans as necessary, and enough more that its end has no influence.
     """
-    line = settings.catenary
+    line = settings.line
     if settings.distance is not None or settings.spans is not None:
         return settings
     last = max(LAST_USUAL, line.spans - 1)

@@ -37,15 +37,16 @@ class Stepping:
         noise: Noise | None,
         odometers: Odometers,
         entries: int,
+        threads: int | None = None,
     ) -> None:
         """Bind the kernels.
 
-        entries: number of entries of an observation. sensors, samples, episode, running: named tuples of
-        arrays, which the kernels take after those of the plant.
+        sensors, samples, episode, running: named tuples of arrays, which the kernels take after those of the
+        plant. entries: number of entries of an observation. threads: as ``LaneThreads`` takes them.
         """
         self.plant, self.lanes, self.noise, self.odometers = plant, lanes, noise, odometers
         self.sensors, self.samples, self.episode, self.running = sensors, samples, episode, running
-        self._entries = entries
+        self._entries, self._most_threads = entries, threads
         self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
         self._any_over = True
         self.results = self.new_results()
@@ -61,7 +62,7 @@ class Stepping:
         """Bind the kernels to the arrays."""
         packed = pack(*self.plant.arrays, *self._arrays)
         run = bind(control_steps, packed, *self.results, 0, self.lanes)
-        self._threads = threads = LaneThreads(run, self.lanes)
+        self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
         alone = partial(run, *self.results, 0, 1)
         self._plain_step = alone if self.lanes == 1 else partial(threads.step, *self.results)
         self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)

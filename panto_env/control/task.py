@@ -22,10 +22,10 @@ from .entries import ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
-from .mean_force import PassiveMean, Trim, target_mean, trim_as_designed
+from .mean_force import PassiveMean, Trim, TrimAsDesigned, target_mean
 from .normalise import normalised
 from .observation import layout
-from .passive_run import passive_run
+from .passive_run import PassiveRun
 from .record import diverged, divergence, ending, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
@@ -45,34 +45,35 @@ class Task(TaskState):
         lanes: int = 1,
         keep_samples: bool = True,
         record_droppers: bool = False,
-        trim: Trim | None = None,
+        trim: Trim | TrimAsDesigned | None = None,
+        threads: int | None = None,
     ) -> None:
         """Build the plant and the arrays of an episode; ``cost`` is that of the longest one.
 
         keep_samples: keep the samples of a whole episode, for ``trajectory``. record_droppers: with the
         tension of every dropper. trim: static force where a mean force is required; by default that of line
-        and pantograph as designed. Raises InputError for settings that are not valid together.
+        and pantograph as designed. threads: maximum number, by default one per core. Raises InputError for
+        settings that are not valid together, or that do not give one line.
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
-        if settings.speed_drift and settings.catenary.kind == "rig":
+        if settings.speed_drift and settings.line.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or use another line.")
         self.settings, self.actuator, self.trim = settings, settings.actuator, trim
         plant = new_plant(settings, lanes)
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
-        options = EntryOptions(settings.actuator, settings.pantograph, settings.harmonics, settings.history)
-        self.layout = layout(settings.observation, options)
+        self.layout = layout(settings.observation, _entry_options(settings))
         self.known_pantograph = settings.known_pantograph or settings.pantograph
         if settings.normalise is not None:
             known = settings.model_copy(update={"pantograph": self.known_pantograph})
             speeds = length.check_speeds(settings.normalise)
-            run = passive_run(known, speeds, passive_pass)
+            run = PassiveRun(known, speeds, passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
         self.passive = None
         if settings.reward.target == "passive":
-            self.passive = passive_run(settings, length.speed_range, passive_pass)
+            self.passive = PassiveRun(settings, length.speed_range, passive_pass)
         self.speed = plant.speed
         odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
@@ -87,6 +88,7 @@ class Task(TaskState):
             noise=None if rms is None else Noise(rms, lanes),
             odometers=odometers,
             entries=len(self.layout.entries),
+            threads=threads,
         )
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
@@ -129,7 +131,7 @@ class Task(TaskState):
         if target_mean(self.settings, float(speeds[0])) is None:
             return None
         if self.trim is None:
-            self.trim = trim_as_designed(self.settings, self.length.speed_range, passive_mean)
+            self.trim = TrimAsDesigned(self.settings, self.length.speed_range, passive_mean)
         return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
 
     def end(self, lane: int) -> int:
@@ -195,6 +197,10 @@ class Task(TaskState):
     def ending(self, lane: int) -> str:
         """Where and why a lane's run ended early, as a sentence; empty if it did not."""
         return ending(self, lane)
+
+
+def _entry_options(settings: RunSettings) -> EntryOptions:
+    return EntryOptions(**{name: getattr(settings, name) for name in EntryOptions._fields})
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:

@@ -1,10 +1,11 @@
-"""The lanes of a vector environment: each runs the usual task, or another one for an episode."""
+"""Lanes of a vector environment: each runs the usual task, or another one for an episode."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from ..base.errors import AccuracyWarning
 from ..base.units import to_kmh
 from ..control import Task
 from ..control.episode import Flags, Results
-from ..control.start import LaneGenerators
+from .episodes import Episodes
+
+OfLane = Callable[[int], np.random.Generator]
+"""Function from a lane's number to its generator."""
 
 
 class Answer(NamedTuple):
@@ -32,21 +36,34 @@ class Answer(NamedTuple):
 
 
 class VectorLanes:
-    """All lanes, and the tasks that they run: usually the same one."""
+    """Lanes, and the tasks that they run: usually the same one.
 
-    def __init__(self, usual: Task) -> None:
-        """usual: the task of episodes without options, of all lanes."""
-        self.usual = usual
-        self._results = usual.results  # of the last step, in arrays that are not written to after return
-        self._others: list[tuple[Task, Flags]] = []  # tasks of episodes with options, and their lanes
-        self._speed_kmh = np.zeros(usual.lanes)
+    Where lines are drawn, the lanes share a line. Once enough episodes have begun on it, further ones begin
+    on the next line, while those on the old one run to their end.
+    """
 
-    def begin(self, lanes: Flags, task: Task, random: LaneGenerators) -> None:
-        """Begin episodes of a task, the usual one or another with as many lanes, in the marked lanes."""
+    def __init__(self, usual: Episodes, episodes_per_line: int = 1) -> None:
+        """usual: episodes without options, with as many lanes; episodes_per_line: per lane, on average."""
+        self.episodes, self.usual = usual, usual.task
+        self._per_line = episodes_per_line * self.usual.lanes
+        self._left = 0  # episodes that are still to begin on the present line
+        self._results = self.usual.results  # of the last step, in arrays that are not written to after return
+        self._others: list[tuple[Task, Flags]] = []  # of episodes with options or on old lines; their lanes
+        self._speed_kmh = np.zeros(self.usual.lanes)
+
+    def episodes_with(self, options: Mapping[str, Any]) -> Episodes:
+        """The episodes with options, for ``begin``. Raises InputError where these are not valid."""
+        return self.episodes.with_options(options)
+
+    def begin(self, lanes: Flags, episodes: Episodes, random: OfLane, anew: bool = False) -> None:
+        """Begin episodes, the usual ones or others with as many lanes, in the marked lanes.
+
+        anew: on a new line where lines are drawn, which is drawn from the first lane's generator.
+        """
         self._results = self._results.copy()
-        self._begin(lanes, task, random)
+        self._begin(lanes, episodes, random, anew)
 
-    def step(self, action: Array, waiting: Flags | None, random: LaneGenerators) -> bool:
+    def step(self, action: Array, waiting: Flags | None, random: OfLane) -> bool:
         """Make one control step under actions, (lanes, actions); lanes in ``waiting`` are reset instead.
 
         Returns whether an episode has ended. Raises InputError, and changes nothing, for an action that is
@@ -62,20 +79,34 @@ class VectorLanes:
             self._results = results
             self._take(own, its)
         if waiting is not None:
-            self._begin(waiting, self.usual, random)
+            self._begin(waiting, self.episodes, random)
         return ended
 
-    def _begin(self, lanes: Flags, task: Task, random: LaneGenerators) -> None:
+    def _begin(self, lanes: Flags, episodes: Episodes, random: OfLane, anew: bool = False) -> None:
         for _, its in self._others:
             its[lanes] = False
         self._others = [(other, its) for other, its in self._others if its.any()]
-        own = self._results
-        if task is not self.usual:
-            self._others.append((task, lanes.copy()))
+        of_first = partial(random, int(lanes.argmax()))
+        if episodes is self.episodes:
+            if episodes.draws_line:
+                self._next_line(lanes, of_first, anew)
+            task, own = self.usual, self._results
+        else:
+            task = episodes.draw(of_first)
             own = task.results
+            self._others.append((task, lanes.copy()))
         task.reset(np.flatnonzero(lanes), random, own)
         self._take(own, lanes)
         self._speed_kmh[lanes] = to_kmh(task.speed[lanes])
+
+    def _next_line(self, lanes: Flags, random: Callable[[], np.random.Generator], anew: bool) -> None:
+        """Draw the line on which lanes, and those after them, begin, if the present one has had enough."""
+        if anew or self._left <= 0:
+            going_on = self._on_usual & ~lanes
+            if going_on.any():
+                self._others.append((self.usual, going_on))
+            self.usual, self._left = self.episodes.draw(random), self._per_line
+        self._left -= int(lanes.sum())
 
     def _take(self, results: Results, lanes: Flags) -> None:
         """Copy the results of some lanes."""
@@ -88,9 +119,9 @@ class VectorLanes:
         """Results of all lanes."""
         return Answer(self._results, self._speed_kmh.copy(), np.ones(self.usual.lanes, dtype=np.bool_))
 
-    def task_of(self, lane: int) -> Task:
-        """The task that a lane runs."""
-        return next((task for task, its in self._others if its[lane]), self.usual)
+    def task_of(self, lane: int) -> tuple[Task, int]:
+        """The task that a lane runs, and its number there."""
+        return next((task for task, its in self._others if its[lane]), self.usual), lane
 
     def figures(self, lanes: Flags) -> dict[str, Array]:
         """Figures of the episodes of lanes, by name, (lanes,), zero for the others.
@@ -106,12 +137,18 @@ class VectorLanes:
 
     def _tasks(self) -> Iterator[tuple[Task, Flags]]:
         """Each task with the lanes that run it, the usual one first."""
-        usual = np.ones(self.usual.lanes, dtype=np.bool_)
-        for _, its in self._others:
-            usual &= ~its
+        usual = self._on_usual
         if usual.any():
             yield self.usual, usual
         yield from self._others
+
+    @property
+    def _on_usual(self) -> Flags:
+        """Which lanes run the usual task."""
+        usual = np.ones(self.usual.lanes, dtype=np.bool_)
+        for _, its in self._others:
+            usual &= ~its
+        return usual
 
 
 def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:

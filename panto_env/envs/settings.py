@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from ..base.errors import InputError
 from ..base.ranges import Between
 from ..base.shown import shown
+from ..control.lines import draws_line
 from ..control.settings import RunSettings
 
 MOST_LANES = 10_000_000
@@ -48,6 +49,16 @@ class VectorSettings(RunSettings):
         AutoresetMode.NEXT_STEP,
         description='when a lane whose episode has ended is reset: "NextStep", "SameStep" or "Disabled"',
     )
+    lines: Annotated[int, Between(1, MOST_LANES)] | None = Field(
+        None,
+        description="number of lines side by side where catenary is a list or a family, each with an equal "
+        "share of the lanes, which is faster; by default one per lane",
+    )
+    episodes_per_line: Annotated[int, Between(1, 10**9)] = Field(
+        1,
+        description="episodes that begin in each lane, on average, before the next line is drawn where "
+        "catenary is a list or a family",
+    )
     max_episode_steps: Annotated[int, Between(1, 10**12)] | None = Field(
         None, description="steps after which an episode is truncated; by default the line's end"
     )
@@ -77,6 +88,17 @@ class VectorSettings(RunSettings):
                 f"render_mode of the vector environment must be None or 'rgb_array', not {shown(value)}."
             )
         return value
+
+    @property
+    def groups(self) -> int:
+        """Number of groups of lanes that share a line."""
+        return 1 if not draws_line(self) else self.lines or self.num_envs
+
+    @model_validator(mode="after")
+    def _lanes_for_each_line(self) -> VectorSettings:
+        if self.lines is not None and self.lines > self.num_envs:
+            raise InputError(f"{self.num_envs} lanes are too few for {self.lines} lines; give fewer lines.")
+        return self
 
     @model_validator(mode="after")
     def _lanes_are_there(self) -> VectorSettings:

@@ -18,7 +18,7 @@ from ..control.observation import BOUND
 from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
 from .description import described
-from .episodes import task_with_options, with_longest_episode
+from .episodes import Episodes, with_longest_episode
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, final_figures, first_info
 from .one_thread import InUse, one_at_a_time, refuse
 from .settings import EnvironmentSettings, render_metadata
@@ -125,8 +125,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._viewer: Viewer | None = None
         self._reward_so_far = 0.0  # shown in pictures
         self._spec: EnvSpec | None = None
-        self._usual = Task(settings)
-        self._watch(self._usual)
+        self._usual = Episodes(settings)
+        self._watch(self._usual.task)
         self._running = False
         shape = self.task.results.observation[0].shape
         self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
@@ -139,7 +139,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._usual.length.most_control_steps)
+        self._spec = with_longest_episode(spec, self._usual.most_control_steps)
 
     @property
     def context(self) -> Context:
@@ -156,8 +156,9 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; ``options`` are arguments of the class, only for this episode."""
-        task = task_with_options(self._usual, options or {})
+        episodes = self._usual.with_options(options or {})
         super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed)
+        task = episodes.draw(lambda: self.np_random)
         if task is not self.task:
             self._watch(task)
         task.reset(0, self.np_random)

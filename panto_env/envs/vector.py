@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..control import Task
+from ..control import Context
 from ..control.action import checked
 from ..control.arguments import takes
 from ..control.episode import Flags
+from ..control.lines import draws_line
 from ..control.observation import BOUND
 from ..control.settings import read_settings
-from .episodes import task_with_options, with_longest_episode
+from .episodes import with_longest_episode
+from .groups import lanes_of
 from .infos import REWARD, lane_figures, lane_infos
-from .lanes import Answer, VectorLanes
+from .lanes import Answer
 from .one_thread import InUse, one_at_a_time
 from .settings import VectorSettings, render_metadata
 from .stable_baselines import NamedToStableBaselines
@@ -41,6 +43,11 @@ class PantographVectorEnv(
     speed, line irregularity and noise drawn for each lane. Lane i, seeded with seed + i, is bit for bit the
     same as a single environment with that seed. `autoreset_mode` is "NextStep" (Gymnasium's default),
     "SameStep" or "Disabled"; `max_episode_steps` truncates episodes as Gymnasium's `TimeLimit` does.
+
+    Where `catenary` is a list or a family, each lane draws its own line for each episode, as the single
+    environment does. Faster is `lines=8`: eight lines side by side, each shared by an equal number of lanes
+    and drawn by the generator of the first of them, `episodes_per_line` times as seldom. `context(lane)` has
+    a lane's line.
 
     `reset(options=...)` takes the options of the single environment, for the episodes that it begins. With
     the option "reset_mask", an array of bool, it begins them only in the marked lanes.
@@ -62,7 +69,11 @@ class PantographVectorEnv(
         self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
         self.num_envs = settings.num_envs
         self.render_mode = settings.render_mode
-        self.task = Task(settings, lanes=self.num_envs, keep_samples=self.render_mode is not None)
+        self._lanes = lanes_of(settings, keep_samples=self.render_mode is not None)
+        self._usual: Any = self._lanes.episodes_with({})
+        self.task, _ = self._lanes.task_of(0)
+        """The task of all lanes on one line; where lines are drawn, that of an example."""
+        self._longest = None if draws_line(settings) else self.task.length.most_control_steps
         drawn = range(self.num_envs) if settings.render_lanes is None else settings.render_lanes
         self._drawn, self._render_size = tuple(drawn), settings.render_size
         self._in_use = InUse()
@@ -79,7 +90,6 @@ class PantographVectorEnv(
         self._shape = (self.num_envs, *self.single_action_space.shape)
         self._spec: EnvSpec | None = None
         self._limit = settings.max_episode_steps
-        self._lanes = VectorLanes(self.task)
         self._random: dict[int, np.random.Generator] = {}  # by lane, made when first needed
         self._seeds: dict[int, int | None] = {}  # seed of each lane's generator; None: any
         self._running = False
@@ -94,7 +104,7 @@ class PantographVectorEnv(
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
+        self._spec = with_longest_episode(spec, self._limit or self._longest)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -125,9 +135,9 @@ class PantographVectorEnv(
         options = dict(options or {})
         mask = self._mask(options.pop("reset_mask", None))
         lanes = self._all if mask is None else mask
-        task = task_with_options(self.task, options)
+        episodes = self._lanes.episodes_with(options)
         self._seed(lanes, seed)
-        self._begin(lanes, task)
+        self._begin(lanes, episodes, anew=mask is None or seed is not None)
         self._running = True
         answer = self._lanes.answer()
         return answer.results.observation, lane_infos(answer if mask is None else answer.of(mask))
@@ -186,13 +196,17 @@ class PantographVectorEnv(
 
         if self._viewer is None:
             self._viewer = Viewer(self._render_size)
-        names = f"{self.task.plant.pantograph.name} on {self.task.plant.catenary.name}"
-        return tuple(
-            self._viewer.frame(
-                self._lanes.task_of(lane), lane, f"lane {lane}: {names}", float(self._reward_so_far[lane])
-            )
-            for lane in self._drawn
-        )
+        frames = []
+        for lane in self._drawn:
+            task, place = self._lanes.task_of(lane)
+            title = f"lane {lane}: {task.plant.pantograph.name} on {task.plant.catenary.name}"
+            frames.append(self._viewer.frame(task, place, title, float(self._reward_so_far[lane])))
+        return tuple(frames)
+
+    def context(self, lane: int) -> Context:
+        """Information about a lane's episode that a policy may use."""
+        task, place = self._lanes.task_of(lane)
+        return task.context(place)
 
     def _figures(self) -> dict[str, Any]:
         return lane_figures(self._lanes.figures(self._ended), self._ended)
@@ -209,7 +223,7 @@ class PantographVectorEnv(
             "final_info": lane_infos(answer.of(ended)) | self._figures(),
             "_final_info": ended,
         }
-        self._begin(ended, self.task)
+        self._begin(ended, self._usual)
         begun = self._lanes.answer()
         return begun.results.observation, lane_infos(begun) | final
 
@@ -217,8 +231,8 @@ class PantographVectorEnv(
     def _all(self) -> Flags:
         return np.ones(self.num_envs, dtype=np.bool_)
 
-    def _begin(self, lanes: Flags, task: Task) -> None:
-        self._lanes.begin(lanes, task, self._generator)
+    def _begin(self, lanes: Flags, episodes: Any, anew: bool = False) -> None:
+        self._lanes.begin(lanes, episodes, self._generator, anew)
         self._steps[lanes] = 0
         self._reward_so_far[lanes] = 0.0
         self._ended[lanes] = False

@@ -225,7 +225,7 @@ def test_a_trim_by_speed_is_near_that_of_each_speed():
     """Between the speeds that are trimmed the mean is within a few tenths of a newton."""
     given = {"catenary": "en50318-2002", "pantograph": "dsa250", "mean_force": "en50367"}
     settings = run_settings(given | {"speed_kmh": (240.0, 250.0)})
-    trim = mean_force.trim_as_designed(settings, (240 / 3.6, 250 / 3.6), passive_mean)
+    trim = mean_force.TrimAsDesigned(settings, (240 / 3.6, 250 / 3.6), passive_mean)
     assert 3.6 * np.diff(trim.speeds).max() <= mean_force.KNOT_DISTANCE
     between = far_enough(run_settings(given | {"speed_kmh": 247.3}))
     exact = trim_of_pass(between, 0, None, passive_mean)

@@ -1,9 +1,12 @@
 """Each entry of an observation is what its name says, judged by name against what did not come from it."""
 
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
 
+from panto_env import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.envs import BARE
 from panto_env.plant.state import Row
@@ -172,3 +175,30 @@ def test_entries_are_clipped_to_ten_of_their_scales(sign):
     force = observation[env.context.layout.index("contact force")]
     assert sign * force == (sign * observation).max() == 10.0
     assert env.observation_space.contains(observation)
+
+
+@pytest.mark.parametrize("kind", ["measured", "centred"])
+def test_line_values_say_what_the_line_is(kind):
+    """The values as the line's data and context have them; the other entries stay as they are."""
+    settings = {"observation": kind, "distance": 50.0}
+    plain = gymnasium.make("panto_env:Pantograph-v0", **BARE | settings).unwrapped
+    env = gymnasium.make("panto_env:Pantograph-v0", **BARE | settings | {"line_values": True}).unwrapped
+    before, _ = plain.reset(seed=0)
+    for name in ("en50318-2002", "re330"):
+        observation, _ = env.reset(seed=0, options={"catenary": name})
+        line, read = env.context.catenary, partial(env.context.layout.read, observation)
+        assert read("span length") == pytest.approx(line.span_length)
+        assert read("wave speed") == pytest.approx(
+            (line.contact_wire.tension / line.contact_wire.mass) ** 0.5
+        )
+        assert read("contact wire tension") == pytest.approx(line.contact_wire.tension)
+        assert read("messenger wire tension") == pytest.approx(line.messenger_wire.tension)
+        assert read("contact wire mass") == pytest.approx(line.contact_wire.mass)
+        assert read("messenger wire mass") == pytest.approx(line.messenger_wire.mass)
+        assert read("droppers of a span") == pytest.approx(len(line.droppers.positions))
+        if name == "en50318-2002":
+            same = [env.context.layout.index(entry.name) for entry in plain.context.layout.entries]
+            np.testing.assert_array_equal(observation[same], before)
+    assert len(observation) == len(before) + 7
+    with pytest.raises(InputError, match="line 'periodic-stiffness' is not one; leave out line_values"):
+        gymnasium.make("panto_env:PantographStiffness-v0", line_values=True)

@@ -39,6 +39,7 @@ RULES = (
     Rule("panto dataset designs", MINUTES, "--count 8 --workers 1"),
     Rule("panto dataset verify data", "of what the three before made", ""),
     Rule("panto evaluate", "all speeds", "--speed 300"),
+    Rule("panto family", "a pass for each of many seeds", "--seeds 2"),
     Rule("panto film", "hundreds of frames", "--seconds 0.1 --size 320 240"),
     Rule("panto film passive runs/demo", "wants an agent of `make demo`, which is run by hand"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),

@@ -71,6 +71,11 @@ class Wire(Settings):
     )
 
     @property
+    def wave_speed(self) -> float:
+        """Speed of waves along the wire (m/s), without bending."""
+        return math.sqrt(self.tension / self.mass)
+
+    @property
     def impedance(self) -> float:
         """Wave impedance, force over velocity (N s/m), without bending."""
         return math.sqrt(self.tension * self.mass)

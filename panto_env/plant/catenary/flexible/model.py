@@ -59,7 +59,7 @@ class FlexibleCatenary:
         if data is not designed:
             shape = shape_left(designed, data)
         own = locate(data, spans, condition)
-        self.wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+        self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
         tightest = with_tension_left(designed, condition, (1 + error, 1 + error))

@@ -116,7 +116,7 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
 def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     """The coarsest grid and the longest step, stable or not, that give figures within 1 % of converged."""
     slow, quick = runs.speeds
-    wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+    wave_speed = data.contact_wire.wave_speed
     spacing, longest = next((fine for share, *fine in GRIDS if quick <= share * wave_speed), GRIDS[-1][1:])
     spacing = min(spacing, max(slow / NODES_HZ, FINEST_GRID))
     deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
@@ -144,7 +144,7 @@ def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
 def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     longer, shorter = FAST_STEPS
     slow, quick = runs.speeds
-    wave_speed = float(np.sqrt(data.contact_wire.tension / data.contact_wire.mass))
+    wave_speed = data.contact_wire.wave_speed
     spacing = next((grid for share, grid in FAST_GRIDS if quick <= share * wave_speed), FAST_GRIDS[-1][1])
     spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
     if np.isfinite(runs.shortest_wave):

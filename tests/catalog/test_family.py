@@ -1,0 +1,225 @@
+"""A family of lines: what is drawn from it lies in its ranges, hangs, and belongs together."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.analysis.family import drawn_line
+from panto_env.catalog import available, load_family, load_lines
+from panto_env.catalog.loader import text_of
+from panto_env.control.lines import on_drawn_line
+from panto_env.control.settings import run_settings
+from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.static import hang
+
+from ..command import panto
+
+FAMILY = load_family("high-speed")
+
+
+def line_of(seed, family="family:high-speed", speed_kmh=(200, 350)):
+    """Line and speeds of the first episode under a seed."""
+    settings = run_settings({"catenary": family, "speed_kmh": speed_kmh})
+    drawn = on_drawn_line(settings, lambda: np.random.default_rng(seed))
+    return drawn.line, drawn.speed_kmh
+
+
+def values_of(line):
+    """All that makes a line another one."""
+    return line.model_dump_json(exclude={"sources"})
+
+
+def file_of(tmp_path, *changes):
+    text = text_of("high-speed")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    return f"family:{path}"
+
+
+def inside(value, ends):
+    return ends[0] <= value <= ends[1]
+
+
+@pytest.mark.plain
+def test_drawn_lines_lie_in_the_ranges_and_hang():
+    for seed in range(30):
+        line, (low, high) = line_of(seed)
+        span, contact, messenger = line.span_length, line.contact_wire, line.messenger_wire
+        assert inside(span, FAMILY.span_length)
+        assert inside(line.encumbrance / span, FAMILY.encumbrance)
+        assert inside(messenger.tension / contact.tension, FAMILY.tension_ratio)
+        for wire, ranges in ((contact, FAMILY.contact_wire), (messenger, FAMILY.messenger_wire)):
+            section = wire.mass / ranges.density
+            assert inside(section, ranges.section)
+            assert inside(wire.tension / section, ranges.stress)
+            radius = math.sqrt(section / math.pi)
+            assert wire.bending_stiffness == pytest.approx(ranges.modulus * math.pi * radius**4 / 4)
+        x = np.array(line.droppers.positions)
+        np.testing.assert_allclose(x + x[::-1], span)
+        assert inside(x[0] / span, FAMILY.droppers.first)
+        assert hang(line).dropper_length.min() >= FAMILY.droppers.shortest
+        assert (hang(line).dropper_tension > 0).all()
+        wave_speed_kmh = 3.6 * math.sqrt(contact.tension / contact.mass)
+        assert max(200, 0.45 * wave_speed_kmh) == pytest.approx(low)
+        assert min(350, 0.7 * wave_speed_kmh) == pytest.approx(high)
+
+
+@pytest.mark.plain
+def test_the_wire_hangs_as_low_as_the_pre_sag_says():
+    """Between droppers it hangs a little lower: by at most what a string of its own weight does."""
+    sags = []
+    for seed in range(12):
+        line, _ = line_of(seed)
+        shape, wire = hang(line), line.contact_wire
+        gap = np.diff(line.droppers.positions).max()
+        own = wire.mass * 9.81 * gap**2 / (8 * wire.tension)
+        between = np.linspace(line.droppers.positions[0], line.droppers.positions[-1], 301)
+        lowest = -shape.contact.height(between).min()
+        deepest = max(line.droppers.sag)
+        assert deepest - 1e-9 <= lowest <= deepest + 1.1 * own
+        sags.append(deepest / line.span_length)
+    assert min(sags) == 0
+    assert 0.0005 < max(sags) <= 0.001
+
+
+@pytest.mark.plain
+def test_a_seed_is_a_line_and_no_two_seeds_or_episodes_share_one():
+    """Over the borders of the ranges for test, selection and training."""
+    seeds = [*range(40), *range(990, 1010), *range(1990, 2010), 999_999]
+    lines = [values_of(line_of(seed)[0]) for seed in seeds]
+    assert len(set(lines)) == len(seeds)
+    assert lines[7] == values_of(line_of(7)[0])
+    random = np.random.default_rng(7)
+    settings = run_settings({"catenary": "family:high-speed", "speed_kmh": (200, 350)})
+    episodes = [values_of(on_drawn_line(settings, lambda: random).line) for _ in range(5)]
+    assert episodes[0] == lines[7]
+    assert len({*episodes, *lines}) == len(seeds) + 4
+
+
+@pytest.mark.plain
+def test_drawing_a_line_leaves_the_other_values_of_an_episode_as_they_are():
+    drawn, plain = np.random.default_rng(3), np.random.default_rng(3)
+    on_drawn_line(run_settings({"catenary": ["re250", "re330"]}), lambda: drawn)
+    assert drawn.random() == plain.random()
+
+
+@pytest.mark.plain
+def test_a_list_is_drawn_from_evenly():
+    names = ["re250", "re330", "ln2"]
+    counts = dict.fromkeys(names, 0)
+    for seed in range(300):
+        counts[line_of(seed, names)[0].name] += 1
+    assert all(70 < count < 130 for count in counts.values())
+
+
+@pytest.mark.plain
+def test_speeds_choose_the_line():
+    """A speed that only fast wires allow is given to these."""
+    for seed in range(10):
+        line, speeds = line_of(seed, speed_kmh=350)
+        assert speeds == (350, 350)
+        assert 0.7 * 3.6 * math.sqrt(line.contact_wire.tension / line.contact_wire.mass) >= 350
+    for speed in (500, 100, math.nan):
+        with pytest.raises(InputError, match="its trains run at 45 to 70 % of the wave speed"):
+            line_of(0, speed_kmh=speed)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ((("value = [40.0, 65.0]", "value = [65.0, 40.0]"),), "key 'span_length' must not fall"),
+        ((("value = [40.0, 65.0]", "value = 55.0"),), None),
+        ((("value = [40.0, 65.0]", "value = [40.0, 900.0]"),), "key 'span_length.*from 2 to 200 m"),
+        ((("value = 0.25, source", "value = 3.0, source"),), "No line of family 'mine' was found in 1,000"),
+        ((("[pre_sag]", "[presag]"),), "presag"),
+    ],
+)
+def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message):
+    own = file_of(tmp_path, *changes)
+    if message is None:
+        assert line_of(1, own)[0].span_length == 55.0
+        assert line_of(1, own)[0].name == "family:mine"
+        return
+    with pytest.raises(InputError, match=message) as caught:
+        load_lines(own)
+    assert "mine.toml" in str(caught.value)
+
+
+@pytest.mark.plain
+def test_where_one_line_is_needed_a_family_or_a_list_is_refused(tmp_path):
+    with pytest.raises(InputError, match="One line is needed here"):
+        _ = run_settings({"catenary": "family:high-speed"}).line
+    with pytest.raises(InputError, match="A list of lines must have one line"):
+        run_settings({"catenary": []})
+    with pytest.raises(InputError, match="so give it with 'family:' before its path"):
+        run_settings({"catenary": file_of(tmp_path).removeprefix("family:")})
+    with pytest.raises(InputError, match="Unknown family 'hihg-speed', did you mean 'high-speed'"):
+        run_settings({"catenary": "family:hihg-speed"})
+
+
+def test_a_saved_run_holds_its_line_and_can_be_repeated(tmp_path):
+    run = simulate("family:high-speed", seed=5, distance=120.0, line_condition="fair")
+    line, _ = line_of(5, speed_kmh=300)
+    assert run.catenary == line.name == "family:high-speed"
+    assert run.design["catenary"] == line.model_dump(mode="json")
+    again = simulate(line, seed=5, distance=120.0, line_condition="fair")
+    np.testing.assert_array_equal(again.contact_force, run.contact_force)
+    run.save(tmp_path / "run.parquet")
+    assert type(run).load(tmp_path / "run.parquet").design["catenary"] == run.design["catenary"]
+
+
+def test_a_required_mean_is_met_on_the_drawn_line():
+    """The passes that trim the static force draw the same line and irregularity."""
+    run = simulate("family:high-speed", seed=5, mean_force=130.0, line_condition="fair", accuracy="fast")
+    assert run.summary().mean == pytest.approx(130.0, abs=0.06)
+
+
+def check_seeds_are_plausible(seeds):
+    """Each line hangs, runs, and lies in the stated bands."""
+    found = [drawn_line(FAMILY, seed) for seed in seeds]
+    assert [(one.seed, one.outside(FAMILY), one.ending) for one in found if one.outside(FAMILY)] == []
+    return found
+
+
+def test_drawn_lines_are_plausible():
+    """A sample; `make studies` tries a thousand."""
+    for one in check_seeds_are_plausible(range(8)):
+        line, (_, fastest) = line_of(one.seed)
+        assert one.speed_kmh == fastest
+        # The middle of a span of two strings that act together yields L / 4 (T1 + T2); droppers add to it.
+        both = line.contact_wire.tension + line.messenger_wire.tension
+        assert 1.0 < one.elasticity / (line.span_length / (4 * both)) < 1.4
+        assert one.elasticity == pytest.approx(elasticity(line, 120.0)[1].max(), rel=0.1)
+
+
+@pytest.mark.study
+def test_a_thousand_drawn_lines_are_plausible_and_drawn_in_milliseconds():
+    found = check_seeds_are_plausible(range(1000))
+    assert np.median([one.milliseconds for one in found]) < 20
+    assert np.mean([one.draws for one in found]) < 3
+
+
+def test_the_command_says_which_lines_are_not_plausible(tmp_path):
+    own = file_of(
+        tmp_path, ("force_deviation = { value = [0.1, 0.45]", "force_deviation = { value = [0.1, 0.2]")
+    )
+    result = panto("family", own, "--seeds", "4", "--first", "2000", "--json")
+    assert result.returncode == 1
+    found = json.loads(result.stdout)
+    assert [one["seed"] for one in found] == [2000, 2001, 2002, 2003]
+    for one in found:
+        assert (one["outside"] == ["force_deviation"]) == (one["force_deviation"] > 0.2)
+    text = panto("family", own, "--seeds", "4", "--first", "2000").stdout
+    count = sum(bool(one["outside"]) for one in found)
+    assert f"{count} of 4 lines are not plausible." in " ".join(text.split())
+
+
+def test_the_catalogue_names_its_families():
+    assert available("family") == ("high-speed",)
