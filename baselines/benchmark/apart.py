@@ -115,7 +115,7 @@ class _PolicyProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | variables,
-            start_new_session=True,  # interrupts from the keyboard are left to this process
+            process_group=0,  # interrupts from the keyboard are left to this process
             bufsize=0,
         )
         assert self._process.stdin is not None

@@ -9,6 +9,7 @@ for what only depends on line and speed. All use the same two pipes: each waits 
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import pickle
@@ -80,6 +81,7 @@ def serve(channel: Channel, begin: Callable[[bytes], None]) -> None:
     """Answer each BEGIN by a forked process that calls ``begin`` with the content, until END."""
     while channel.read(1) == BEGIN:
         content = channel.read(int.from_bytes(channel.read(8), "big"))
+        gc.freeze()  # a collection would touch, and so copy, all memory in each forked process
         me, process = os.getpid(), os.fork()
         if process == 0:
             _run(channel, me, begin, content)
@@ -141,6 +143,7 @@ def main() -> None:
     # Forking while idle threads of kernels or of linear algebra exist: none of them is needed afterwards.
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     channel = Channel()
+    checked_action(np.zeros(1), (1,))  # imports what NumPy imports late, once for all passes
     with suppress(BrokenPipeError, KeyboardInterrupt):
         serve(channel, lambda content: _load(channel, content.decode()))
     os._exit(0)
