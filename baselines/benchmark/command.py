@@ -89,6 +89,7 @@ def benchmark(
     from ..report.result import parse_result
     from .plot import plot as draw
     from .report import WIDTH, tables
+    from .seeds import salt_hash
 
     line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
@@ -118,6 +119,9 @@ def benchmark(
         if not console.is_terminal:
             console = PlainConsole(width=WIDTH)
         console.print(tables(outcome))
+        if settings.salt is not None:
+            words = f"Seeds are made from the salt '{settings.salt}', SHA-256 {salt_hash(settings.salt)}."
+            console.print(words, soft_wrap=True)
 
 
 def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> BenchmarkSettings:

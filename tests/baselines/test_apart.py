@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,9 @@ from panto_baselines.benchmark.apart import PolicyApart, find_apart
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_env import InputError
+from panto_env.analysis.pool import in_processes
+from panto_env.analysis.simulation import ready_pass
+from panto_env.base.machine import cores
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
@@ -23,6 +28,7 @@ ROOT = Path(__file__).parents[2]
 SPANS = (3, 5)
 POLICY = """
 import json, os, sys, time
+from functools import partial
 from pathlib import Path
 import numpy as np
 
@@ -191,3 +197,26 @@ def test_its_processes_end_with_it():
     assert len(children) == 2  # that which loads nothing, and that of the policy
     apart.close()
     wait_for(lambda: not any(map(alive, children)), 5)
+
+
+def answering_times(policy: str) -> list[float]:
+    """Median time (s) that an answer takes in a pass: in this process, and apart."""
+    medians = []
+    for driver in (find_policy(policy), PolicyApart(policy)):
+        task, _ = ready_pass("passive", {"distance": 900.0}, 1)
+        driver.reset(task.context(0))
+        times = []
+        while not task.results.truncated[0]:
+            observation = task.results.observation[0].copy()
+            begun = time.perf_counter()
+            action = driver.act(observation)
+            times.append(time.perf_counter() - begun)
+            task.step(action[None])
+        medians.append(float(np.median(times)))
+    return medians
+
+
+@pytest.mark.slow
+def test_an_answer_from_apart_takes_less_than_30_microseconds_more_on_every_core():
+    for beside, away in in_processes([partial(answering_times, "pd") for _ in range(cores())]):
+        assert 0 < away - beside < 30e-6
