@@ -37,6 +37,7 @@ from .policy_process import (
     FAILED,
     LONGEST,
     OBSERVATION,
+    core,
     process_control,
 )
 
@@ -155,7 +156,7 @@ class _PolicyProcess:
 
     def act(self, observation: NDArray[np.float32]) -> Array:
         """Action for an observation. Raises PolicyError if the policy fails."""
-        self._send(OBSERVATION + observation.tobytes())
+        self._send(OBSERVATION + core() + observation.tobytes())
         answer = self._answer("act", ACT_LIMIT)
         if len(answer) != self._size:
             self._fail("act", "its process sent something else than an action")

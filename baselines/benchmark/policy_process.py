@@ -29,7 +29,8 @@ from panto_env.control.context import Context
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
 BEGIN, OBSERVATION, END = b"b", b"o", b"e"
-"""First byte of a request. BEGIN is followed by 8 bytes, the length, and so much content."""
+"""First byte of a request. BEGIN is followed by 8 bytes, the length, and so much content; OBSERVATION by 2,
+the number of the core on which the other side runs, and the observation."""
 DONE, FAILED, ENDED = b"+", b"!", b"."
 """First byte of an answer: content, a sentence about the policy's error, or how a process has ended."""
 LONGEST = 4096
@@ -38,10 +39,20 @@ DIE_WITH_PARENT, DUMPABLE = 1, 4
 """Options of Linux's ``prctl``."""
 
 
+NO_CORE = b"\xff\xff"
+"""Number of the core where the system doesn't tell it."""
+LINUX = ctypes.CDLL(None) if sys.platform == "linux" else None
+
+
 def process_control(option: int, value: int) -> None:
     """Set an option of this process, on Linux only."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+    if LINUX is not None:
+        LINUX.prctl(option, value, 0, 0, 0)
+
+
+def core() -> bytes:
+    """Number of the core on which this process runs, 2 bytes, on Linux only."""
+    return NO_CORE if LINUX is None else int(LINUX.sched_getcpu()).to_bytes(2, "big")
 
 
 class Channel:
@@ -49,6 +60,7 @@ class Channel:
 
     def __init__(self) -> None:
         self._requests, self._answers = os.dup(0), os.dup(1)
+        self._core = NO_CORE
         nothing = os.open(os.devnull, os.O_RDWR)
         os.dup2(nothing, 0)
         os.dup2(nothing if sys.stderr is None else 2, 1)
@@ -66,11 +78,21 @@ class Channel:
         return content
 
     def observation(self, size: int) -> bytes:
-        """The bytes of an observation, as many; none at the end of the pass."""
-        request = os.read(self._requests, 1 + size)
+        """The bytes of an observation, as many; none at the end of the pass.
+
+        The process moves to the core on which the other side runs. As one of both waits at any time, they
+        need no more, and pairs of processes that share two cores would wait for each other.
+        """
+        request = os.read(self._requests, 3 + size)
         if request[:1] != OBSERVATION:
             return b""
-        return request[1:] if len(request) > size else request[1:] + self.read(1 + size - len(request))
+        if len(request) < 3 + size:
+            request += self.read(3 + size - len(request))
+        if request[1:3] != self._core:
+            self._core = request[1:3]
+            with suppress(OSError):
+                os.sched_setaffinity(0, {int.from_bytes(self._core, "big")})
+        return request[3:]
 
     def answer(self, kind: bytes, content: bytes = b"") -> None:
         """Send an answer, cut to ``LONGEST``."""

@@ -28,7 +28,6 @@ ROOT = Path(__file__).parents[2]
 SPANS = (3, 5)
 POLICY = """
 import json, os, sys, time
-from functools import partial
 from pathlib import Path
 import numpy as np
 
@@ -199,21 +198,24 @@ def test_its_processes_end_with_it():
     wait_for(lambda: not any(map(alive, children)), 5)
 
 
-def answering_times(policy: str) -> list[float]:
-    """Median time (s) that an answer takes in a pass: in this process, and apart."""
-    medians = []
+def answering_times(policy: str) -> tuple[float, float]:
+    """Time (s) that an answer takes in this process, and apart: minimum over passes of the median."""
+    found = []
     for driver in (find_policy(policy), PolicyApart(policy)):
-        task, _ = ready_pass("passive", {"distance": 900.0}, 1)
-        driver.reset(task.context(0))
-        times = []
-        while not task.results.truncated[0]:
-            observation = task.results.observation[0].copy()
-            begun = time.perf_counter()
-            action = driver.act(observation)
-            times.append(time.perf_counter() - begun)
-            task.step(action[None])
-        medians.append(float(np.median(times)))
-    return medians
+        medians = []
+        for _ in range(5):
+            task, _ = ready_pass("passive", {"distance": 900.0}, 1)
+            driver.reset(task.context(0))
+            times = []
+            while not task.results.truncated[0]:
+                observation = task.results.observation[0].copy()
+                begun = time.perf_counter()
+                action = driver.act(observation)
+                times.append(time.perf_counter() - begun)
+                task.step(action[None])
+            medians.append(float(np.median(times)))
+        found.append(min(medians))
+    return found[0], found[1]
 
 
 @pytest.mark.slow
