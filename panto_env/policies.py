@@ -16,12 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .base import plugins
+from .base.arrays import Array
 from .base.errors import InputError
 from .base.inline import parse_inline
 from .base.names import suggest
-from .base.shown import shown
+from .base.shown import shortly, shown
+from .control.action import numbers
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
+
+
+class PolicyError(InputError):
+    """A policy failed: one sentence that names it."""
 
 
 class Policy(Protocol):
@@ -107,13 +113,23 @@ def parameters_of(maker: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
 
 @contextmanager
 def errors_name(policy: str, method: str) -> Iterator[None]:
-    """Within the body errors of a policy become an InputError that names it, the method, file and line."""
+    """Within the body errors of a policy become a PolicyError that names it, the method, file and line."""
     try:
         yield
+    except PolicyError:
+        raise
     except InputError as error:
-        raise InputError(f"The policy '{policy}' failed in {method}: {error}") from error
+        raise PolicyError(f"The policy '{policy}' failed in {method}: {error}") from error
     except Exception as error:  # a policy is foreign code
-        raise InputError(f"The policy '{policy}' failed in {method}, {_failure(error)}.") from error
+        raise PolicyError(f"The policy '{policy}' failed in {method}, {_failure(error)}.") from error
+
+
+def checked_action(returned: Any, shape: tuple[int, ...]) -> Array:
+    """A policy's answer as an array of floats. Raises InputError unless it is finite and has this shape."""
+    action: Array | None = numbers(returned)
+    if action is None or action.shape != shape or not np.isfinite(action).all():
+        raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
+    return action
 
 
 def _failure(error: BaseException) -> str:

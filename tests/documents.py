@@ -136,6 +136,8 @@ def _panto(command, words):
     name = next((word for word in words if not word.startswith("-")), None)
     assert name is None or name in group.commands, f"{command.place}: there is no command {name}"
     one = group if name is None else group.commands[name]
+    if words[1:] and words[1] in getattr(one, "commands", ()):  # a command of a command
+        name, words, one = words[1], words[1:], one.commands[words[1]]
     known = {option for each in one.params for option in each.opts} | {"--help", "-h"}
     unknown = {word.partition("=")[0] for word in words if word.startswith("--")} - known
     assert not unknown, f"{command.place}: it has no option {', '.join(sorted(unknown))}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,9 @@ from .run import SUFFIXES, run
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
 
+DRAW = "draw"
+"""Salt that stands for one drawn at random."""
+
 
 @with_settings(
     only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
@@ -44,6 +48,19 @@ def benchmark(
     ] = None,
     speed: Annotated[list[float] | None, typer.Option(help="Speed (km/h) on every line; repeatable.")] = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,
+    salt: Annotated[
+        str | None,
+        typer.Option(
+            help="Make new test seeds from this text, which the result holds with its SHA-256, or from one "
+            "drawn at random: 'draw'."
+        ),
+    ] = None,
+    trusted: Annotated[
+        bool,
+        typer.Option(
+            "--trusted", help="Run installed policies in the process of the plant: faster by little."
+        ),
+    ] = False,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     ray: RayAddress = None,
     output: Annotated[
@@ -72,6 +89,7 @@ def benchmark(
     from ..report.result import parse_result
     from .plot import plot as draw
     from .report import WIDTH, tables
+    from .seeds import salt_hash
 
     line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
     settings = _settings(
@@ -80,6 +98,8 @@ def benchmark(
         policies=policies or None,
         trainings={} if policies else None,
         seeds=seeds,
+        salt=secrets.token_hex(16) if salt == DRAW else salt,
+        trusted=trusted or None,
         **given,
     )
     if output is not None:
@@ -100,6 +120,9 @@ def benchmark(
         if not console.is_terminal:
             console = PlainConsole(width=WIDTH)
         console.print(tables(outcome))
+        if settings.salt is not None:
+            words = f"Seeds are made from the salt '{settings.salt}', SHA-256 {salt_hash(settings.salt)}."
+            console.print(words, soft_wrap=True)
 
 
 def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> BenchmarkSettings:

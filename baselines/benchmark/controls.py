@@ -55,9 +55,9 @@ class Blind:
 class Tape:
     """Plays back recorded actions, (control steps, actions); zeros after the last one."""
 
-    def __init__(self, actions: Array) -> None:
-        """actions: in the order of the control steps, each in -1..1."""
-        self._actions = actions
+    def __init__(self, actions: Array, washout: float = 0.0) -> None:
+        """actions: in the order of the control steps, each in -1..1. washout: see ``Policy``."""
+        self._actions, self.washout = actions, washout
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""

@@ -14,6 +14,7 @@ from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.metrics.spans import in_words
 
+from .actions import Played
 from .run import Benchmark
 from .settings import Line
 from .single_pass import drive
@@ -29,7 +30,7 @@ def plot(outcome: Benchmark) -> Figure:
     """Contact force along two spans of every line; below it σ over speed, and its change with intervals.
 
     The force, low-passed without delay, is shown at a line's highest speed under the first seed, over the
-    last two evaluated spans; this runs one more pass per policy and line.
+    last two evaluated spans; this plays one pass per policy and line again.
     ``panto_env.analysis.plots.save`` writes the figure.
     """
     from matplotlib.figure import Figure
@@ -57,13 +58,24 @@ def _cells_of(outcome: Benchmark, line: Line) -> list[Cell]:
     return [cell for cell in outcome.cells if (cell.catenary, cell.pantograph) == names]
 
 
+def _played(outcome: Benchmark, line: Line, policy: str, speed_kmh: float, seed: int) -> Played:
+    """What a policy did in a pass."""
+    wanted = (policy, line.catenary, line.pantograph, speed_kmh, seed)
+    return next(
+        played
+        for row, played in zip(outcome.rows, outcome.played, strict=True)
+        if (row.policy, row.catenary, row.pantograph, row.speed_kmh, row.seed) == wanted
+    )
+
+
 def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str]) -> None:
     settings, line = outcome.settings, outcome.settings.lines[place]
-    speed, seed = max(line.speeds_kmh), settings.seeds[0]
+    speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
     first, last = outcome.spans[place]
     shown = max(first, last - 1), last
     for policy, colour in colours.items():
-        run, _ = drive(settings, line, policy, speed, seed)
+        played = _played(outcome, line, policy, speed, seed)
+        run, _ = drive(settings, line, policy, speed, seed, played)
         inside = run.alignment.within(run.position, shown)
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,15 @@ from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.spans import FIRST_SETTLED
-from panto_env.policies import find_policy
 
 from ..oracle.stored import stored_ratio
+from . import actions, apart
+from .actions import Played
 from .controls import policy_of
 from .overall import Standing, standings
+from .seeds import salt_hash
 from .settings import BenchmarkSettings, Line
-from .single_pass import Row, along, run_pass
+from .single_pass import Pass, Row, along, run_pass
 from .statistics import Cell, LineAtSpeed, compare
 from .trace import Trace
 
@@ -43,6 +45,7 @@ class Benchmark:
     cells: tuple[Cell, ...]  # one per policy, line and speed
     standings: tuple[Standing, ...]  # one per policy that runs on every line
     traces: tuple[Trace, ...]  # of the passes under the first seed that did not end early
+    played: tuple[Played, ...] = field(repr=False, compare=False)  # in the rows' passes
 
     def as_dict(self) -> dict[str, Any]:
         """The whole outcome as plain data for JSON: nan becomes None."""
@@ -50,6 +53,8 @@ class Benchmark:
             {
                 "version": __version__,
                 "settings": self.settings.model_dump(mode="json"),
+                "salt_sha256": None if self.settings.salt is None else salt_hash(self.settings.salt),
+                "actions_sha256": actions.digest(self.played),
                 "spans": self.spans,
                 "standings": [asdict(each) for each in self.standings],
                 "cells": [asdict(cell) | {"oracle_share": cell.oracle_share} for cell in self.cells],
@@ -60,11 +65,15 @@ class Benchmark:
         return table
 
     def save(self, path: str | Path) -> None:
-        """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet."""
+        """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet.
+
+        The actions of all passes are written beside a JSON.
+        """
         check_output(path, SUFFIXES)
         if Path(path).suffix.lower() != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
             return
+        actions.save(self.played, actions.beside(path))
         write_checked(path, self.as_dict())
 
 
@@ -87,24 +96,45 @@ def run(
         raise InputError(f"workers must be 1 or more, not {workers}.")
     count = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
     check_passes(count * len(settings.seeds), "This benchmark")
-    for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
-        find_policy(policy_of(policy))
-    spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
-    jobs = [
-        partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == settings.seeds[0])
-        for line, covered in zip(settings.lines, spans, strict=True)
-        for speed in line.speeds_kmh
-        for policy in settings.policies_on(line)
-        for seed in settings.seeds
-    ]
-    if workers == 1 and ray is None:
-        passes = one_by_one(jobs, progress=progress)
-    else:
-        passes = spread(jobs, workers=workers, ray=ray, progress=progress)
+    try:
+        for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
+            apart.find_apart(policy_of(policy), settings.trusted)
+        spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
+        first = settings.drawn_seeds[0]
+        jobs = [
+            partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == first)
+            for line, covered, policy, speed, seed in passes_of(settings, spans)
+        ]
+        if workers == 1 and ray is None:
+            passes = one_by_one(jobs, progress=progress)
+        else:
+            passes = spread(jobs, workers=workers, ray=ray, progress=progress)
+    finally:
+        apart.close()
+    return outcome_of(settings, spans, passes)
+
+
+def passes_of(
+    settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]
+) -> Iterator[tuple[Line, tuple[int, int], str, float, int]]:
+    """Line, evaluated spans, policy, speed (km/h) and seed of each pass, in the order of a result's rows."""
+    for line, covered in zip(settings.lines, spans, strict=True):
+        for speed in line.speeds_kmh:
+            for policy in settings.policies_on(line):
+                for seed in settings.drawn_seeds:
+                    yield line, covered, policy, speed, seed
+
+
+def outcome_of(
+    settings: BenchmarkSettings, spans: tuple[tuple[int, int], ...], passes: Sequence[Pass]
+) -> Benchmark:
+    """Outcome of all passes."""
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
     cells = compare(rows, stored_bounds(settings, spans))
-    return Benchmark(settings, spans, rows, cells, standings(rows, cells, settings.trainings), traces)
+    played = tuple(each.played for each in passes)
+    standing = standings(rows, cells, settings.trainings)
+    return Benchmark(settings, spans, rows, cells, standing, traces, played)
 
 
 def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:

@@ -28,7 +28,7 @@ from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 
-from .seeds import TEST, check_seeds
+from .seeds import TEST, check_seeds, salted_seed
 
 S = TypeVar("S", bound=Settings)
 _Span = Annotated[int, Between(1, MOST_SPANS)]
@@ -99,6 +99,18 @@ class BenchmarkSettings(Settings):
         min_length=1,
         description="seeds, or their number, counted from 0; only those that are for tests",
     )
+    salt: str | None = Field(
+        None,
+        min_length=1,
+        max_length=200,
+        description="text from which new test seeds are made, one for each of ``seeds``, so that nobody can "
+        "prepare for them",
+    )
+    trusted: bool = Field(
+        False,
+        description="whether installed policies run in the process of the plant instead of apart from it; "
+        "those from a file never do",
+    )
     actuator: _Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
@@ -113,6 +125,11 @@ class BenchmarkSettings(Settings):
     control_interval: ControlInterval = Field(
         default("control_interval"), description=description("control_interval")
     )
+
+    @property
+    def drawn_seeds(self) -> tuple[int, ...]:
+        """Seeds of the passes: ``seeds`` themselves, or those that the salt makes of them."""
+        return self.seeds if self.salt is None else tuple(salted_seed(self.salt, seed) for seed in self.seeds)
 
     def policies_on(self, line: Line) -> tuple[str, ...]:
         """All policies that run on a line."""

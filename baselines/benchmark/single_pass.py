@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.control import Task
 from panto_env.control.context import Context
+from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
-from panto_env.policies import Policy, find_policy, wishes
+from panto_env.policies import Policy, wishes
 
+from .actions import Played
+from .apart import find_apart
 from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
 from .same_mean import NONE, PassiveFigures, passive_at_mean_of, power
 from .settings import REFERENCE, BenchmarkSettings, Line
@@ -54,9 +58,10 @@ class Row:
 
 
 class Pass(NamedTuple):
-    """Figures of one pass, and what a page draws of it."""
+    """Figures of one pass, what the policy did in it, and what a page draws of it."""
 
     row: Row
+    played: Played
     trace: Trace | None  # None if not requested, or if the pass ended early
 
 
@@ -69,21 +74,23 @@ def run_pass(
     seed: int,
     *,
     traced: bool = False,
+    played: Played | None = None,
 ) -> Pass:
     """Run one pass; its figures cover ``spans``, first and last, counted from 1.
 
-    traced: whether to keep what a page draws of the pass.
+    traced: whether to keep what a page draws of the pass. played: of the policy in an earlier run of this
+    pass, to play again instead of running the policy.
 
     Raises InputError, naming the policy, if the policy fails.
     """
-    run, force = drive(settings, line, policy, speed_kmh, seed)
+    run, recorder = _record(settings, line, policy, speed_kmh, seed, played)
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
         # A command counts if its first time step lies within the spans, as for the figures of the run.
         steps = round(settings.control_interval / run.time_step)
-        commands = force[run.inside(spans)[::steps]]
+        commands = recorder.forces()[run.inside(spans)[::steps]]
         changes = np.diff(commands, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
@@ -109,23 +116,38 @@ def run_pass(
         pressed_cost_function=at_same_mean.cost_function,
     )
     kept = traced and not run.terminated
-    return Pass(row, trace(run, spans, policy, line) if kept else None)
+    return Pass(row, recorder.played(), trace(run, spans, policy, line) if kept else None)
 
 
 def drive(
-    settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
+    settings: BenchmarkSettings,
+    line: Line,
+    policy: str,
+    speed_kmh: float,
+    seed: int,
+    played: Played | None = None,
 ) -> tuple[Trajectory, Array]:
-    """Run one pass: its record, and the commanded forces (N), (control steps, actions)."""
-    run, recorder = _record(settings, line, policy, speed_kmh, seed)
+    """Run one pass: its record, and the commanded forces (N), (control steps, actions).
+
+    played: as for ``run_pass``.
+    """
+    run, recorder = _record(settings, line, policy, speed_kmh, seed, played)
     return run, recorder.forces()
 
 
 def _record(
-    settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
+    settings: BenchmarkSettings,
+    line: Line,
+    policy: str,
+    speed_kmh: float,
+    seed: int,
+    played: Played | None = None,
 ) -> tuple[Trajectory, _CommandRecorder]:
-    recorder = _CommandRecorder(_player(settings, line, policy, speed_kmh, seed), policy)
+    player = Tape(*played) if played else _player(settings, line, policy, speed_kmh, seed)
+    recorder = _CommandRecorder(player, policy)
     with _torch_on_one_thread():
-        run = simulate(policy=recorder, **_arguments(settings, line, speed_kmh, seed))
+        arguments = _arguments(settings, line, speed_kmh, seed)
+        run = simulate(policy=recorder, watch=recorder.watch, **arguments)
     return run, recorder
 
 
@@ -154,21 +176,22 @@ def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: flo
     control = control_of(policy)
     if control == TAPE:
         _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
-        return Tape(recorder.actions())
-    found = find_policy(policy_of(policy))
+        return Tape(*recorder.played())
+    found = find_apart(policy_of(policy), settings.trusted)
     return Blind(found) if control == BLIND else found
 
 
 class _CommandRecorder:
-    """A wrapper that records the actions of a policy, under that policy's name."""
+    """A wrapper that records a policy's actions and what is commanded, under that policy's name."""
 
     def __init__(self, policy: Policy, name: str) -> None:
         self._policy, self.name = policy, name
         vars(self).update(wishes(policy))
         self._actions: list[Array] = []
+        self._commands: list[Array] = []
 
     def reset(self, context: Context) -> None:
-        self._force_limit = context.force_limit
+        self._force_limit, self._washout = context.force_limit, context.washout
         self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
@@ -176,13 +199,18 @@ class _CommandRecorder:
         self._actions.append(np.array(action, dtype=float))  # a copy: a policy may change it later
         return action
 
-    def actions(self) -> Array:
-        """Recorded actions, (control steps, actions), clipped to -1..1."""
-        return np.clip(np.array(self._actions), -1, 1)
+    def watch(self, task: Task) -> None:
+        """Record what the plant was commanded: the action, clipped, less a washout's slow average."""
+        actions = len(task.actuator.places)
+        self._commands.append(task.episode.table[0, TaskRow.ACTION : TaskRow.ACTION + actions].copy())
+
+    def played(self) -> Played:
+        """What the policy did."""
+        return Played(np.clip(np.array(self._actions), -1, 1), self._washout)
 
     def forces(self) -> Array:
         """Commanded forces (N), (control steps, actions)."""
-        return self._force_limit * self.actions()
+        return self._force_limit * np.array(self._commands)
 
 
 @contextmanager

@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.shown import shortly, shown
+from ..base.shown import shown
 from ..control import Task, passive_mean, trim_of_pass
-from ..control.action import numbers
 from ..control.arguments import check_arguments, parameters
 from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..plant.state import Row
-from ..policies import Policy, errors_name, find_policy, wishes
+from ..policies import Policy, checked_action, errors_name, find_policy, wishes
 
 _LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
 
@@ -103,12 +102,7 @@ def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
     while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
             # A copy: a policy may keep its observation.
-            returned = policy.act(results.observation[0].copy())
-            action = numbers(returned)
-            if action is None or action.shape != shape or not np.isfinite(action).all():
-                raise InputError(
-                    f"its action must be finite numbers of shape {shape}, not {shortly(returned)}."
-                )
+            action = checked_action(policy.act(results.observation[0].copy()), shape)
         task.step(action[None])
         yield task.plant.of(0, Row.STEP) / task.end(0)
 

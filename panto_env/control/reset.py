@@ -90,7 +90,7 @@ def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None
     target, spread = task.targets(task.speed[lanes], nominal)
     rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
     rows[:, TaskRow.PER_SPREAD] = 1 / spread
-    uplift, force = limits(task.settings.catenary, task.speed[lanes])
+    uplift, force = limits(task.settings.line, task.speed[lanes])
     rows[:, TaskRow.UPLIFT_LIMIT], rows[:, TaskRow.FORCE_LIMIT] = uplift, force
     counted_from = np.maximum(counted_from, start[:, Row.STEP])
     if (counted_from >= end).any():

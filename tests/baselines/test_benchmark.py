@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -325,6 +327,13 @@ def test_command_prints_a_table_for_people() -> None:
     assert result.exit_code == 0, result.output
     for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
         assert words in result.stdout
+
+
+def test_command_draws_a_salt_and_prints_it_with_its_hash() -> None:
+    words = " ".join(called("passive", "--salt", "draw").stdout.split())
+    found = re.search(r"salt '([0-9a-f]{32})', SHA-256 ([0-9a-f]{64})\.", words)
+    assert found
+    assert hashlib.sha256(found[1].encode()).hexdigest() == found[2]
 
 
 def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
 
 def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     given = settings(line_condition="new")
-    row, trace = run_pass(given, LINE, (1, 3), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)
+    row, _, trace = run_pass(given, LINE, (1, 3), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)
     run, _ = drive(given, LINE, "p:gain=0.5", SPEED_KMH, seed=3)
     assert (trace.policy, trace.catenary, trace.speed_kmh, trace.seed) == (
         *("p:gain=0.5", LINE.catenary, SPEED_KMH, 3),

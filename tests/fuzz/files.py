@@ -7,6 +7,8 @@ import warnings
 from pathlib import Path
 
 from panto_agents.stored import FOLDER as MODELS
+from panto_baselines.benchmark.run import run as run_benchmark
+from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.dataset.checksums import write_checksums
 from panto_env import simulate
 from panto_env.catalog import load_pantograph
@@ -116,6 +118,7 @@ def write_files(folder: Path) -> None:
         "million.toml": TRAINING.format(steps=128, widths=1_000_000),
         "ablation.toml": ABLATION,
         "track.toml": TRACK,
+        "small.toml": f'policies = ["passive"]\nseeds = 1\n{TRACK}',
         "episodes.toml": EPISODES,
         "designs.toml": DESIGNS,
         "policies.py": POLICIES,
@@ -155,6 +158,8 @@ def write_made_files(folder: Path) -> None:
         run.save(folder / "passes" / f"{k}.parquet")
     shutil.copy(next(MODELS.glob("*.safetensors")), folder / "agent.safetensors")
     shutil.copy(DOCS / "benchmark" / "head.json", folder / "benchmark.json")
+    run_benchmark(load_benchmark(folder / "small.toml"), workers=1).save(folder / "result.json")
+    shutil.copytree(DOCS.parent / "examples" / "submission", folder / "mine")
     shutil.copy(next((DOCS / "speed").glob("*.json")), folder / "speed.json")
     (folder / "set").mkdir()
     shutil.copy(folder / "rig.csv", folder / "set" / "rig.csv")

@@ -52,8 +52,10 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("evaluate",): ("passive", *QUICK, "--speed", "300", "--line-condition", "fair"),
     ("export",): ("agent.safetensors", "model.safetensors"),
     ("oracle",): (*QUICK, "--spans", "1-1", "--hops", "0"),
+    ("replay",): ("result.json", "--workers", "1"),
     ("report",): ("benchmark.json",),
     ("returns",): ("benchmark.json", "--episodes", "2", "--workers", "1"),
+    ("submission", "check"): ("mine", "--config", "small.toml", "--seeds", "1", "--workers", "1"),
     ("train",): ("training.toml", "--output", "run"),
     ("trainings",): ("training.toml", "--workers", "1"),
     ("tune",): (

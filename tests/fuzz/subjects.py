@@ -15,6 +15,8 @@ from panto_agents.model_file import read_model
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER as MODELS
+from panto_baselines.benchmark import actions
+from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.dataset.designs_settings import load_designs
 from panto_baselines.dataset.episodes import Episode, read_episodes
@@ -76,6 +78,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "evaluations": Subject("CSV", run.evaluations, _evaluations),
         "saved run": Subject("Parquet", folder / "run.parquet", Trajectory.load, checked=True),
         "benchmark": Subject("JSON", ROOT / "docs" / "benchmark" / "head.json", read_result, checked=True),
+        "actions": _actions(folder),
         "oracles": Subject("JSON", stored.RESULTS, stored.read, checked=True),
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
         "settings of a training": Subject("JSON", run.settings, _settings, checked=True),
@@ -132,6 +135,13 @@ def _part(folder: Path) -> Subject:
     path = folder / "part.safetensors"
     write_arrays(path, {}, arrays)
     return Subject("model", path, lambda path: read_episodes(path, plans), checked=True)
+
+
+def _actions(folder: Path) -> Subject:
+    passes = [Played(np.linspace(-1, 1, steps)[:, None], 0.0) for steps in (5, 8)]
+    path = folder / "out.actions.safetensors"
+    actions.save(passes, path)
+    return Subject("model", path, lambda path: actions.read(path, actions.digest(passes)), checked=True)
 
 
 def _evaluations(path: Path) -> Any:

@@ -55,6 +55,11 @@ RULES = (
         "panto trainings",
         "six trainings of minutes, or a cluster; tests/cluster/ has short ones",
     ),
+    Rule(
+        "panto submission check",
+        "all speeds",
+        "--config benchmark/without-position --seeds 1 --workers 1",
+    ),
     Rule("panto sweep catenary.mean_stiffness=2000:6000:17", "527 passes", ""),
     Rule(
         "panto tune",
@@ -111,6 +116,7 @@ def folder(tmp_path, monkeypatch):
     """A folder with what documents take for granted: results, a record of a rig, a controller."""
     for name in ("benchmark", "speed"):
         shutil.copytree(ROOT / "docs" / name, tmp_path / "docs" / name)
+    shutil.copytree(ROOT / "examples" / "submission", tmp_path / "my-policy")
     (tmp_path / "docs" / "figures").mkdir()
     truth = parameters_of(load_pantograph("identified-2dof"))
     write_record(

@@ -1,0 +1,141 @@
+"""A result keeps its actions: played again they give its rows, and nothing else does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer import Typer
+from typer.testing import CliRunner
+
+from panto_baselines.benchmark import actions, replay_command
+from panto_baselines.benchmark import run as benchmark
+from panto_baselines.benchmark.actions import Played
+from panto_baselines.benchmark.replay import replay
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.single_pass import drive, run_pass
+from panto_env import InputError, simulate
+from panto_env.base.checksums import read_checked, write_checked
+from panto_env.base.settings import parse
+
+LINE = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
+
+
+class Leaning:
+    """Commands a force that grows, and wants a washout of it."""
+
+    washout = 0.5
+
+    def reset(self, context):
+        self.step = 0
+
+    def act(self, observation):
+        self.step += 1
+        return np.full(1, min(1.2, 0.01 * self.step))
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory) -> Path:
+    table = {"policies": ["pd", "fb+ff:gain=0.3"], "lines": [LINE], "seeds": 2, "salt": "a pinch"}
+    outcome = benchmark.run(parse(BenchmarkSettings, table, "the benchmark"), workers=1)
+    path = tmp_path_factory.mktemp("result") / "out.json"
+    outcome.save(path)
+    return path
+
+
+def called(*arguments):
+    app = Typer()
+    app.command()(replay_command.replay)
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+def changed(result, folder, change):
+    """A copy of the result whose table, or actions, somebody has changed, checksums and all."""
+    table, path = read_checked(result), folder / "out.json"
+    passes = actions.read(actions.beside(result), table["actions_sha256"])
+    change(table, passes)
+    actions.save(passes, actions.beside(path))
+    write_checked(path, table | {"actions_sha256": actions.digest(passes)})
+    return path
+
+
+def test_every_figure_follows_from_the_actions(result):
+    again = replay(result, workers=1)
+    assert len(again.rows) == 6
+    assert {each.difference for each in again.rows} == {0.0}
+    assert again.follows
+    some = replay(result, ["pd"], workers=1)
+    assert [each.row["policy"] for each in some.rows] == ["pd", "pd"]
+    assert some.follows is None
+
+
+def test_a_better_figure_or_rank_than_the_actions_give_is_found(result, tmp_path):
+    def better(table, passes):
+        table["rows"][-1]["std"] *= 1 - 1e-12
+
+    again = replay(changed(result, tmp_path, better), workers=1)
+    assert [each.difference > 0 for each in again.rows] == [False] * 5 + [True]
+
+    def first(table, passes):
+        table["cells"][-1]["rank"] = 0
+
+    assert replay(changed(result, tmp_path, first), workers=1).follows is False
+
+
+def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
+    def nudged(table, passes):
+        passes[-1].actions[40] += 1e-9
+
+    path = changed(result, tmp_path, nudged)
+    differences = [each.difference for each in replay(path, workers=1).rows]
+    assert differences[:-1] == [0.0] * 5
+    assert 0 < differences[-1] < 1e-4
+    done = called(path, "--workers", 1)
+    assert done.exit_code == 1
+    assert "1 of 6 rows do not follow" in " ".join(done.stdout.split())
+    assert called(path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
+
+
+def test_the_command_prints_json(result):
+    done = called(result, "--json", "--workers", 1, "--policy", "pd")
+    assert done.exit_code == 0
+    assert [row["difference"] for row in json.loads(done.stdout)["rows"]] == [0.0, 0.0]
+
+
+def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
+    with pytest.raises(InputError, match="no policy 'p': it has passive, pd, fb"):
+        replay(result, ["p"])
+    alone = tmp_path / "out.json"
+    alone.write_bytes(result.read_bytes())
+    with pytest.raises(InputError, match=r"out.actions.safetensors, the actions .* no such file"):
+        replay(alone)
+    actions.beside(alone).write_bytes(actions.beside(result).read_bytes()[:-1])
+    with pytest.raises(InputError, match="holds no actions, or is damaged"):
+        replay(alone)
+    actions.save([Played(np.zeros((3, 1)), 0.0)], actions.beside(alone))
+    with pytest.raises(InputError, match="holds the actions of another result"):
+        replay(alone)
+    write_checked(alone, {"what": "else"})
+    with pytest.raises(InputError, match="is no result of"):
+        replay(alone)
+
+
+def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
+    """An ideal actuator does what it is commanded: its forces in the record are the commands."""
+    settings = parse(BenchmarkSettings, {"line_condition": "new", "actuator": "ideal"}, "the benchmark")
+    line, spans = Line(**LINE), (3, 5)
+    done = run_pass(settings, line, spans, Leaning(), 300.0, 0)
+    _, commands = drive(settings, line, Leaning(), 300.0, 0)
+    run = simulate(policy=Leaning(), distance=310.0, line_condition="new", record_droppers=False)
+    steps = round(settings.control_interval / run.time_step)
+    # An actuator without lag has reached the command at the end of the step.
+    np.testing.assert_allclose(commands[:, 0], run.frame_force[steps - 1 :: steps], atol=1e-9)
+    assert commands.max() < 70 < 100 * done.played.actions.max()
+    inside = run.inside(spans)[::steps]
+    expected = np.sqrt(np.mean((np.diff(commands[inside, 0]) / settings.control_interval) ** 2))
+    assert done.row.action_rate == pytest.approx(expected)
+    assert done.row.saturation == 0.0 < np.mean(np.abs(done.played.actions[inside]) >= 0.999)
+    again = run_pass(settings, line, spans, Leaning(), 300.0, 0, played=done.played)
+    assert again.row.figures == done.row.figures
