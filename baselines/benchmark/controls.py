@@ -1,8 +1,8 @@
 """Controls of a benchmark: a policy without its observations, and a record of its actions without the policy.
 
 "blind of pd" is the policy given its first observation at every step; "tape of pd" plays back the actions
-that it took on another line, drawn under another seed. If a control scores as well as the policy itself, the
-benchmark does not need feedback.
+that it took on another line, drawn under another seed, and "tape of oracle" those of the stored oracle. If a
+control scores as well as the policy itself, the benchmark does not need feedback.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from panto_env.policies import Policy, wishes
 Array = NDArray[np.float64]
 
 BLIND, TAPE = "blind of ", "tape of "
+ORACLE_TAPE = TAPE + "oracle"
 OTHER_SEED = 1_000_003
 """Added to the seed of a pass, so that a tape is recorded on a different line."""
 

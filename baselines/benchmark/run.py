@@ -23,11 +23,11 @@ from panto_env.metrics.spans import FIRST_SETTLED
 from ..oracle.stored import stored_ratio
 from . import actions, apart
 from .actions import Played
-from .controls import policy_of
+from .controls import ORACLE_TAPE, policy_of
 from .overall import Standing, standings
 from .seeds import salt_hash
 from .settings import BenchmarkSettings, Line
-from .single_pass import Pass, Row, along, run_pass
+from .single_pass import Pass, Row, along, oracle_tape, run_pass
 from .statistics import Cell, LineAtSpeed, compare
 from .trace import Trace
 
@@ -97,8 +97,7 @@ def run(
     count = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
     check_passes(count * len(settings.seeds), "This benchmark")
     try:
-        for policy in {policy for line in settings.lines for policy in settings.policies_on(line)}:
-            apart.find_apart(policy_of(policy), settings.trusted)
+        _check_policies(settings)
         spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
         first = settings.drawn_seeds[0]
         jobs = [
@@ -112,6 +111,16 @@ def run(
     finally:
         apart.close()
     return outcome_of(settings, spans, passes)
+
+
+def _check_policies(settings: BenchmarkSettings) -> None:
+    """Raise InputError for a policy that cannot be made, before any pass is run."""
+    for line in settings.lines:
+        for speed in line.speeds_kmh if ORACLE_TAPE in settings.policies_on(line) else ():
+            oracle_tape(settings, line, speed)
+    policies = {policy for line in settings.lines for policy in settings.policies_on(line)}
+    for policy in policies - {ORACLE_TAPE}:
+        apart.find_apart(policy_of(policy), settings.trusted)
 
 
 def passes_of(

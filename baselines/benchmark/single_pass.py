@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, wishes
 
+from ..oracle.stored import stored_actions
 from .actions import Played
 from .apart import find_apart
-from .controls import BLIND, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
+from .controls import BLIND, ORACLE_TAPE, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
 from .same_mean import NONE, PassiveFigures, passive_at_mean_of, power
 from .settings import REFERENCE, BenchmarkSettings, Line
 from .trace import Trace, trace
@@ -174,11 +176,24 @@ def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: 
 def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:
     """The policy that runs in a pass: itself, or a control of it."""
     control = control_of(policy)
+    if policy == ORACLE_TAPE:
+        return oracle_tape(settings, line, speed_kmh)
     if control == TAPE:
         _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
         return Tape(*recorder.played())
     found = find_apart(policy_of(policy), settings.trusted)
     return Blind(found) if control == BLIND else found
+
+
+def oracle_tape(settings: BenchmarkSettings, line: Line, speed_kmh: float) -> Tape:
+    """The actions of the stored oracle. Raises InputError if there is none for this line and speed."""
+    actions = stored_actions(along(settings, line) | {"speed_kmh": speed_kmh})
+    if actions is None:
+        raise InputError(
+            f"No oracle is stored for '{line.catenary}' at {speed_kmh:g} km/h with this pantograph and "
+            f"actuator, so leave out '{ORACLE_TAPE}'."
+        )
+    return Tape(actions)
 
 
 class _CommandRecorder:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from panto_env.base.checksums import read_checked, with_checksum
 from panto_env.base.errors import InputError
@@ -139,6 +140,24 @@ def read(path: str | Path) -> dict[str, Any]:
 def load(path: Path = RESULTS) -> dict[str, Any]:
     """Read a file written by ``save``, once per process."""
     return read(path)
+
+
+def stored_actions(given: Mapping[str, Any], path: Path = RESULTS) -> NDArray[np.float64] | None:
+    """Actions, (control steps, actions), of a stored oracle from the start of its pass on; None without one.
+
+    The oracle may be for another condition of the line: line and pantograph, by their names, speed and
+    actuator are those of ``given``, settings of a run by name.
+    """
+    settings = run_settings(given)
+    actuator, names = settings.actuator, (settings.line.name, settings.pantograph.name)
+    for one in load(path)["cells"]:
+        same = (one["catenary"], one["pantograph"]) == names and one["speed_kmh"] == settings.speed_kmh[0]
+        if same and one["actuator"] == actuator.model_dump(mode="json"):
+            found = one["passes"][0]
+            commands = np.array(found["commands"])
+            before = np.zeros((found["first_step"], commands.shape[1]))
+            return np.asarray(np.concatenate([before, commands]) / actuator.force_limit, dtype=np.float64)
+    return None
 
 
 def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int], path: Path = RESULTS) -> float | None:
