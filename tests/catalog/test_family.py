@@ -103,6 +103,19 @@ def test_a_seed_is_a_line_and_no_two_seeds_or_episodes_share_one():
 
 
 @pytest.mark.plain
+@pytest.mark.parametrize(
+    ("seed", "span", "tension", "mass", "droppers", "alpha"),
+    [(0, 63.573, 21268.96, 0.91099, 8, 0.051311), (999, 41.578, 20018.06, 0.63192, 7, 0.086136)],
+)
+def test_the_lines_of_the_tests_stay_what_they_are(seed, span, tension, mass, droppers, alpha):
+    """Another range, or another order of the draws, changes every result on a family."""
+    line, _ = line_of(seed)
+    found = line.span_length, line.contact_wire.tension, line.messenger_wire.mass, line.damping.alpha
+    assert found == pytest.approx((span, tension, mass, alpha), rel=2e-5)
+    assert len(line.droppers.positions) == droppers
+
+
+@pytest.mark.plain
 def test_drawing_a_line_leaves_the_other_values_of_an_episode_as_they_are():
     drawn, plain = np.random.default_rng(3), np.random.default_rng(3)
     on_drawn_line(run_settings({"catenary": ["re250", "re330"]}), lambda: drawn)

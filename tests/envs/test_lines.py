@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
 
 from panto_env import InputError
 from panto_env.backend import LaneThreads
@@ -14,7 +15,9 @@ from panto_env.base.machine import cores
 from panto_env.catalog import load_catenary
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
-from tests.lanes import check_lanes_are_singles
+
+from ..lanes import check_lanes_are_singles
+from .test_vector_rules import actions_of, assert_same, native, of_singles
 
 SHORT = {"distance": 25.0, "settle": 0.0, "reward": "agent", "accuracy": "fast"}
 FAMILY = {"catenary": "family:high-speed"} | SHORT
@@ -133,6 +136,29 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
 def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     ran = check_lanes_are_singles("Pantograph-v0", settings, steps=70)
     assert ran.ends > 3
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_lanes_on_lines_of_their_own_answer_as_gymnasium_s_vector_environment(mode):
+    """Observations, rewards, ends, and infos with figures and masks, over the ends of episodes."""
+    ours = native("Pantograph-v0", autoreset_mode=mode, **FAMILY)
+    theirs = of_singles("Pantograph-v0", mode=mode, **FAMILY)
+    (mine, my_infos), (other, infos) = ours.reset(seed=5), theirs.reset(seed=5)
+    np.testing.assert_array_equal(mine, other)
+    assert_same(my_infos, infos)
+    ends = 0
+    for action in actions_of(ours, 80):
+        mine, other = ours.step(action), theirs.step(action)
+        for k in range(4):
+            np.testing.assert_array_equal(mine[k], other[k])
+        assert_same(mine[4], other[4])
+        ended = mine[2] | mine[3]
+        ends += ended.sum()
+        if mode == AutoresetMode.DISABLED and ended.any():
+            mine, other = (envs.reset(options={"reset_mask": ended.copy()}) for envs in (ours, theirs))
+            np.testing.assert_array_equal(mine[0], other[0])
+            assert_same(mine[1], other[1])
+    assert ends > 3
 
 
 def test_lanes_of_a_group_share_the_line_of_its_first_lane():
