@@ -123,9 +123,8 @@ def share_of(wins: NDArray[np.bool_], clusters: Clusters) -> Share:
         *_between(wins.mean(axis=(0, 2))),
     ]
     variance = sum(part.variance for part in parts)
-    number = (drawn.seeds * passes) ** 0.5
-    if variance > ROUNDING:
-        number = min(passes, share * (1 - share) / variance)
+    varies = variance > ROUNDING
+    number = share * (1 - share) / variance if varies else (drawn.seeds * passes) ** 0.5
     z = _quantile(parts) ** 2 / number
     middle = (share + z / 2) / (1 + z)
     half = (z * (share * (1 - share) + z / 4)) ** 0.5 / (1 + z)

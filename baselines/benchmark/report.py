@@ -18,7 +18,7 @@ from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 180
+WIDTH = 170
 """Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # with the decimals shown
     "std": 2,
@@ -75,7 +75,7 @@ def _overall(outcome: Benchmark) -> Table:
     table.add_column("policy", overflow="fold")
     best = next((each for each in found if each.rank == 1), None)
     headings = ["rank", "Δσ (%)", "worst quarter (%)", "worst cell (%)", "passes improved", "of oracle"]
-    headings += ["power (W)", "at limit", "mean moved in", "better than the next in"]
+    headings += ["mean moved in", "better than the next in"]
     for heading in [*headings, *(["beaten by the first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
     after = next_in_ranking(found)
@@ -89,8 +89,6 @@ def _overall(outcome: Benchmark) -> Table:
             f"{number(each.worst, 1)} at {each.worst_at}",
             _share(each.improved),
             "–" if each.oracle_share is None else _share(each.oracle_share),
-            number(each.power, 1),
-            number(each.saturation, 2),
             f"{each.moved} of {each.passes}",
             str(each.better_than.get(after.get(each.policy, ""), "–")),
         ]

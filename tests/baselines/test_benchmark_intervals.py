@@ -121,14 +121,19 @@ def test_a_share_s_interval_covers_that_trainings_differ():
 @pytest.mark.parametrize("seeds", [8, 16])
 @pytest.mark.parametrize("speeds", [1, 5])
 def test_intervals_cover_the_truth_in_95_percent_of_draws(kind, seeds, speeds):
-    assert 93 <= coverage("mean", kind, seeds, speeds, repetitions=2500) <= 97
-    assert coverage("share of 0.7", kind, seeds, speeds, repetitions=2500) >= 93
+    assert 93 <= coverage("mean", kind, seeds, speeds, repetitions=2500 if speeds == 1 else 1200) <= 97
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seeds", [8, 16])
+def test_intervals_of_shares_cover_the_truth_in_95_percent_of_draws(kind, seeds):
+    assert 93 <= coverage("share of 0.7", kind, seeds, 5, repetitions=2500) <= 98
 
 
 def test_the_interval_of_a_method_covers_the_truth():
-    assert 93 <= coverage("mean of 5 trainings", "normal", 16, 5, repetitions=1000) <= 97
+    assert 93 <= coverage("mean of 5 trainings", "normal", 16, 5, repetitions=500) <= 97
 
 
 def test_a_bootstrap_of_each_cell_by_itself_covers_far_less():
     """So that the simulation has the power to show what is wrong."""
-    assert coverage("mean, by cell", "normal", 8, 5, repetitions=500) < 85
+    assert coverage("mean, by cell", "normal", 8, 5, repetitions=200) < 85
