@@ -129,7 +129,8 @@ class _PolicyProcess:
             )
         except OSError as error:
             raise InputError(
-                f"The Python of policies, {python}, can't be started: {error.strerror}; correct {INTERPRETER}."
+                f"The Python of policies, {python}, can't be started: {error.strerror}; "
+                f"correct {INTERPRETER}."
             ) from error
         assert self._process.stdin is not None
         assert self._process.stdout is not None
