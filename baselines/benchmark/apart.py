@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.analysis.pool import LINEAR_ALGEBRA_THREADS
+from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 from panto_env.policies import PolicyError, find_policy, policy_names
 
@@ -105,20 +106,32 @@ class _PolicyProcess:
     """A ``policy_process`` as seen from the plant; it runs one policy at a time."""
 
     def __init__(self) -> None:
+        """Start it. Raises InputError where that is not possible."""
+        if not hasattr(os, "fork"):
+            raise InputError(
+                "A policy apart from the plant needs a system that can fork, such as Linux or macOS; only "
+                "installed policies run without, with --trusted."
+            )
         # Not even as the same user may a policy read this process's memory. Root still may.
         process_control(DUMPABLE, 0)
         variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # for the reason see ``in_processes``
         python = os.environ.get(INTERPRETER)
         if python is None:
             python, variables["PYTHONPATH"] = sys.executable, os.pathsep.join(sys.path)
-        self._process = subprocess.Popen(
-            [python, "-P", "-m", MODULE],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | variables,
-            process_group=0,  # interrupts from the keyboard are left to this process
-            bufsize=0,
-        )
+        try:
+            self._process = subprocess.Popen(
+                [python, "-P", "-m", MODULE],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | variables,
+                process_group=0,  # interrupts from the keyboard are left to this process
+                bufsize=0,
+            )
+        except OSError as error:
+            raise InputError(
+                f"The Python of policies, {python}, can't be started: {error.strerror}; "
+                f"correct {INTERPRETER}."
+            ) from error
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()

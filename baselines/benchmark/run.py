@@ -73,8 +73,8 @@ class Benchmark:
         if Path(path).suffix.lower() != ".json":
             write_rows([row.as_dict() for row in self.rows], path)
             return
-        actions.save(self.played, actions.beside(path))
         write_checked(path, self.as_dict())
+        actions.save(self.played, actions.beside(path))
 
 
 def run(

@@ -15,9 +15,10 @@ from panto_env import Trajectory, simulate
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
+from panto_env.control.entries import FULL as NOT_MEASURED
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
-from panto_env.policies import Policy, wishes
+from panto_env.policies import Policy, PolicyError, wishes
 
 from ..oracle.stored import stored_actions
 from .actions import Played
@@ -182,6 +183,11 @@ def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: flo
         _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
         return Tape(*recorder.played())
     found = find_apart(policy_of(policy), settings.trusted)
+    if wishes(found).get("observation") == NOT_MEASURED:
+        raise PolicyError(
+            f"The policy '{policy_of(policy)}' wishes the observation '{NOT_MEASURED}', which holds what no "
+            "train can measure; let it take another one."
+        )
     return Blind(found) if control == BLIND else found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -188,6 +189,23 @@ def test_what_a_policy_prints_does_not_reach_standard_output(tmp_path, capfd):
     output, errors = capfd.readouterr()
     assert output == ""
     assert {"hello", "shell"} <= set(errors.split())
+
+
+def test_its_python_may_be_another(monkeypatch, tmp_path):
+    policy = written(tmp_path, "Path('python').write_text(sys.executable); return np.zeros(1)")
+    other = tmp_path / "bin" / "python3"
+    other.parent.mkdir()
+    other.symlink_to(sys.executable)
+    (tmp_path / "pyvenv.cfg").write_text((Path(sys.prefix) / "pyvenv.cfg").read_text())
+    (tmp_path / "lib").symlink_to(Path(sys.prefix) / "lib")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PANTO_POLICY_PYTHON", str(other))
+    play(policy)
+    assert Path("python").read_text() == str(other)
+    apart.close()
+    monkeypatch.setenv("PANTO_POLICY_PYTHON", str(tmp_path / "none"))
+    with pytest.raises(InputError, match="none, can't be started: No such file or directory; correct PANTO"):
+        play(policy)
 
 
 def test_its_processes_end_with_it():

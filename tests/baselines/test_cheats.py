@@ -13,6 +13,7 @@ from panto_baselines.benchmark import apart
 from panto_baselines.benchmark.run import passes_of, run
 from panto_baselines.benchmark.settings import BenchmarkSettings
 from panto_baselines.benchmark.single_pass import run_pass
+from panto_env import InputError
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
@@ -209,3 +210,9 @@ def test_a_bias_within_the_gate_gains_nothing(tmp_path):
         assert not cell.disqualified
         assert abs(cell.mean_change) > 1.2
         assert cell.change > -0.5
+
+
+def test_one_that_wants_to_see_what_no_train_can_measure_is_refused(tmp_path):
+    text = PRESSER.replace("def __init__", "observation = 'full'\n\n    def __init__")
+    with pytest.raises(InputError, match="'full', which holds what no train can measure"):
+        one_pass(cheat(tmp_path, "Presser", text), settings("passive"))
