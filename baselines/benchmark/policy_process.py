@@ -37,8 +37,6 @@ LONGEST = 4096
 """Maximum length of an answer (bytes): a pipe passes so much on in one piece."""
 DIE_WITH_PARENT, DUMPABLE = 1, 4
 """Options of Linux's ``prctl``."""
-
-
 NO_CORE = b"\xff\xff"
 """Number of the core where the system doesn't tell it."""
 LINUX = ctypes.CDLL(None) if sys.platform == "linux" else None

@@ -1,6 +1,6 @@
 """Ways to win without controlling: each is tried here, and gains nothing.
 
-A policy that presses in some passes only is in test_benchmark_statistics.py.
+A policy that presses in some passes only is in the tests of the statistics.
 """
 
 from __future__ import annotations
