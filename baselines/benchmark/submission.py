@@ -95,7 +95,8 @@ def check(
     card, policy = read_submission(folder)
     lines = tuple(line.model_copy(update={"policies": ()}) for line in settings.lines)
     policies = (REFERENCE, policy, f"{TAPE}{policy}")
-    judged = settings.model_copy(update={"policies": policies, "lines": lines, "trusted": False})
+    changes = {"policies": policies, "lines": lines, "trainings": {}, "trusted": False}
+    judged = settings.model_copy(update=changes)
     return Checked(card, policy, run(judged, workers, progress))
 
 
