@@ -93,9 +93,8 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
     if drawn.freedom < 1:
         return None
     means = np.mean([_interquartile_means(row, drawn.counts) for row in rows], axis=0)
-    low, high = np.quantile(
-        means, norm.cdf((-1.0, 1.0))
-    )  # a deviation that few far-off passes do not stretch
+    # Half of what lies between is a standard deviation that a few far-off resamples do not stretch.
+    low, high = np.quantile(means, norm.cdf((-1.0, 1.0)))
     own = np.array([interquartile_mean(row) for row in rows])
     parts = [_Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom), *_between(own)]
     variance = sum(part.variance for part in parts)
