@@ -106,8 +106,8 @@ def test_identify_from_csv_finds_the_truth(monkeypatch, capsys, tmp_path):
         assert fit.parameters[name] == pytest.approx(example.TRUTH[name], rel=0.01)
 
 
-def test_sac_example_trains_and_acts(monkeypatch):
-    """A second of it: the critics have learnt, and what it would do is a policy."""
+def test_sac_example_trains_and_acts(monkeypatch, tmp_path):
+    """A second of it: the critics have learnt, and what it would do is a policy of the benchmark."""
     torch = pytest.importorskip("torch")
     example = load("train_sac", monkeypatch)
     learner = example.train(2_000)
@@ -116,18 +116,22 @@ def test_sac_example_trains_and_acts(monkeypatch):
     target = torch.cat([each.flatten() for each in learner.critic_target.parameters()])
     assert torch.isfinite(critic).all()
     assert not torch.equal(critic, target)  # the target follows what has been learnt
-    run = simulate(policy=example.Learned(learner), distance=120.0, **example.TASK)
-    assert run.policy == "sac"
+    example.save_policy(learner, tmp_path / "sac.safetensors")
+    policy = str(tmp_path / "sac.safetensors")
+    run = simulate(policy=policy, distance=60.0, actuator="realistic", sensors="realistic")
     assert run.frame_force.any()
 
 
-@pytest.mark.slow
-def test_sac_example_is_better_than_passive(monkeypatch):
+@pytest.mark.study
+def test_sac_example_is_better_than_passive(monkeypatch, tmp_path):
+    """It is ranked, and better than passive at every speed."""
     pytest.importorskip("stable_baselines3")
     example = load("train_sac", monkeypatch)
-    sigma, mean = example.judge(example.Learned(example.train(120_000)))
-    assert sigma < -12.0
-    assert abs(mean) < 2.5
+    example.save_policy(example.train(400_000), tmp_path / "sac.safetensors")
+    result = example.judge(tmp_path / "sac.safetensors", seeds=3)
+    own = [cell for cell in result.cells if cell.policy != "passive"]
+    assert [cell.disqualified for cell in own] == [""] * 4
+    assert max(cell.change for cell in own) < 0
 
 
 def test_ppo_example_earns_more_than_at_first(monkeypatch):
