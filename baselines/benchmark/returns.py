@@ -29,6 +29,7 @@ INGREDIENTS: dict[str, dict[str, Any]] = {
     "paper 1's reward": {"reward": "paper1"},
     "counted from the start": {"settle": 0.0},
     "counted from span 3": {"settle": 3.0},
+    "speeds between those of the result, too": {"speed_kmh": (250.0, 350.0)},
 }
 """Arguments that replace those of the id, by what they change."""
 
@@ -53,8 +54,9 @@ def returns(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> list[Returned]:
-    """Mean returns of all policies of a benchmark's result, in episodes on its line over its speeds.
+    """Mean returns of all policies of a benchmark's result, in episodes on its line at its speeds in turn.
 
+    Speeds between would ask another question: gains fitted at the result's speeds are worth less there.
     result: as ``read_result`` gives it, of one line. Episodes have the seeds 0, 1, ... A policy that wants
     no washout has none. arguments: of the environment, instead of those of its id. Raises InputError for a
     result of several lines, an id that does not exist, and a policy that fails.
@@ -65,12 +67,12 @@ def returns(
     if len(lines) != 1:
         raise InputError(f"A result of one line is needed, not of {len(lines)}; take another one.")
     ((catenary, pantograph),) = lines
-    speeds = [cell.speed_kmh for cell in result.cells]
-    given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": (min(speeds), max(speeds))}
-    given |= arguments or {}
+    speeds = sorted({cell.speed_kmh for cell in result.cells})
+    place = {"catenary": catenary, "pantograph": pantograph}
+    given = [place | {"speed_kmh": speeds[k % len(speeds)]} | dict(arguments or {}) for k in range(episodes)]
     standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     jobs = [
-        partial(one_return, identifier, given, each.policy, seed)
+        partial(one_return, identifier, given[seed], each.policy, seed)
         for each in standings
         for seed in range(episodes)
     ]

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 def returns(
     result: Annotated[Path, typer.Argument(help="JSON of `panto benchmark`, of one line.")],
     environment: Annotated[str, typer.Option("--id", help="Id of the environment.")] = "Pantograph-v0",
-    episodes: Annotated[int, typer.Option(min=2, help="Episodes per policy, seeds 0, 1, ...")] = 20,
+    episodes: Annotated[
+        int, typer.Option(min=2, help="Episodes per policy, seeds 0, 1, ..., at the result's speeds in turn.")
+    ] = 20,
     ingredients: Annotated[
         bool,
         typer.Option("--ingredients", help="Also with each ingredient of the reward left out or changed."),
@@ -27,7 +29,7 @@ def returns(
 ) -> None:
     """Compare the returns of an environment with a benchmark's ranks.
 
-    Every policy of the result runs episodes on its line, over its range of speeds. Disqualified policies
+    Every policy of the result runs episodes on its line, at its speeds in turn. Disqualified policies
     share the last rank of the benchmark.
     """
     from ..report.result import read_result

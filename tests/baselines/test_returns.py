@@ -91,6 +91,17 @@ def test_every_policy_of_the_result_has_the_mean_of_its_episodes(result):
         assert each.change == standing.change
 
 
+def test_episodes_are_at_the_speeds_of_the_result_in_turn(result):
+    at_any = {name: value for name, value in SHORT.items() if name != "speed_kmh"}
+    found = returns(result, episodes=3, arguments=at_any, workers=1)[0]
+    given = {"catenary": "en50318-2002", "pantograph": "en50318-2002"} | at_any
+    speeds = (250.0, 300.0, 250.0)
+    single = [
+        one_return("Pantograph-v0", given | {"speed_kmh": v}, "passive", k) for k, v in enumerate(speeds)
+    ]
+    assert found.mean == pytest.approx(np.mean(single))
+
+
 def test_the_command_prints_policies_by_return_and_the_correlation(result, tmp_path):
     file = tmp_path / "result.json"
     result.save(file)
