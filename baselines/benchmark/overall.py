@@ -30,8 +30,9 @@ MOVED_PASSES = 1 / 3
 """Share of a track's passes from which on a policy is disqualified for moving the mean by over ``MOVED``.
 
 Of 56 places of policies in the rankings of November 2026, 47 had no such pass. Lines as built had most: a
-fifth for `skyhook`, `tuned-fb+ff` and `lqg`. With 16 seeds such a share has a standard error of 6 points: at a
-quarter, chance would throw it out once in five times, at a third hardly ever. ``statistics.MOVED_AT_MOST`` refuses policies that press harder in fewer passes.
+fifth for `skyhook`, `tuned-fb+ff` and `lqg`. With 16 seeds such a share has a standard error of 6 points: at
+a quarter, chance would throw it out once in five times, at a third hardly ever.
+``statistics.MOVED_AT_MOST`` refuses policies that press harder in fewer passes.
 """
 NEAR = 5.0
 """Points of change (%) from the best policy within which a tape shows that a track needs no feedback."""
