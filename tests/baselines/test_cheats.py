@@ -10,11 +10,14 @@ import json
 import pytest
 
 from panto_baselines.benchmark import apart
+from panto_baselines.benchmark.controls import ORACLE_TAPE
 from panto_baselines.benchmark.run import passes_of, run
-from panto_baselines.benchmark.settings import BenchmarkSettings
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.benchmark.single_pass import run_pass
+from panto_baselines.oracle import stored
 from panto_env import InputError
 from panto_env.base.settings import parse
+from panto_env.plant.actuators import actuator_settings
 from panto_env.policies import find_policy
 
 SPANS = (6, 9)
@@ -216,3 +219,24 @@ def test_one_that_wants_to_see_what_no_train_can_measure_is_refused(tmp_path):
     text = PRESSER.replace("def __init__", "observation = 'full'\n\n    def __init__")
     with pytest.raises(InputError, match="'full', which holds what no train can measure"):
         one_pass(cheat(tmp_path, "Presser", text), settings("passive"))
+
+
+def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
+    track = load_benchmark("benchmark/known-line")
+    row = run_pass(track, track.lines[0], (10, 19), ORACLE_TAPE, 300.0, 0).row
+    cells = [each for each in stored.load()["cells"] if each["speed_kmh"] == 300.0]
+    best = next(each["passes"][0] for each in cells if each["actuator"]["place"] == "frame")
+    assert best["seed"] == 0
+    assert row.figures.std == pytest.approx(best["oracle"]["std"], rel=1e-6)
+    other = run_pass(track, track.lines[0], (10, 19), ORACLE_TAPE, 300.0, 1).row
+    assert other.figures.std > 1.01 * row.figures.std
+
+
+def test_the_tape_of_an_oracle_that_is_not_stored_is_refused_before_any_pass():
+    line = LINE | {"speeds_kmh": [350, 262]}
+    settings = parse(BenchmarkSettings, {"policies": [ORACLE_TAPE], "lines": [line], "seeds": 1}, "it")
+    with pytest.raises(InputError, match=r"No oracle is stored for 'shinkansen-simple' at 350 km/h"):
+        run(settings, workers=1)
+    realistic = settings.model_copy(update={"actuator": actuator_settings("realistic")})
+    with pytest.raises(InputError, match=r"No oracle is stored for 'shinkansen-simple' at 262 km/h"):
+        run(realistic, workers=1)
