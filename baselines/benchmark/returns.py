@@ -56,10 +56,11 @@ def returns(
 ) -> list[Returned]:
     """Mean returns of all policies of a benchmark's result, in episodes on its line at its speeds in turn.
 
-    Speeds between would ask another question: gains fitted at the result's speeds are worth less there.
-    result: as ``read_result`` gives it, of one line. Episodes have the seeds 0, 1, ... A policy that wants
-    no washout has none. arguments: of the environment, instead of those of its id. Raises InputError for a
-    result of several lines, an id that does not exist, and a policy that fails.
+    Actuator and sensors are those of the result. Speeds between would ask another question: gains fitted at
+    the result's speeds are worth less there. result: as ``read_result`` gives it, of one line. Episodes have
+    the seeds 0, 1, ... A policy that wants no washout has none. arguments: of the environment, instead of
+    those of its id. Raises InputError for a result of several lines, an id that does not exist, and a policy
+    that fails.
     """
     if identifier not in IDS:
         raise InputError(f"Unknown id '{identifier}': known are {', '.join(IDS)}.")
@@ -69,6 +70,7 @@ def returns(
     ((catenary, pantograph),) = lines
     speeds = sorted({cell.speed_kmh for cell in result.cells})
     place = {"catenary": catenary, "pantograph": pantograph}
+    place |= {name: result.settings[name] for name in ("actuator", "sensors")}
     given = [place | {"speed_kmh": speeds[k % len(speeds)]} | dict(arguments or {}) for k in range(episodes)]
     standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     jobs = [

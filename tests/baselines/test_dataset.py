@@ -236,6 +236,7 @@ class TestParts:
             sets = [{{ name = "deadly", policies = ['{mortal}'], episodes = 12 }}]
             [environment]
             distance = 60
+            washout = 0
             """
         )
         command = ("dataset", "episodes", "tiny.toml", "--output", "out", "--workers", 1)

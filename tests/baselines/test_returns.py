@@ -13,12 +13,15 @@ from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return,
 from panto_baselines.benchmark.returns_command import returns as command
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.report.result import parse_result
 from panto_env import InputError
 from panto_env.control.settings import read_settings
 from panto_env.envs import IDS
 from panto_env.envs.settings import EnvironmentSettings
 from panto_env.policies import find_policy
 
+LINE = "en50318-2002"
+OF_RESULT = {"catenary": LINE, "pantograph": LINE, "actuator": "ideal", "sensors": "ideal"}
 SHORT = {"distance": 120.0, "accuracy": "fast", "settle": 1.0, "speed_kmh": (250.0, 300.0)}
 
 
@@ -77,24 +80,30 @@ def test_a_policy_has_the_washout_that_it_asks_for(monkeypatch):
 @pytest.fixture(scope="module")
 def result():
     line = Line(speeds_kmh=(250.0, 300.0), distance=310.0, spans=(3, 5))
-    return run(BenchmarkSettings(policies=("pd", "p:gain=0.1"), lines=(line,), seeds=(0, 1)), workers=1)
+    settings = BenchmarkSettings(policies=("pd", "p:gain=0.1"), lines=(line,), seeds=(0, 1))
+    return run(settings, workers=1)
 
 
-def test_every_policy_of_the_result_has_the_mean_of_its_episodes(result):
-    found = returns(result, episodes=2, arguments=SHORT, workers=1)
+@pytest.fixture(scope="module")
+def read(result):
+    return parse_result(result.as_dict(), "the outcome")
+
+
+def test_every_policy_of_the_result_has_the_mean_of_its_episodes(read):
+    found = returns(read, episodes=2, arguments=SHORT, workers=1)
     assert [each.policy for each in found] == ["passive", "pd", "p:gain=0.1"]
-    given = {"catenary": "en50318-2002", "pantograph": "en50318-2002"} | SHORT
-    for each, standing in zip(found, result.standings, strict=True):
+    given = OF_RESULT | SHORT
+    for each, standing in zip(found, read.standings, strict=True):
         single = [one_return("Pantograph-v0", given, each.policy, seed) for seed in (0, 1)]
         assert each.mean == pytest.approx(np.mean(single))
         assert each.error == pytest.approx(abs(single[0] - single[1]) / 2)
         assert each.change == standing.change
 
 
-def test_episodes_are_at_the_speeds_of_the_result_in_turn(result):
+def test_episodes_are_at_the_speeds_of_the_result_in_turn(read):
     at_any = {name: value for name, value in SHORT.items() if name != "speed_kmh"}
-    found = returns(result, episodes=3, arguments=at_any, workers=1)[0]
-    given = {"catenary": "en50318-2002", "pantograph": "en50318-2002"} | at_any
+    found = returns(read, episodes=3, arguments=at_any, workers=1)[0]
+    given = OF_RESULT | at_any
     speeds = (250.0, 300.0, 250.0)
     single = [
         one_return("Pantograph-v0", given | {"speed_kmh": v}, "passive", k) for k, v in enumerate(speeds)

@@ -44,6 +44,7 @@ pantograph = "three-mass"
 speed_kmh = [250, 300]
 [environment]
 line_condition = "fair"
+washout = 0
 [[sets]]
 name = "own"
 policies = ["passive"]

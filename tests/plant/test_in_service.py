@@ -197,7 +197,7 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_presses_less_hard(tmp_p
     usual |= {"total_steps": 245_760, "checkpoint_steps": 100_000}  # a quarter of it leaves it to the seed
     moved, ratios = [], []
     for name, reward in (("with", "agent"), ("without", {"rate": 0.1})):
-        environment = usual["environment"] | {"reward": reward}
+        environment = usual["environment"] | {"reward": reward, "washout": 0.0, "settle": 0.0}
         training = parse_training(usual | {"environment": environment}, name)
         folder = train(training, tmp_path / name, progress=False)
         pairs = Comparison(training.arguments, (200.0, 250.0, 300.0), range(1000, 1002)).run(
