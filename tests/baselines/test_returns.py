@@ -130,6 +130,11 @@ def test_every_ingredient_is_a_valid_change_of_the_id(name):
     assert (changed == usual) == (name == "all")
 
 
+def test_more_episodes_than_can_be_run_are_refused(read):
+    with pytest.raises(InputError, match="This comparison"):
+        returns(read, episodes=2**31)
+
+
 def test_results_of_several_lines_and_unknown_ids_are_refused():
     cells = [SimpleNamespace(catenary=name, pantograph="p", speed_kmh=300.0) for name in ("a", "b")]
     with pytest.raises(InputError, match="one line"):
