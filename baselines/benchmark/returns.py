@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from panto_env.analysis.pool import Progress
+from panto_env.analysis.pool import Progress, check_passes
 from panto_env.base.errors import InputError
 from panto_env.cluster import spread
 from panto_env.envs import IDS
@@ -59,8 +59,8 @@ def returns(
     Actuator and sensors are those of the result. Speeds between would ask another question: gains fitted at
     the result's speeds are worth less there. result: as ``read_result`` gives it, of one line. Episodes have
     the seeds 0, 1, ... A policy that wants no washout has none. arguments: of the environment, instead of
-    those of its id. Raises InputError for a result of several lines, an id that does not exist, and a policy
-    that fails.
+    those of its id. Raises InputError for a result of several lines, an id that does not exist, too many
+    episodes, and a policy that fails.
     """
     if identifier not in IDS:
         raise InputError(f"Unknown id '{identifier}': known are {', '.join(IDS)}.")
@@ -68,11 +68,12 @@ def returns(
     if len(lines) != 1:
         raise InputError(f"A result of one line is needed, not of {len(lines)}; take another one.")
     ((catenary, pantograph),) = lines
+    standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
+    check_passes(episodes * len(standings), "This comparison")
     speeds = sorted({cell.speed_kmh for cell in result.cells})
     place = {"catenary": catenary, "pantograph": pantograph}
     place |= {name: result.settings[name] for name in ("actuator", "sensors")}
     given = [place | {"speed_kmh": speeds[k % len(speeds)]} | dict(arguments or {}) for k in range(episodes)]
-    standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     jobs = [
         partial(one_return, identifier, given[seed], each.policy, seed)
         for each in standings
