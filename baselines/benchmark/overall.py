@@ -130,6 +130,11 @@ def without_feedback(found: Sequence[Ranked]) -> str:
     return f"needs no feedback: {tape.policy} {tape.change:.1f} %, {best.policy} {best.change:.1f} %"
 
 
+def with_feedback(title: str, found: Sequence[Ranked]) -> str:
+    """A title, and that a tape is nearly as good as the best policy where it is."""
+    return "; ".join(filter(None, (title, without_feedback(found))))
+
+
 def next_in_ranking(found: Sequence[Ranked]) -> dict[str, str]:
     """The policy that is ranked next after each one."""
     ranked = sorted((each for each in found if each.rank is not None), key=lambda each: each.rank or 0)

@@ -13,7 +13,7 @@ from rich.text import Text
 from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
-from .overall import next_in_ranking, without_feedback
+from .overall import next_in_ranking, with_feedback
 from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
@@ -70,7 +70,7 @@ def _overall(outcome: Benchmark) -> Table:
     """Table of the overall results, one row per policy."""
     found = outcome.standings
     title = f"{outcome.settings.title}: all lines, speeds and seeds"
-    title = "; ".join(filter(None, (title, without_feedback(found))))
+    title = with_feedback(title, found)
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("policy", overflow="fold")
     best = next((each for each in found if each.rank == 1), None)

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
-from panto_env.base.shown import shortly
-from panto_env.control.action import numbers
-from panto_env.policies import Policy, errors_name, find_policy, wishes
+from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
 from ..benchmark.seeds import DATA
 from .settings import ENVIRONMENT, EpisodesSettings, Plan
@@ -197,10 +195,7 @@ def _seen(
 def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[Any]:
     """A policy's action for an observation, clipped to -1..1. Raises InputError if it is not valid."""
     with errors_name(name, "act"):
-        returned = policy.act(seen.copy())  # a copy: the policy may keep it
-        action = numbers(returned)
-        if action is None or action.shape != shape or not np.isfinite(action).all():
-            raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
+        action = checked_action(policy.act(seen.copy()), shape)  # a copy: the policy may keep it
     clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
     return clipped
 

@@ -21,7 +21,7 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 
 from ..benchmark.intervals import Share
-from ..benchmark.overall import without_feedback
+from ..benchmark.overall import with_feedback
 from ..benchmark.statistics import LineAtSpeed
 
 Number = Annotated[
@@ -129,7 +129,7 @@ class Result(ResultTable):
     @property
     def heading(self) -> str:
         """The title, and that a tape is nearly as good as the best policy where it is."""
-        return "; ".join(filter(None, (self.title, without_feedback(self.standings))))
+        return with_feedback(self.title, self.standings)
 
     @property
     def policies(self) -> list[str]:

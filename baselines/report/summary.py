@@ -8,7 +8,7 @@ from statistics import mean
 
 from panto_env.base.table import Table
 
-from ..benchmark.overall import next_in_ranking, without_feedback
+from ..benchmark.overall import next_in_ranking, with_feedback
 from ..benchmark.statistics import LineAtSpeed
 from .result import Result, StoredCell, StoredStanding
 
@@ -40,8 +40,7 @@ def summary(result: Result) -> Table:
     if any(oracles):
         rows.append(("*oracle*", *(each or "–" for each in oracles), *["–"] * len(OVERALL)))
     seeds = result.cells[0].seeds
-    feedback = without_feedback(result.standings)
-    title = f"{result.title}: Δσ (%), {seeds} seeds{f'; {feedback}' if feedback else ''}"
+    title = with_feedback(f"{result.title}: Δσ (%), {seeds} seeds", result.standings)
     return Table(title, headings, tuple(rows))
 
 

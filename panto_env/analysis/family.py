@@ -13,7 +13,7 @@ import numpy as np
 from ..base.table import Alarm, Table
 from ..base.units import to_kmh
 from ..catalog.family import LineFamily
-from ..control.lines import on_drawn_line
+from ..control.lines import line_generator, on_drawn_line
 from ..control.settings import run_settings
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
@@ -74,7 +74,7 @@ def drawn_line(family: LineFamily, seed: int) -> DrawnLine:
     milliseconds = 1e3 * (time.perf_counter() - begun)
     line, (_, speed_kmh) = drawn.line, drawn.speed_kmh
     assert isinstance(line, FlexibleCatenaryData)
-    (own,) = np.random.default_rng(seed).spawn(1)
+    own = line_generator(np.random.default_rng(seed))
     draws = 1 + next(k for k, one in enumerate(family.drawn(own, settings.speed_kmh)) if one is not None)
     run = simulate(line, family.plausible.pantograph, speed_kmh, record_droppers=False)
     figures = None if run.terminated else run.summary()

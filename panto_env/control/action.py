@@ -26,6 +26,12 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     return force
 
 
+def not_finite(action: Array, lane: int, several: bool) -> InputError:
+    """The error for actions, (lanes, actions), of which that of a lane is not finite; several: lanes."""
+    whose = f" of lane {lane}" if several else ""
+    return InputError(f"The action{whose} must be finite, not {action[lane]}; check the policy.")
+
+
 def numbers(action: Any) -> Array | None:
     """The action as an array of floats; None where it is not made of real numbers, or some are masked."""
     if isinstance(action, np.ma.MaskedArray):

@@ -21,6 +21,12 @@ def draws_line(settings: RunSettings) -> bool:
     return not isinstance(settings.catenary, CatenaryData)
 
 
+def line_generator(random: np.random.Generator) -> np.random.Generator:
+    """The child of an episode's generator from which its line is drawn."""
+    (own,) = random.spawn(1)
+    return own
+
+
 def on_drawn_line(settings: R, random: Callable[[], np.random.Generator]) -> R:
     """Settings of an episode: on a line drawn from a list, all alike, or from a family.
 
@@ -32,7 +38,7 @@ def on_drawn_line(settings: R, random: Callable[[], np.random.Generator]) -> R:
     lines = settings.catenary
     if isinstance(lines, CatenaryData):
         return settings
-    (own,) = random().spawn(1)
+    own = line_generator(random())
     if isinstance(lines, LineFamily):
         line, speed_kmh = lines.draw(own, settings.speed_kmh)
         return settings.model_copy(update={"catenary": line, "speed_kmh": speed_kmh})

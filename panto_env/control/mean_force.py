@@ -17,8 +17,8 @@ from ..base.errors import InputError
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from .by_speed import BySpeed
+from .identity import NOT_OF_A_RUN
 from .kept import kept
-from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
 
 TOLERANCE = 0.05
@@ -27,16 +27,7 @@ MOST_RUNS = 10
 KNOT_DISTANCE = 5.0
 """Maximum distance (km/h) between the speeds at which a range is trimmed. Between them the force is
 interpolated, and the mean is within about 0.3 N of its target."""
-NO_MATTER = {
-    *OBSERVATION_SETTINGS,
-    "reward",
-    "cost",
-    "settle",
-    "actuator",
-    "sensors",
-    "washout",
-    "mean_force",
-}
+NO_MATTER = {*NOT_OF_A_RUN, "actuator", "sensors", "washout", "mean_force"}
 """Settings on which the mean force of a passive run does not depend."""
 
 PassiveMean = Callable[[float], float]

@@ -16,8 +16,8 @@ from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.sensors import Reading
 from .by_speed import BySpeed
+from .identity import NOT_OF_A_RUN
 from .kept import kept
-from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings, as_designed
 
 KNOT_DISTANCE = 25.0
@@ -26,17 +26,7 @@ LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
 SPREADS = LOW_PASSED + 1
 """Number of rows of means, after which those of spreads begin."""
-NO_MATTER = (
-    *OBSERVATION_SETTINGS,
-    "estimator",
-    "known_pantograph",
-    "reward",
-    "cost",
-    "settle",
-    "actuator",
-    "sensors",
-    "washout",
-)
+NO_MATTER = {*NOT_OF_A_RUN, "estimator", "known_pantograph", "actuator", "sensors", "washout"}
 """Settings on which a passive run does not depend."""
 
 RunPassively = Callable[[RunSettings], Trajectory]
@@ -76,7 +66,7 @@ def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[fl
     usual = RunSettings()
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
-    inputs = designed.model_dump(mode="json", exclude=set(NO_MATTER), serialize_as_any=True)
+    inputs = designed.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True)
     line = designed.line.name
     means, spreads = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
     return [*means, *spreads]

@@ -43,7 +43,7 @@ def limits(catenary: CatenaryData, speeds: Array) -> tuple[float, Array]:
 
 
 @inlined
-def compute_cost(episode, task, now, values):
+def compute_cost(episode, now, values):
     """Cost of a control step."""
     weights, per_step = episode.cost_weights, 1.0 / episode.control_steps
     values[RESULT.COST] = per_step * (

@@ -221,7 +221,7 @@ class RunSettings(Numerics):
     reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
         None,
         validate_default=True,
-        description='weights of the reward\'s terms: "paper1", "agent", one with values such as '
+        description='weights of the reward\'s terms: "paper1", "benchmark", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
     )
     cost: Annotated[CostWeights, BeforeValidator(_cost)] = Field(

@@ -107,7 +107,7 @@ def control_lane(packed, entries, values, flags, lane):
             add_sample_to_figures(running, samples, own, task, now, frame, head, lane)
             take_readings(sensors, CONTROLLED, step, own, now[NOW.READING :], lane)
         compute_reward(episode, own, task, now, values)
-        compute_cost(episode, task, now, values)
+        compute_cost(episode, now, values)
         if counts:
             add_control_step_to_figures(task, now)
         else:

@@ -13,6 +13,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
+from .action import not_finite
 from .episode import Flags, Results, new_results
 from .step import control_steps, observe_start
 
@@ -139,8 +140,7 @@ class Stepping:
         if answer < 0:
             action = self.episode.action
             lane = int(np.flatnonzero(~np.isfinite(action).all(axis=1))[0])
-            whose = f" of lane {lane}" if self.lanes > 1 else ""
-            raise InputError(f"The action{whose} must be finite, not {action[lane]}; check the policy.")
+            raise not_finite(action, lane, several=self.lanes > 1)
         return answer > 0
 
     def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:

@@ -24,7 +24,7 @@ class Episodes:
         self.draws_line = draws_line(settings)
         self.task = Task(on_example(settings), **of_task)
         """The task of all episodes. Where lines are drawn: one on an example, to know the spaces by."""
-        for line in settings.catenary if isinstance(settings.catenary, tuple) else ():
+        for line in settings.catenary[1:] if isinstance(settings.catenary, tuple) else ():
             Task(settings.model_copy(update={"catenary": line}), keep_samples=False)  # each is possible
 
     def draw(self, random: Callable[[], np.random.Generator]) -> Task:

@@ -14,6 +14,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.machine import cores
 from ..control import Task
+from ..control.action import not_finite
 from ..control.episode import Flags, Results
 from ..control.lines import draws_line
 from .episodes import Episodes
@@ -55,10 +56,7 @@ class LaneGroups:
         if waiting is not None:
             wrong &= ~waiting
         if wrong.any():  # before any group has moved
-            lane = int(wrong.argmax())
-            raise InputError(
-                f"The action of lane {lane} must be finite, not {action[lane]}; check the policy."
-            )
+            raise not_finite(action, int(wrong.argmax()), several=True)
         return self._threads.step(action, waiting, random) > 0
 
     def _step_groups(

@@ -6,8 +6,6 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...analysis.simulation import simulate
 from ...base.units import to_kmh
 from ...catalog import load_catenary
@@ -51,7 +49,7 @@ def cases() -> Iterator[tuple[str, float]]:
         line = load_catenary(name)
         if not isinstance(line, FlexibleCatenaryData):
             continue
-        wave_speed = to_kmh(float(np.sqrt(line.contact_wire.tension / line.contact_wire.mass)))
+        wave_speed = to_kmh(line.contact_wire.wave_speed)
         for speed in SPEEDS_KMH:
             if speed < HIGHEST * wave_speed:
                 yield name, speed

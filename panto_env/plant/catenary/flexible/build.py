@@ -152,7 +152,7 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
     stencil = [
         [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
     ]
-    courant = np.array([np.sqrt(wire.tension / wire.mass) for wire in wires]) * step / dx
+    courant = np.array([wire.wave_speed for wire in wires]) * step / dx
     table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
     return Tensioned(
         shape=shape.contact.height(np.linspace(0, data.span_length, table)),

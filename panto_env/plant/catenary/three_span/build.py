@@ -46,7 +46,7 @@ class ThreeSpan:
         Raises InputError for conditions with defects.
         """
         refuse_defects(data, runs.conditions)
-        self.wave_speed = float(np.sqrt(data.wire.tension / data.wire.mass))
+        self.wave_speed = data.wire.wave_speed
         check_speeds(data.name, self.wave_speed, runs.speeds)
         self.time_step = numerics.time_step or runs.carried_step(TIME_STEP)
         runs.check_wave(self.time_step)
