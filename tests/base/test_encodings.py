@@ -130,6 +130,7 @@ def test_all_characters_of_the_sources_have_a_plain_form():
         ("é ü ø Å", "e u o A"),
         ("┏━┓┃│├┼", "+-+||++"),
         ("█▌", "##"),
+        ("─╿▀▟■", "-+##?"),  # both ends of boxes and blocks, and what stands behind them
         ("漢", "?"),
         ("\udcff", "?"),
     ],

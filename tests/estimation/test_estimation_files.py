@@ -9,8 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from panto_env import InputError, simulate
+from panto_env.cli.estimate import _scores_table
 from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import read_motion, write_motion
+from panto_env.estimation.score import Score
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
 from ..command import panto
@@ -123,6 +125,12 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     assert shown.returncode == 0, shown.stderr
     assert "from displacements, periodic" in " ".join(shown.stdout.split())
     assert "reliable" in shown.stdout
+
+
+def test_a_table_of_scores_has_the_units_of_its_headings():
+    table = _scores_table([Score(20.0, 1.25, 3.5, 0.987, 0.12345, 4.0, 0.0)])
+    assert table.headings == ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
+    assert table.rows == [("0 to 20 Hz", "1.25", "3.50", "0.9870", "123.45")]
 
 
 def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):

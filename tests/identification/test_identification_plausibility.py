@@ -135,6 +135,25 @@ def test_marks_are_printed_and_in_the_json(panto):
     assert set(told["fits"]["equation-error"]["impossible"]) == {"c1T", "c2", "m3"}
 
 
+def test_what_a_record_cannot_determine_is_said_beside_the_values(panto):
+    """One sine cannot tell the spring from the mass."""
+    shown = " ".join(panto(noisy(EXPERIMENTS[0]), "--free-offset").split())
+    assert "k3 not determined, the 95 % interval holds 0" in shown
+
+
+def test_a_method_that_finds_nothing_hides_no_other_unless_its_fit_is_wanted(panto, monkeypatch):
+    failing = identify(RECORD, KNOWN)
+    del failing.fits[OUTPUT_ERROR]
+    failing.failures[OUTPUT_ERROR] = "it does not settle."
+    monkeypatch.setattr("panto_env.identification.identify", lambda *_, **__: failing)
+    assert "low-passed" in panto(RECORD)
+    with pytest.raises(InputError, match=r"Output error: it does not settle"):
+        panto(RECORD, "--output", "mine.toml")
+    failing.fits.clear()
+    with pytest.raises(InputError, match=r"Output error: it does not settle"):
+        panto(RECORD)
+
+
 OTHER = replace(
     RECORD,
     support=0.05

@@ -4,12 +4,15 @@ python -m tests.project.test_defaults   # writes defaults.txt anew
 """
 
 import importlib
+import inspect
 import pkgutil
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 from panto_env.base.settings import Settings
+from panto_env.cli import make_app
 from panto_env.control.reward import REWARDS
 from panto_env.envs import IDS
 from panto_env.estimation.settings import ESTIMATORS
@@ -35,13 +38,32 @@ def kinds(parent=Settings):
         yield from kinds(each)
 
 
+def functions(module):
+    """Name and defaults of the functions that users import from a module: those in its ``__all__``."""
+    for name in getattr(module, "__all__", ()):
+        if inspect.isfunction(function := getattr(module, name)):
+            parameters = inspect.signature(function).parameters.values()
+            given = {each.name: each.default for each in parameters if each.default is not each.empty}
+            yield f"function {function.__module__}.{name}", given
+
+
+def options(command, name="panto"):
+    """Name and defaults of the options of a command and those below it; without those that have none."""
+    for word, below in getattr(command, "commands", {}).items():
+        yield from options(below, f"{name} {word}")
+    yield name, {each.name: each.default for each in command.params if each.default not in (None, False)}
+
+
 def defaults():
-    """One line per class of settings, preset and id: its name, and what it sets."""
+    """One line per class of settings, preset, id, function and command: its name, and what it sets."""
+    told = dict(options(get_command(make_app())))
     for package in map(importlib.import_module, PACKAGES):
+        told |= functions(package)
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if "__main__" not in module.name:
-                importlib.import_module(module.name)
-    told = {
+                told |= functions(importlib.import_module(module.name))
+    told = {name: given for name, given in told.items() if given}
+    told |= {
         f"{kind.__module__}.{kind.__qualname__}": {
             name: field.get_default(call_default_factory=True)
             for name, field in kind.model_fields.items()

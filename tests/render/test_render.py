@@ -20,7 +20,7 @@ from panto_env.plant.state import Place, Row
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import excerpt, frames
+from panto_env.render.film import excerpt, figures_in_words, frames
 from panto_env.render.filmed import check_together, policy_pass
 from panto_env.render.layout import Layout
 from panto_env.render.moment import moment_of
@@ -301,6 +301,18 @@ def test_passes_of_other_speeds_or_control_intervals_are_not_filmed_above_each_o
             check_together([first, other])
 
 
+def test_a_change_of_spread_is_given_only_between_passes_that_differ_in_their_control():
+    first, same, other = (
+        policy_pass(name, {"distance": 800.0, "pantograph": pantograph}, 0)
+        for name, pantograph in (("passive", "dsa380"), ("pd", "dsa380"), ("pd", "dsa250"))
+    )
+    of_first, of_same, of_other = (figures_in_words(each, first) for each in (first, same, other))
+    assert "σ relative to passive" in of_same
+    assert not any("relative" in text for text in [*of_first, *of_other])
+    early = replace(first, run=replace(first.run, terminated=True))
+    assert not any("relative" in text for text in figures_in_words(same, early))
+
+
 def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
     short = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 200.0}
     with pytest.raises(InputError, match="before span 10; begin in an earlier one"):
@@ -310,6 +322,7 @@ def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
     for arguments, words in (
         (["passive"] * 5, "up to 4 passes, not 5"),
         (["passive", "--size", "641", "480"], "even numbers of pixels"),
+        (["passive", "pd", "--size", "640", "362"], "the height for each pass's part"),
     ):
         result = CliRunner().invoke(make_app(), ["film", *arguments, "--output", str(tmp_path / "film.mp4")])
         assert isinstance(result.exception, InputError)
