@@ -309,7 +309,7 @@ def test_a_change_of_spread_is_given_only_between_passes_that_differ_in_their_co
     of_first, of_same, of_other = (figures_in_words(each, first) for each in (first, same, other))
     assert "σ relative to passive" in of_same
     assert not any("relative" in text for text in [*of_first, *of_other])
-    early = replace(first, run=replace(first.run, terminated=True))
+    early = first._replace(run=replace(first.run, terminated=True))
     assert not any("relative" in text for text in figures_in_words(same, early))
 
 
