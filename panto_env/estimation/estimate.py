@@ -58,7 +58,7 @@ def estimate(
     lag = round(settings.lag / motion.time_step)
     force = smooth_force(model, filtered, lag) if lag else filtered.state @ model.force
     variance = smoothed_variance(model, gains, lag) if lag else force_variance(model, gains)
-    first = math.ceil(SETTLING / motion.time_step)
+    first = first_settled(motion)
     tested = consistency(filtered, motion.time, first)
     suspension_error = -float(filtered.state[-1, -1]) if settings.suspension_drift > 0 else 0.0
     return Estimate(
@@ -71,6 +71,11 @@ def estimate(
         consistency=tested,
         verdict=judge(tested, suspension_error),
     )
+
+
+def first_settled(motion: Motion) -> int:
+    """Number of the first sample after a motion's start has been forgotten."""
+    return math.ceil(SETTLING / motion.time_step)
 
 
 def model_of(motion: Motion, pantograph: PantographData, settings: EstimatorSettings) -> Model:

@@ -8,7 +8,6 @@ were it not, all of them and the lift could be scaled alike. ``information`` mea
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +17,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.pantograph.schema import PantographData
-from .estimate import SETTLING, filter_motion, model_of
+from .estimate import filter_motion, first_settled, model_of
 from .kalman import corrected, correction, steady_gains
 from .model import Model
 from .motion import Motion
@@ -125,7 +124,7 @@ def information(
     """
     check_motion(motion, pantograph)
     _check([name for name in names if name not in (HEAD_MASS, LIFT)], pantograph)
-    first = math.ceil(SETTLING / motion.time_step)
+    first = first_settled(motion)
 
     model = model_of(motion, pantograph, settings)
     gains = steady_gains(model)

@@ -18,7 +18,7 @@ from ..base.errors import InputError
 from ..base.names import suggest
 from ..base.ranges import Between, ranges_of
 from ..plant.pantograph.schema import PantographData
-from .estimate import SETTLING, filter_motion, model_of
+from .estimate import filter_motion, first_settled, model_of
 from .innovations import log_likelihood
 from .kalman import steady_gains
 from .motion import Motion
@@ -38,8 +38,8 @@ class Tuning:
 
     settings: EstimatorSettings
     values: dict[str, float]  # by name
-    log_likelihood: float  # per sample
-    before: float  # of the settings that it began with, per sample
+    log_likelihood: float  # per sample that counts
+    before: float  # of the settings that it began with, per sample that counts
     at_bounds: tuple[str, ...]  # names that ended at an end of their range: the records do not determine them
 
 
@@ -66,7 +66,7 @@ def tune(
     ranges = [_range(settings, name) for name in names]
     bounds = [(math.log(each.low), math.log(each.high)) for each in ranges]
     begin = np.array([math.log(_get(settings, name)) for name in names])
-    samples = sum(len(motion.head) for motion in motions)
+    samples = sum(len(motion.head) - first_settled(motion) for motion in motions)
 
     def cost(logarithms: Array) -> float:
         return -_log_likelihood(motions, pantograph, _changed(settings, names, logarithms)) / samples
@@ -101,7 +101,7 @@ def _log_likelihood(
     for motion in motions:
         model = model_of(motion, pantograph, settings)
         filtered = filter_motion(model, steady_gains(model), motion)
-        total += log_likelihood(filtered, math.ceil(SETTLING / motion.time_step))
+        total += log_likelihood(filtered, first_settled(motion))
     return total
 
 

@@ -25,6 +25,7 @@ from panto_env.estimation.tuning import tune
 
 TRUE = load_pantograph("dsa350")
 STEP, N = 2e-3, 5000
+SETTLED = 500  # samples of the first second
 PLAIN = EstimatorSettings(frame_intensity=0.02, **PAPER2)
 
 
@@ -154,6 +155,7 @@ def test_maximum_likelihood_finds_the_intensities_that_made_the_record():
     assert found.settings.frame_intensity == found.values["frame_intensity"]
     assert found.log_likelihood > found.before
     assert found.at_bounds == ()
+    assert found.before == pytest.approx(likelihood(motions, PLAIN) / (2 * (3000 - SETTLED)))
     # The greatest: on every side the record is less likely.
     most = likelihood(motions, found.settings)
     for name in names:
@@ -172,7 +174,7 @@ def likelihood(motions, settings):
     total = 0.0
     for motion in motions:
         model = model_of(motion, TRUE, settings)
-        total += log_likelihood(filter_motion(model, steady_gains(model), motion), 500)
+        total += log_likelihood(filter_motion(model, steady_gains(model), motion), SETTLED)
     return total
 
 

@@ -65,7 +65,10 @@ def draw(paths: list[Path], count: int, seed: int) -> list[Mutant]:
         if places:
             place = rng.choice(sorted(places))
             name, occurrence = rng.choice(places[place])
-            after = mutate_code(source, OPERATORS[name], occurrence)
+            try:
+                after = mutate_code(source, OPERATORS[name], occurrence)
+            except AttributeError:  # Cosmic Ray cannot replace an exception with a dotted name
+                continue
             mutant = Mutant(path, place[0], _statement(tree, place[0]), name.split("/")[1], source, after)
             if _is_python(after):
                 drawn.setdefault((path, place), mutant)
