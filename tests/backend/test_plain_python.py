@@ -1,4 +1,7 @@
-"""The kernels' source does the same as plain Python (NUMBA_DISABLE_JIT=1) as it does compiled."""
+"""The kernels' source does the same as plain Python (NUMBA_DISABLE_JIT=1) as it does compiled, and as it did.
+
+python -m tests.backend.test_plain_python   # writes kernel_results.json anew
+"""
 
 import json
 import os
@@ -13,7 +16,7 @@ import pytest
 
 import panto_env
 from panto_env.backend import JIT
-from panto_env.catalog import load_catenary
+from panto_env.catalog import load_catenary, load_pantograph
 
 pytestmark = pytest.mark.plain
 
@@ -67,6 +70,21 @@ def passive_run():
     return [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
 
 
+def drifting_run():
+    """A worn line under a damped contact, at a speed that drifts."""
+    damped = load_pantograph("en50318-2002").model_copy(update={"contact_damping": 100.0})
+    numerics = {"window": 3, "precision": "double", "spacing": 0.5, "time_step": 2e-3}
+    uneven = {"speed_drift": 5.0, "line_condition": "worn", "seed": 1}
+    run = panto_env.simulate(catenary=short_line(), pantograph=damped, distance=30.0, **numerics, **uneven)
+    return [run.contact_force.tolist(), run.position.tolist()]
+
+
+def rig_run():
+    """A rig's computer and cylinder."""
+    run = panto_env.simulate(catenary="rig", distance=8.0, speed_kmh=200)
+    return [run.contact_force.tolist(), run.wire.tolist()]
+
+
 def several_lanes():
     """Observations and rewards of four lanes that end apart, each then idle for a step."""
     envs = gymnasium.make_vec(
@@ -84,8 +102,18 @@ def several_lanes():
 RUNS = {
     **{name: partial(observations, name) for name in CASES},
     "a window that moves along a line": passive_run,
+    "a speed that drifts": drifting_run,
+    "a rig": rig_run,
     "several lanes": several_lanes,
 }
+STORED = Path(__file__).with_name("kernel_results.json")
+
+
+def digest(rows):
+    """A few numbers in which each number of a run counts, differently."""
+    values = np.concatenate([np.ravel(row) for row in rows])
+    weights = np.random.default_rng(0).uniform(1, 2, (3, values.size))
+    return (weights @ values / weights.sum(axis=1)).tolist()
 
 
 def in_the_other_way():
@@ -110,9 +138,20 @@ def test_plain_python_and_compiled_kernels_agree(name, others):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", RUNS)
+def test_kernels_compute_what_they_did(name):
+    """Physics has tests of its own; this one notices each change of a result, wanted or not."""
+    assert digest(RUNS[name]()) == pytest.approx(json.loads(STORED.read_text())[name], rel=1e-5)
+
+
 def test_a_passive_run_agrees_with_one_under_control():
     """Two kernels share the plant's step: a run without policy, and one whose policy does nothing."""
     settings = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 40.0}
     passive = panto_env.simulate(**settings)
     controlled = panto_env.simulate(**settings, policy="passive")
     np.testing.assert_array_equal(passive.contact_force, controlled.contact_force)
+
+
+if __name__ == "__main__":
+    results = {name: digest(run()) for name, run in RUNS.items()}
+    STORED.write_text(json.dumps(results, indent=1) + "\n")

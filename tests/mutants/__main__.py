@@ -40,7 +40,12 @@ class Workbench:
         (folder / "names").mkdir()
         for name, source in PACKAGES.items():
             (folder / "names" / name).symlink_to(self.root / source)
-        self.environment = os.environ | {"PYTHONPATH": str(folder / "names"), "PYTHONDONTWRITEBYTECODE": "1"}
+        self.kernels = folder / "kernels"
+        self.environment = os.environ | {
+            "PYTHONPATH": str(folder / "names"),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "PANTO_CACHE_DIR": str(self.kernels),
+        }
         if room.get("plain"):
             self.environment["NUMBA_DISABLE_JIT"] = "1"
         self.marks = "not slow and not study" + " and plain" * room.get("plain", False)
@@ -73,6 +78,12 @@ class Workbench:
         self.left_out = [f"--deselect={name}" for name in failed]
         self.data.read()
 
+    def keep_kernels(self) -> None:
+        """Let compiled kernels serve the sources as they are now: only files without kernels are mutated."""
+        name = "from panto_env.backend.cache import kernel_hash; print(kernel_hash())"
+        for folder in self.kernels.glob("*"):
+            folder.rename(self.kernels / self._python("-c", name).stdout.strip())
+
     def tests_of(self, mutant: Mutant) -> list[str]:
         """The tests that reach a mutant, and all of the room where a fixture does."""
         by_line = self.data.contexts_by_lineno(str(mutant.path))
@@ -85,6 +96,8 @@ class Workbench:
         if not (tests := self.tests_of(mutant)):
             return False
         mutant.path.write_text(mutant.after, encoding="utf-8")
+        if not self.room.get("plain"):
+            self.keep_kernels()
         try:
             done = self._python(
                 "-m", "pytest", "-q", "-x", "-m", self.marks, *self.left_out, *tests, seconds=600
@@ -110,8 +123,9 @@ def judge(name: str, room: dict[str, Any], count: int, seed: int, python: str) -
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         bench, killed = Workbench(Path(folder), python, room), 0
         paths = sorted(path for source in room["sources"] for path in (bench.root / source).rglob("*.py"))
-        if not room.get("plain"):  # coverage sees nothing of compiled kernels
-            paths = [path for path in paths if not KERNEL.search(path.read_text(encoding="utf-8"))]
+        # Coverage sees nothing of compiled kernels; all else is tested with kernels compiled.
+        plain = room.get("plain", False)
+        paths = [path for path in paths if bool(KERNEL.search(path.read_text(encoding="utf-8"))) == plain]
         mutants = draw(paths, count, seed)
         bench.cover()
         for mutant in mutants:
