@@ -121,6 +121,16 @@ def test_an_unknown_input_is_found_whatever_it_does(driven):
     assert np.abs(found - middle)[100:].max() < 0.5
 
 
+def test_settings_of_an_unknown_input_are_those_given_or_the_usual_ones(driven):
+    motion, pantograph = driven
+    usual = unknown_input(motion, pantograph)
+    np.testing.assert_array_equal(usual, unknown_input(motion, pantograph, EstimatorSettings()))
+    bare = dataclasses.replace(motion, head_velocity=None, frame_velocity=None)
+    unknown_input(bare, pantograph, EstimatorSettings(observation="displacements"))
+    with pytest.raises(InputError, match="no velocities"):
+        unknown_input(bare, pantograph)
+
+
 def test_an_unknown_input_is_that_of_least_squares_over_the_whole_record(driven):
     """Over all starts and all forces of 40 samples at once, without a recursion."""
     motion, pantograph = driven

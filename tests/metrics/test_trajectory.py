@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, Trajectory, simulate
+from panto_env.metrics import trajectory
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +59,15 @@ def test_other_parquet_files_and_missing_files_are_refused(tmp_path):
         Trajectory.load(tmp_path / "other.parquet")
     with pytest.raises(InputError, match="does not exist"):
         Trajectory.load(tmp_path / "missing.parquet")
+
+
+@pytest.mark.parametrize("other", [trajectory.FORMAT - 1, trajectory.FORMAT + 1])
+def test_files_of_another_format_are_refused(run, tmp_path, monkeypatch, other):
+    with monkeypatch.context() as patch:
+        patch.setattr(trajectory, "FORMAT", other)
+        run.save(tmp_path / "run.parquet")
+    with pytest.raises(InputError, match="it has another format"):
+        Trajectory.load(tmp_path / "run.parquet")
 
 
 def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
