@@ -99,6 +99,32 @@ def test_lanes_of_a_group_run_in_each_as_far_as_it_draws():
         np.testing.assert_array_equal(observations[i], env.step(actions[i])[0])
 
 
+def test_figures_are_those_of_the_lanes_that_end_whatever_task_each_runs():
+    """The middle lane runs an episode of its own speed; the others end later."""
+    settings = LIVELY | {"speed_kmh": 200, "distance": 20.0}
+    vector = make("PantographStiffness-v0", 3, **settings)
+    vector.reset(seed=5)
+    faster = {"reset_mask": np.array([False, True, False]), "speed_kmh": 300}
+    vector.reset(options=faster)
+    singles = [gymnasium.make("panto_env:PantographStiffness-v0", **settings) for _ in range(3)]
+    for i, env in enumerate(singles):
+        env.reset(seed=5 + i)
+    singles[1].reset(options={"speed_kmh": 300})
+    over, still = [], np.zeros((3, 1), np.float32)
+    while len(over) < 3:
+        *_, infos = vector.step(still)
+        alone = {i: env.step(still[i]) for i, env in enumerate(singles) if i not in over}
+        ended = {i: info["figures"] for i, (*_, truncated, info) in alone.items() if truncated}
+        assert ("figures" in infos) == bool(ended)
+        for i in range(3 if ended else 0):
+            assert infos["_figures"][i] == (i in ended)
+            figures = {key: values[i] for key, values in infos["figures"].items() if key[0] != "_"}
+            expected = ended.get(i, dict.fromkeys(figures, 0.0))
+            assert figures == pytest.approx(expected, rel=1e-9, nan_ok=True)
+        over += list(ended)
+    assert over == [1, 0, 2]
+
+
 def test_autoreset_modes_are_declared_and_kept():
     same = make(distance=10.0, autoreset_mode="SameStep")
     assert same.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
