@@ -256,6 +256,10 @@ def test_plot_shows_what_varies():
     assert list(lines.axes[1].lines[0].get_ydata()) == passive[300.0]
     assert "speed_kmh = 300" in lines.get_suptitle()
     assert "spans 10-19" in lines.get_suptitle()
+    assert "ended early" not in lines.get_suptitle()
+    over = [{**row, "terminated": row is one_speed[0]} for row in one_speed]
+    early = plot_sweep(over, ["catenary.mean_stiffness", "speed_kmh"])
+    assert "1 of 4 passes ended early and are not shown" in early.get_suptitle()
 
 
 def test_a_plot_names_parameters_in_words_with_their_units():

@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 
 import numpy as np
 import pytest
@@ -210,6 +211,12 @@ def test_drawn_lines_are_plausible():
         both = line.contact_wire.tension + line.messenger_wire.tension
         assert 1.0 < one.elasticity / (line.span_length / (4 * both)) < 1.4
         assert one.elasticity == pytest.approx(elasticity(line, 120.0)[1].max(), rel=0.1)
+
+
+def test_the_time_that_a_draw_takes_is_in_milliseconds(monkeypatch):
+    clock = iter([5.0, 5.25])
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock, 9.0))
+    assert drawn_line(FAMILY, 0).milliseconds == 250.0
 
 
 @pytest.mark.study
