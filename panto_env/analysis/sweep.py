@@ -223,6 +223,7 @@ def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
         "policy": one_pass.policy,
         "catenary": run.catenary,
         "pantograph": run.pantograph,
+        "system": run.line.system,
         "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
         **{name: run.settings[name] for name in DISCRETISATION},

@@ -101,7 +101,7 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
     """Draw the line of no contact, and EN 50367's maximum force and σ; σ at the first policy's mean force."""
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
-    limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]
+    limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
     force.plot(values, limits, drawstyle="steps-pre", **style)
     std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)

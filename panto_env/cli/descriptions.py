@@ -14,7 +14,7 @@ from ..base.names import suggest
 from ..catalog import available, load_catenary, load_family, load_pantograph
 from ..catalog.family import LineFamily
 from ..catalog.loader import SCHEMAS
-from ..catalog.values import values_of
+from ..catalog.values import by_value, values_of
 from ..plant.actuators import ACTUATOR_PRESETS
 from ..plant.catenary.schema import CatenaryData
 from ..plant.line_condition import LINE_CONDITIONS
@@ -86,7 +86,7 @@ def _family_of(path: str) -> str:
 def _entry(family: str, entry: Entry) -> Description:
     rows = [(each.key, str(each.value), each.meaning, each.source) for each in values_of(entry)]
     headings = ("key", "value", "meaning", "source")
-    return Description(family, entry.name, entry.description, headings, rows, entry.model_dump())
+    return Description(family, entry.name, entry.description, headings, rows, by_value(entry))
 
 
 def _policy(name: str) -> Description:

@@ -87,8 +87,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
-    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the reward is
-    then charged for the rest of the run as if without contact.
+    is lost for 0.5 s, the contact wire takes up all its room at a support, or the two wires touch; the
+    reward is then charged for the rest of the run as if without contact.
 
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the

@@ -95,7 +95,7 @@ def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Mom
         force=contact.force,
         filtered=contact.filtered,
         nominal_force=float(own[Row.NOMINAL_FORCE]),
-        largest_force=en50367.maximum_limit(speed),
+        largest_force=en50367.maximum_limit(speed, plant.catenary.system),
         actuators={place: float(own[Row.FRAME_FORCE + place]) for place in task.actuator.places},
         force_limit=task.actuator.force_limit,
         figures=figures,

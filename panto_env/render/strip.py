@@ -38,7 +38,7 @@ class Strip:
         self._felt, self._position = felt(task, 0, SPANS), position_of(task, 0)
         self._alignment = plant.alignment
         self._time = plant.of(0, Row.STEP) * plant.time_step
-        self._limit = en50367.maximum_limit(float(task.speed[0]))
+        self._limit = en50367.maximum_limit(float(task.speed[0]), plant.catenary.system)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = max(NARROW, min(options.max_width, WIDE))
