@@ -12,8 +12,10 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import typer
 
 from ..base.errors import InputError
+from ..base.table_file import TABLES
 from ..control.settings import fields
 from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
+from ..terminal import writable
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""
@@ -32,6 +34,20 @@ Spans = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
+FiguresFile = Annotated[
+    str | None,
+    typer.Option(
+        help=f"Write figures and requirements to this file ({', '.join(TABLES)}).", callback=writable(TABLES)
+    ),
+]
+DroppersFile = Annotated[
+    str | None,
+    typer.Option(
+        help=f"Write the droppers' forces at rest and in the run, lengths and stretches to this file "
+        f"({', '.join(TABLES)}).",
+        callback=writable(TABLES),
+    ),
+]
 Command = Callable[..., None]
 
 

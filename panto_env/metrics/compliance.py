@@ -60,7 +60,8 @@ def compliance(
     """All criteria of a run, then additional values without limits.
 
     arcing: NQ (%). speed: of the train (m/s). mean_span: mean length of a span (m). tension, tension_near:
-    all samples of all droppers, and those of the train's present span (N), empty where not recorded.
+    all samples of the droppers of the evaluated spans, and those while the train is in their span (N), empty
+    where not recorded.
     """
     return [
         *en50367.criteria(figures, arcing, speed, line.system, line.system_source),

@@ -368,7 +368,7 @@ def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> Non
         (["q"], "Unknown policy 'q'"),
         (["p", "--catenary", "nowhere"], "Unknown catenary"),
         (["p", "--actuator", "strong"], "key 'actuator'"),
-        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .parquet"),
+        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .xlsx, .parquet"),
         (["p", "--html", "out.txt"], "out.txt must end in .html"),
         (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
     ],
