@@ -184,7 +184,7 @@ def _in_panel(name: str, annotation: Any) -> Any:
 
 
 def _place(parameter: inspect.Parameter) -> tuple[int, bool]:
-    """Place of a parameter in the help: arguments, then options by panel; the discretisation ends its panel."""
+    """Place of a parameter in the help: arguments, then options by panel, the discretisation at its end."""
     panels = [getattr(each, "rich_help_panel", None) for each in get_args(parameter.annotation)]
     place = next((PANELS.index(panel) for panel in panels if panel in PANELS), -1)
     return place, parameter.name in Numerics.model_fields
