@@ -68,10 +68,11 @@ def simulate(
     with written_last() as later:
         if output is not None:
             later(trajectory.save, output, None if trajectory.terminated else chosen)
-        if figures is not None:
-            later(save_figures, [trajectory], figures, chosen)
-        if droppers is not None:
-            later(save_droppers, [trajectory], droppers, chosen)
+        for write, path in ((save_figures, figures), (save_droppers, droppers)):
+            if path is not None and trajectory.terminated:
+                say(f"{path} is not written, since the run has no figures.")
+            elif path is not None:
+                later(write, [trajectory], path, chosen)
         if plot is not None:
             later(save, plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
         _print(trajectory, chosen, json)

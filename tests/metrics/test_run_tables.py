@@ -4,6 +4,7 @@ import pandas
 import pytest
 
 from panto_env import InputError, Trajectory, simulate
+from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics.droppers import moving_droppers
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import low_pass
@@ -138,3 +139,17 @@ def test_a_sweep_has_units_in_its_headings(tmp_path):
         assert frame["speed (km/h)"].tolist() == [250, 250]
         assert {"mean (N)", "std (N)", "contact_loss (%)", "max_uplift (m)", "time_step (s)"} <= set(frame)
         assert frame["mean (N)"].notna().all()
+
+
+def test_a_run_that_ends_early_still_ends_with_1_and_writes_no_figures(tmp_path):
+    """Of a line with next to no room at its supports."""
+    text = (FOLDERS["catenary"] / "en50318-2002.toml").read_text()
+    assert "free_uplift = { value = 0.24" in text
+    (tmp_path / "low.toml").write_text(
+        text.replace("free_uplift = { value = 0.24", "free_uplift = { value = 0.02")
+    )
+    files = ("--figures", "figures.csv", "--droppers", "droppers.csv", "--output", "run.xlsx")
+    result = panto("simulate", "--catenary", "low.toml", *files, cwd=tmp_path)
+    assert result.returncode == 1, result.stderr
+    assert "figures.csv is not written, since the run has no figures" in result.stderr
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["low.toml", "run.xlsx"]
