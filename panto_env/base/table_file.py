@@ -81,7 +81,8 @@ def _write_csv(sheet: Sheet, path: str | Path) -> None:
 
     columns = [pa.array(_harmless(column), from_pandas=True) for column in sheet.columns.values()]
     table = pa.Table.from_arrays(columns, [_apart(title) for title in sheet.titles])
-    texts = [cell for column in sheet.columns.values() for cell in column if isinstance(cell, str)]
+    lists = [column for column in sheet.columns.values() if not hasattr(column, "dtype")]
+    texts = [cell for column in lists for cell in column if isinstance(cell, str)]
     plain = all(text.isascii() for text in (*sheet.titles, *texts))
     with write_whole(path) as temporary, temporary.open("wb") as file:
         file.write(b"" if plain else codecs.BOM_UTF8)  # without it Excel garbles all but ASCII
