@@ -93,8 +93,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
     actuators (N), position (m), speed (km/h), the reward's terms, and the cost of safe learning: the share of
-    the step without contact, with an uplift beyond half the room at a support, and with a low-passed contact
-    force beyond EN 50367's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
+    the step without contact, with an uplift beyond its limit at a support, and with a low-passed contact
+    force beyond the line's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
     of an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
     end. `trajectory.summary()` has those of whole spans after the start has died out, which the benchmark
     compares. Until the end they are infinite; a figure that the run does not have, such as uplift where no
