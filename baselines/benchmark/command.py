@@ -66,7 +66,7 @@ def benchmark(
     output: Annotated[
         str | None,
         typer.Option(
-            help="File to write: everything as .json, or the passes as .csv or .parquet.",
+            help="File to write: everything as .json, or the passes as .csv, .xlsx or .parquet.",
             callback=writable(SUFFIXES, announced=False),
         ),
     ] = None,

@@ -80,8 +80,9 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    limit = en50367.maximum_limit(from_kmh(speed))
-    axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label="limit of EN 50367")
+    limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
+    words = f"limit of {en50367.maximum_source(run.line.system)}"
+    axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
     axes.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
     mark_supports(axes, run)
     axes.set(

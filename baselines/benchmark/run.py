@@ -11,13 +11,15 @@ from typing import Any
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
 from panto_env.base.checksums import write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import TABLES, check_output, finite, write_rows
+from panto_env.base.files import check_output, finite
 from panto_env.base.machine import cores
+from panto_env.base.table_file import TABLES, write_rows
 from panto_env.base.version import __version__
 from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import far_enough, run_settings
+from panto_env.metrics.labels import HEADINGS
 from panto_env.metrics.spans import FIRST_SETTLED
 
 from ..oracle.stored import stored_ratio
@@ -27,7 +29,7 @@ from .controls import ORACLE_TAPE, policy_of
 from .overall import Standing, standings
 from .seeds import salt_hash
 from .settings import BenchmarkSettings, Line
-from .single_pass import Pass, Row, along, oracle_tape, run_pass
+from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
 from .statistics import Cell, LineAtSpeed, compare
 from .trace import Trace
 
@@ -65,13 +67,13 @@ class Benchmark:
         return table
 
     def save(self, path: str | Path) -> None:
-        """Write a file, whole or not at all: everything as JSON, or the rows as CSV or Parquet.
+        """Write a file, whole or not at all: everything as JSON, or the rows as CSV, Excel or Parquet.
 
         The actions of all passes are written beside a JSON.
         """
         check_output(path, SUFFIXES)
         if Path(path).suffix.lower() != ".json":
-            write_rows([row.as_dict() for row in self.rows], path)
+            write_rows([row.as_dict() for row in self.rows], path, HEADINGS | ROW_HEADINGS)
             return
         write_checked(path, self.as_dict())
         actions.save(self.played, actions.beside(path))

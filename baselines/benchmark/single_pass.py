@@ -34,6 +34,16 @@ FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
 
 
+ROW_HEADINGS = {
+    "action_rate": "action_rate (N/s)",
+    "saturation": "saturation (-)",
+    "power": "power (W)",
+    "pressed_std": "pressed_std (N)",
+    "pressed_cost_function": "pressed_cost_function (N m)",
+}
+"""Headings with units, in files of tables, of the figures that ``Row`` has beside those of a run."""
+
+
 @dataclass(frozen=True)
 class Row:
     """Figures of one pass; all are nan if it ended early (``terminated``)."""

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from panto_env.analysis.options import DroppersFile, FiguresFile
 from panto_env.base.errors import InputError
 from panto_env.base.files import PAGES, check_output
 from panto_env.base.shown import harmless
@@ -24,6 +25,8 @@ def report(
     output: Annotated[
         Path | None, typer.Option(help="Page to write; the first file's name with .html by default.")
     ] = None,
+    figures: FiguresFile = None,
+    droppers: DroppersFile = None,
     markdown: Annotated[
         bool,
         typer.Option("--markdown", help="Print each track's table for a document; write no page."),
@@ -38,13 +41,18 @@ def report(
 
     kinds = {file.suffix.lower() for file in files}
     if kinds == {".parquet"} and not markdown:
-        _of_runs(files, output)
+        _of_runs(files, output, figures, droppers)
         return
     if kinds != {".json"}:
         odd = next((file for file in files if file.suffix.lower() != ".json"), files[0])
         raise InputError(
             f"{odd}: give either runs (.parquet) or results of the benchmark (.json), not both"
             f"{'; --markdown takes results of the benchmark' if markdown else ''}."
+        )
+    if figures is not None or droppers is not None:
+        raise InputError(
+            "--figures and --droppers are for runs (.parquet); the passes of a benchmark are written by "
+            "`panto benchmark --output`."
         )
     if markdown:
         from .summary import summary
@@ -59,11 +67,17 @@ def report(
     console.print(f"The page is {path}.", markup=False, highlight=False, soft_wrap=True)
 
 
-def _of_runs(files: list[Path], output: Path | None) -> None:
-    from panto_env import report
+def _of_runs(files: list[Path], output: Path | None, figures: str | None, droppers: str | None) -> None:
+    from panto_env import Trajectory, report
+    from panto_env.metrics.run_tables import save_droppers, save_figures
 
     path = files[0].with_suffix(PAGES[0]) if output is None else output
     check_output(path, PAGES)
     announce_overwriting(path)
     report.save(files, path)
     console.print(f"The report is {path}.", markup=False, highlight=False, soft_wrap=True)
+    runs = [Trajectory.load(file) for file in files] if figures or droppers else []
+    if figures is not None:
+        save_figures(runs, figures)
+    if droppers is not None:
+        save_droppers(runs, droppers)

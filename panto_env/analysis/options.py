@@ -6,20 +6,59 @@ import inspect
 import re
 import types
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import wraps
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from ..base.errors import InputError
+from ..base.table_file import TABLES
 from ..control.settings import fields
 from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
+from ..plant.numerics import Numerics
+from ..terminal import writable
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""
 OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 """Options in another unit than the setting: the setting's unit, the option's unit, and the factor."""
 SIMPLE = (bool, int, float, str)
+LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS = (
+    "Line",
+    "Pantograph",
+    "Run",
+    "Output",
+    "Control and learning",
+)
+"""Panels of the help, in its order."""
+LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS
+PANEL_OF = {
+    **dict.fromkeys(("catenary", "line_condition", "spans"), LINE),
+    **dict.fromkeys(("pantograph", "mean_force", "pantograph_scatter", "actuator", "sensors"), PANTOGRAPH),
+    **dict.fromkeys(
+        (
+            "control_interval",
+            "washout",
+            "observation",
+            "harmonics",
+            "history",
+            "line_values",
+            "normalise",
+            "estimator",
+            "known_pantograph",
+            "reward",
+            "cost",
+            "settle",
+        ),
+        LEARNING,
+    ),
+}
+"""Panels of settings; others are in that of the run."""
+OUTPUTS = {"output", "figures", "droppers", "plot", "html", "force", "live", "json"}
+OUTPUTS |= {"first_span", "seconds", "slow_motion", "size"}  # of a film
+"""Options of commands in the panel of the output; others that a command has itself are in that of the run."""
 
 SPAN = re.compile("[0-9]{1,9}")
 """Number of a span; Python would also accept the digits of other alphabets."""
@@ -32,6 +71,20 @@ Spans = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of irregularity and noise.")]
+FiguresFile = Annotated[
+    str | None,
+    typer.Option(
+        help=f"Write figures and requirements to this file ({', '.join(TABLES)}).", callback=writable(TABLES)
+    ),
+]
+DroppersFile = Annotated[
+    str | None,
+    typer.Option(
+        help=f"Write the droppers' forces at rest and in the run, lengths and stretches to this file "
+        f"({', '.join(TABLES)}).",
+        callback=writable(TABLES),
+    ),
+]
 Command = Callable[..., None]
 
 
@@ -57,12 +110,10 @@ def with_settings(
 
         hints = get_type_hints(command, include_extras=True)
         own = [
-            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
-            for parameter in list(inspect.signature(command).parameters.values())[1:]
+            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=_in_panel(name, hints[name]))
+            for name, parameter in list(inspect.signature(command).parameters.items())[1:]
         ]
-        required = [parameter for parameter in own if parameter.default is inspect.Parameter.empty]
-        optional = [parameter for parameter in own if parameter.default is not inspect.Parameter.empty]
-        parameters = [*required, *(_option(name, defaults) for name in names), *optional]
+        parameters = sorted((*(_option(name, defaults) for name in names), *own), key=_place)
         with_options.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         with_options.__annotations__ = {each.name: each.annotation for each in parameters}
         return with_options
@@ -111,13 +162,32 @@ def _option(name: str, defaults: bool) -> inspect.Parameter:
         text += f" Default: {field.default}."
     option = RENAMED.get(name, name)
     flag = [f"--{option.replace('_', '-')}"] if kind is bool else []
-    info = typer.Option(*flag, help=text)
+    info = typer.Option(*flag, help=text, rich_help_panel=PANEL_OF.get(name, RUN))
     return inspect.Parameter(
         option,
         inspect.Parameter.KEYWORD_ONLY,
         default=None,
         annotation=Annotated[kind | None, info],  # type: ignore[operator]
     )
+
+
+def _in_panel(name: str, annotation: Any) -> Any:
+    """The annotation of a command's own parameter with its panel, if it is an option."""
+    if get_origin(annotation) is not Annotated:
+        return annotation
+    kind, info, *rest = get_args(annotation)
+    if not isinstance(info, OptionInfo):
+        return annotation
+    info = copy(info)  # of options that commands share
+    info.rich_help_panel = OUTPUT if name in OUTPUTS else RUN
+    return Annotated[kind, info, *rest]
+
+
+def _place(parameter: inspect.Parameter) -> tuple[int, bool]:
+    """Place of a parameter in the help: arguments, then options by panel, the discretisation at its end."""
+    panels = [getattr(each, "rich_help_panel", None) for each in get_args(parameter.annotation)]
+    place = next((PANELS.index(panel) for panel in panels if panel in PANELS), -1)
+    return place, parameter.name in Numerics.model_fields
 
 
 def _to_setting(name: str, value: Any) -> Any:

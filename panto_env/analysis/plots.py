@@ -123,8 +123,8 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     """Draw the contact force and its limits; shown: samples, (n,); raw: colour of the unfiltered force."""
     position = run.position[shown]
     filtered = zero_phase_low_pass(run.contact_force, run.time_step)[shown]
-    limit = en50367.maximum_limit(run.speed)
-    words = f"EN 50367: at most {limit:g} N"
+    limit = en50367.maximum_limit(run.speed, run.line.system)
+    words = f"{en50367.maximum_source(run.line.system)}: at most {limit:g} N"
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
     axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")
     axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")

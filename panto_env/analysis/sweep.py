@@ -16,10 +16,12 @@ from ..base.errors import InputError
 from ..base.names import hint
 from ..base.settings import Settings
 from ..base.shown import shown
+from ..base.table_file import write_rows
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
+from ..metrics.labels import HEADINGS
 from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_label, parameter_names
@@ -95,6 +97,18 @@ def sweep(
     return in_threads(
         [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
     )
+
+
+def save(rows: Sequence[Row], path: str | Path, **settings: Any) -> None:
+    """Write the rows of a sweep as CSV, Excel or Parquet, by the file's suffix, whole or not at all.
+
+    settings: those of the sweep, for the units of the swept values. CSV and Excel have units in the headings,
+    all values are in SI units but for the speed (km/h).
+    """
+    swept = list(rows[0])[: list(rows[0]).index(POLICY)] if rows else []
+    units = {name: label[label.rfind(" (") :] for name, label in labels(swept, **settings).items()}
+    headings = {name: f"{name}{units[name]}" for name in swept if units[name].endswith(")")}
+    write_rows(rows, path, headings | HEADINGS)
 
 
 def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
@@ -223,6 +237,7 @@ def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
         "policy": one_pass.policy,
         "catenary": run.catenary,
         "pantograph": run.pantograph,
+        "system": run.line.system,
         "speed_kmh": one_pass.arguments["speed_kmh"],
         "seed": run.seed,
         **{name: run.settings[name] for name in DISCRETISATION},

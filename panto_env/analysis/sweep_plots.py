@@ -87,7 +87,7 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
     handles = [
         Line2D([], [], color="0.3", linestyle=style, label=name) for name, (_, style) in FORCES.items()
     ]
-    words = f"EN 50367: maximum; σ of 0.3 F_m ({next(iter(by_policy))})"
+    words = f"{en50367.maximum_source(rows[0]['system'])}: maximum; σ of 0.3 F_m ({next(iter(by_policy))})"
     handles.append(Line2D([], [], color=LIMIT, linestyle=DASHES, linewidth=0.9, label=words))
     handles += [
         Line2D([], [], color=series_colour(k), marker=".", label=name) for k, name in enumerate(by_policy)
@@ -98,10 +98,10 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
 
 
 def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) -> None:
-    """Draw the line of no contact, and EN 50367's maximum force and σ; σ at the first policy's mean force."""
+    """Draw the line of no contact, and the maximum force and σ; σ at the first policy's mean force."""
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
-    limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]
+    limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
     force.plot(values, limits, drawstyle="steps-pre", **style)
     std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)

@@ -1,4 +1,4 @@
-"""Files: reading TOML with clear errors, writing whole or not at all, tables of rows, data fit for JSON."""
+"""Files: reading TOML with clear errors, writing whole or not at all, data fit for JSON."""
 
 from __future__ import annotations
 
@@ -88,8 +88,6 @@ def _reason(error: OSError | ValueError) -> str:
     return os.strerror(number) if number else str(error).rstrip(".")
 
 
-TABLES = (".csv", ".parquet")
-"""Suffixes of files for tables of rows."""
 PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of files for plots."""
 PAGES = (".html",)
@@ -141,23 +139,6 @@ def make_folder(path: str | Path) -> None:
     except (OSError, ValueError) as error:
         raise InputError(f"The folder {path} cannot be made: {_reason(error)}.") from error
     _try(Path(path) / "trial", f"Nothing can be written into the folder {path}")
-
-
-def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
-    """Write rows of the same keys as CSV or Parquet, by the file's suffix, whole or not at all."""
-    check_output(path, TABLES)
-    import pyarrow as pa  # slow to import
-
-    table = pa.Table.from_pylist(rows)
-    with write_whole(path) as temporary:
-        if temporary.suffix.lower() == ".csv":
-            from pyarrow.csv import write_csv
-
-            write_csv(table, temporary)
-        else:
-            from pyarrow.parquet import write_table
-
-            write_table(table, temporary, write_page_checksum=True)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

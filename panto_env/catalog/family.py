@@ -16,7 +16,7 @@ from ..base.units import to_kmh
 from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang
-from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS
+from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, PowerSystem
 from .line_ranges import (
     DampingRanges,
     DropperRanges,
@@ -67,6 +67,7 @@ class LineFamily(Settings):
     max_speed_kmh: Annotated[float, Between(1, 2000, "km/h")] = Field(
         description="maximum speed of trains (km/h)"
     )
+    system: PowerSystem = Field("AC", description="power supply of the lines, as of a single line")
     spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
     span_length: Range[Annotated[float, Between(2, LONGEST_SPAN, "m")]] = Field(
         description="distance between supports (m)"
@@ -136,6 +137,7 @@ class LineFamily(Settings):
             random.uniform(*ends) for ends in (self.steady_arm.mass, self.steady_arm.stiffness)
         )
         return {
+            "system": self.system,
             "span_length": span,
             "spans": self.spans,
             "encumbrance": span * random.uniform(*self.encumbrance),
@@ -170,5 +172,5 @@ class LineFamily(Settings):
             return None
         if hang(line).dropper_length.min() < self.droppers.shortest:
             return None
-        sources = {each.key: f"drawn from {name}" for each in values_of(line)}
+        sources = {each.key: each.source or f"drawn from {name}" for each in values_of(line)}
         return line.model_copy(update={"sources": sources})

@@ -17,6 +17,7 @@ from ..base.plain_characters import show_always
 from ..base.shown import one_line
 from ..base.standard_streams import guarded_streams, say
 from ..base.version import __version__
+from .panels import PanelGroup
 
 UsageError: Any = typer.BadParameter.__base__
 """Click's class, which older releases of Typer import and newer ones include."""
@@ -109,6 +110,7 @@ def make_app() -> typer.Typer:
 
     app = typer.Typer(
         name="panto",
+        cls=PanelGroup,
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,

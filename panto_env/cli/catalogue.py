@@ -9,8 +9,10 @@ import typer
 from rich.table import Table
 
 from ..base.errors import InputError
+from ..base.table_file import TABLES, write_rows
 from ..catalog.loader import text_of
-from ..terminal import Json, console, print_json
+from ..plant.catenary.flexible.dropper_table import HEADINGS, dropper_table
+from ..terminal import Json, console, print_json, print_table, writable
 from .descriptions import LOADERS, POLICY, PRESETS, Description, described, everything
 
 
@@ -26,9 +28,20 @@ def list_entries(
         bool,
         typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from."),
     ] = False,
+    droppers: Annotated[
+        str | None,
+        typer.Option(
+            help="Write the droppers of the line at rest, with force, length and stretch, to this file "
+            f"({', '.join(TABLES)}).",
+            callback=writable(TABLES),
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """List lines, pantographs, policies and presets, or all values of one with their source or default."""
+    """List lines, pantographs, policies and presets, or all values of one with their source or default.
+
+    Of a line with droppers, also their force, length and stretch at rest.
+    """
     if toml:
         if name is None:
             raise InputError("Give the name of a line or a pantograph: panto list en50318-2002 --toml.")
@@ -36,12 +49,16 @@ def list_entries(
         return
     if name is not None:
         found = described(name)
+        if droppers is not None:
+            _write_droppers(found, name, droppers)
         if json:
             print_json({each.family: each.data for each in found})
         else:
             for each in found:
                 _print(each)
         return
+    if droppers is not None:
+        raise InputError("Give the name of a line: panto list en50318-2002 --droppers droppers.csv.")
     families = everything()
     if json:
         print_json(
@@ -81,6 +98,15 @@ def _print(each: Description) -> None:
         for row in each.rows:
             table.add_row(*row)
         console.print(table)
+    if each.droppers:
+        print_table(dropper_table(each.droppers))
+
+
+def _write_droppers(found: list[Description], name: str, path: str) -> None:
+    rows = [dropper._asdict() for each in found for dropper in each.droppers]
+    if not rows:
+        raise InputError(f"'{name}' is not a line with droppers, so there is no table of them.")
+    write_rows(rows, path, HEADINGS)
 
 
 def _table(family: str, *headings: str) -> Table:

@@ -14,8 +14,9 @@ from ..base.names import suggest
 from ..catalog import available, load_catenary, load_family, load_pantograph
 from ..catalog.family import LineFamily
 from ..catalog.loader import SCHEMAS
-from ..catalog.values import values_of
+from ..catalog.values import by_value, values_of
 from ..plant.actuators import ACTUATOR_PRESETS
+from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
 from ..plant.catenary.schema import CatenaryData
 from ..plant.line_condition import LINE_CONDITIONS
 from ..plant.pantograph.schema import PantographData
@@ -46,6 +47,7 @@ class Description(NamedTuple):
     headings: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     data: Any  # the same content for JSON
+    droppers: Sequence[RestingDropper] = ()  # of a span of a line
 
 
 def everything() -> dict[str, list[Description]]:
@@ -86,7 +88,9 @@ def _family_of(path: str) -> str:
 def _entry(family: str, entry: Entry) -> Description:
     rows = [(each.key, str(each.value), each.meaning, each.source) for each in values_of(entry)]
     headings = ("key", "value", "meaning", "source")
-    return Description(family, entry.name, entry.description, headings, rows, entry.model_dump())
+    droppers = droppers_at_rest(entry)
+    data = by_value(entry) | ({"droppers_at_rest": [each._asdict() for each in droppers]} if droppers else {})
+    return Description(family, entry.name, entry.description, headings, rows, data, droppers)
 
 
 def _policy(name: str) -> Description:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import InputError
-from ..base.files import TABLES, write_rows
 from ..base.table import Alarm, Table
+from ..base.table_file import TABLES, Sheet, write_table
 from ..base.units import from_kmh
 from ..terminal import (
     Json,
@@ -84,7 +84,9 @@ def estimate(
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option(help="Write the estimate to this .csv or .parquet file.", callback=writable(TABLES)),
+        typer.Option(
+            help=f"Write the estimate to this file ({', '.join(TABLES)}).", callback=writable(TABLES)
+        ),
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -136,7 +138,7 @@ def estimate(
     scores = _scores(motion, found)
     with written_last() as later:
         if output is not None:
-            later(write_rows, _rows(found), output)
+            later(write_table, _sheet(found), output)
         if plot is not None:
             from ..analysis.plots import save
             from ..estimation.plots import plot_estimate
@@ -164,16 +166,13 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
     return nominal
 
 
-def _rows(found: Estimate) -> list[dict[str, Any]]:
+def _sheet(found: Estimate) -> Sheet:
     from ..estimation.innovations import nis
 
     normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
     columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
-    names = list(columns)
-    return [
-        dict(zip(names, row, strict=True))
-        for row in zip(*(each.tolist() for each in columns.values()), strict=True)
-    ]
+    units = {"time": "time (s)", "contact_force": "contact_force (N)", "nis": "nis (-)"}
+    return Sheet("estimate", columns, units)
 
 
 def _figures(found: Estimate) -> dict[str, float]:

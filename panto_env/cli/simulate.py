@@ -11,12 +11,13 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from ..analysis.options import Seed, Spans, parse_spans, with_settings
+from ..analysis.options import DroppersFile, FiguresFile, Seed, Spans, parse_spans, with_settings
 from ..analysis.requirements import print_criteria
 from ..base.standard_streams import say
 from ..metrics.labels import LABELS
+from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.spans import SpanChoice, in_words
-from ..metrics.trajectory import SUFFIXES, Trajectory
+from ..metrics.trajectory import OUTPUTS, Trajectory
 from ..terminal import (
     Json,
     Plot,
@@ -41,8 +42,13 @@ def simulate(
     seed: Seed = 0,
     output: Annotated[
         str | None,
-        typer.Option(help="Save the run to this Parquet file (.parquet).", callback=writable(SUFFIXES)),
+        typer.Option(
+            help="Save the run to this file: .parquet, which other commands read, .csv or .xlsx.",
+            callback=writable(OUTPUTS),
+        ),
     ] = None,
+    figures: FiguresFile = None,
+    droppers: DroppersFile = None,
     plot: Plot = None,
     live: Annotated[
         bool, typer.Option("--live", help="Draw force and heights in the terminal during the run.")
@@ -61,7 +67,12 @@ def simulate(
         )
     with written_last() as later:
         if output is not None:
-            later(trajectory.save, output)
+            later(trajectory.save, output, None if trajectory.terminated else chosen)
+        for write, path in ((save_figures, figures), (save_droppers, droppers)):
+            if path is not None and trajectory.terminated:
+                say(f"{path} is not written, since the run has no figures.")
+            elif path is not None:
+                later(write, [trajectory], path, chosen)
         if plot is not None:
             later(save, plot_run(trajectory, "all" if trajectory.terminated else chosen), plot)
         _print(trajectory, chosen, json)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from math import isfinite
 from typing import Annotated, Any
 
@@ -13,9 +14,10 @@ from rich.table import Table
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.pool import MOST_PASSES
 from ..analysis.sweep import SPEED, labels
+from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
 from ..base.errors import InputError
-from ..base.files import TABLES, write_rows
+from ..base.table_file import TABLES
 from ..base.version import __version__
 from ..control.identity import plain
 from ..control.settings import run_settings
@@ -47,7 +49,7 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
     output: Annotated[
         str | None,
-        typer.Option(help="Save the table to this .csv or .parquet file.", callback=writable(TABLES)),
+        typer.Option(help=f"Save the table to this file ({', '.join(TABLES)}).", callback=writable(TABLES)),
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -73,7 +75,7 @@ def sweep(
         )
     with written_last() as later:
         if output is not None:
-            later(write_rows, rows, output)
+            later(partial(save_rows, **settings), rows, output)
         if plot is not None:
             later(save, plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
         if json:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.units import to_kmh
+from ..catalog.values import by_value
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
@@ -97,8 +98,8 @@ def trajectory(
         ending=ending(task, lane),
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
         design={
-            "catenary": plant.catenary.model_dump(mode="json"),
-            "pantograph": task.settings.pantograph.model_dump(mode="json"),
+            "catenary": by_value(plant.catenary),
+            "pantograph": by_value(task.settings.pantograph),
         },
     )
 

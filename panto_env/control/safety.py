@@ -8,12 +8,10 @@ from pydantic import Field
 from ..backend import inlined
 from ..base.arrays import Array
 from ..base.settings import NonNegative, Settings
+from ..metrics.compliance import uplift_factor
 from ..metrics.en50367 import maximum_limit
 from ..plant.catenary.schema import CatenaryData
 from .state import NOW, RESULT, TASK_ROW
-
-UPLIFT_SHARE = 0.5
-"""Share of the room at a support that the uplift may take: EN 50119 wants room for twice the uplift."""
 
 
 class CostWeights(Settings):
@@ -23,12 +21,12 @@ class CostWeights(Settings):
     uplift: NonNegative = Field(
         1.0,
         description="weight of the time in which the contact wire, at any support, is lifted by more than "
-        "half of the line's free_uplift (-)",
+        "half of the line's free_uplift, or two thirds where a stop limits it (-)",
     )
     max_force: NonNegative = Field(
         1.0,
         description="weight of the time in which the contact force, behind the low-pass of EN 50317, is "
-        "above EN 50367's maximum (-)",
+        "above the maximum for the line's power supply (-)",
     )
 
     @property
@@ -39,7 +37,8 @@ class CostWeights(Settings):
 
 def limits(catenary: CatenaryData, speeds: Array) -> tuple[float, Array]:
     """Uplift (m) and contact forces (N), (n,), above which a step costs; speeds: (n,), m/s."""
-    return UPLIFT_SHARE * catenary.free_uplift, np.array([maximum_limit(speed) for speed in speeds.tolist()])
+    forces = [maximum_limit(speed, catenary.system) for speed in speeds.tolist()]
+    return catenary.free_uplift / uplift_factor(catenary.uplift_stop), np.array(forces)
 
 
 @inlined

@@ -87,14 +87,14 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact
-    is lost for 0.5 s, the contact wire rises to the steady arm's stop, or the two wires touch; the reward is
-    then charged for the rest of the run as if without contact.
+    is lost for 0.5 s, the contact wire takes up all its room at a support, or the two wires touch; the
+    reward is then charged for the rest of the run as if without contact.
 
     ## Info
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
     actuators (N), position (m), speed (km/h), the reward's terms, and the cost of safe learning: the share of
-    the step without contact, with an uplift beyond half the room at a support, and with a low-passed contact
-    force beyond EN 50367's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
+    the step without contact, with an uplift beyond its limit at a support, and with a low-passed contact
+    force beyond the line's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
     of an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
     end. `trajectory.summary()` has those of whole spans after the start has died out, which the benchmark
     compares. Until the end they are infinite; a figure that the run does not have, such as uplift where no

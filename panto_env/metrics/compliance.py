@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 
 from ..base.arrays import Array
-from ..plant.catenary.schema import CatenaryData
+from ..plant.catenary.schema import BY_DEFAULT, CatenaryData, PowerSystem
 from . import en50367
 from .criterion import Criterion
 from .figures import Figures
+from .labels import LABELS
 
 SHARE_OF_WAVE_SPEED = 0.7
 """Maximum speed of a train relative to the wave speed of the contact wire."""
@@ -21,22 +22,27 @@ WAVE_NOTE = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
 class LineFacts:
     """Data of a line that the criteria of a run depend on."""
 
-    system: str = "AC"  # of power supply
+    system: PowerSystem = "AC"  # power supply
+    system_source: str = BY_DEFAULT
     wave_speed: float = math.inf  # of the contact wire (m/s), infinite where no wave runs along it
     free_uplift: float = math.nan  # room for the uplift at a support (m)
     free_uplift_source: str = ""
+    uplift_stop: bool = False  # whether a stop at the support limits the uplift
     dropper_reflection: float = math.nan  # of a wave at a dropper (-)
     support_reflection: float = math.nan  # of a wave at a support, at the rate of passing them (-)
 
     @classmethod
     def of(cls, line: CatenaryData, wave_speed: float, speed: float) -> LineFacts:
         """Facts of a line with a train on it; both speeds in m/s."""
+        room = line.source_of("free_uplift")
         dropper, support = line.reflections(speed / line.alignment().mean_length)
         return cls(
             system=line.system,
+            system_source=line.source_of("system"),
             wave_speed=wave_speed,
             free_uplift=line.free_uplift,
-            free_uplift_source=line.sources.get("free_uplift", "default (recalled)"),
+            free_uplift_source=f"{room}, recalled" if room == BY_DEFAULT else room,
+            uplift_stop=line.uplift_stop,
             dropper_reflection=dropper,
             support_reflection=support,
         )
@@ -54,22 +60,41 @@ def compliance(
     """All criteria of a run, then additional values without limits.
 
     arcing: NQ (%). speed: of the train (m/s). mean_span: mean length of a span (m). tension, tension_near:
-    all samples of all droppers, and those of the train's present span (N), empty where not recorded.
+    all samples of the droppers of the evaluated spans, and those while the train is in their span (N), empty
+    where not recorded.
     """
     return [
-        *en50367.criteria(figures, arcing, speed, line.system),
+        *en50367.criteria(figures, arcing, speed, line.system, line.system_source),
+        _minimum(figures),
         *_uplift(figures, line),
         *_waves(line, speed, speed / mean_span),
         *_droppers(tension, tension_near),
     ]
 
 
+def _minimum(figures: Figures) -> Criterion:
+    label = LABELS["min"]
+    source = "EN 50119, recalled"
+    return Criterion("min", label.name, label.unit, figures.min, 0.0, None, source, strict=True)
+
+
 def _uplift(figures: Figures, line: LineFacts) -> list[Criterion]:
     if math.isnan(figures.max_uplift) or math.isnan(line.free_uplift):
         return []
-    twice, room = 2e3 * figures.max_uplift, 1e3 * line.free_uplift
-    note = f"of the supports; limit: the room up to the steady arm's stop, {line.free_uplift_source}"
-    return [Criterion("uplift", "twice the uplift", "mm", twice, None, room, "EN 50119, recalled", note)]
+    factor = uplift_factor(line.uplift_stop)
+    value, room = 1e3 * factor * figures.max_uplift, 1e3 * line.free_uplift
+    name = f"{'twice' if factor == 2 else f'{factor:g} times'} the uplift"
+    limited = "a stop limits" if line.uplift_stop else "no stop limits"
+    note = f"maximum of the supports; {limited} it; limit: the room there ({line.free_uplift_source})"
+    return [Criterion("uplift", name, "mm", value, None, room, "EN 50119, recalled", note)]
+
+
+def uplift_factor(stopped: bool) -> float:
+    """Room for the uplift at a support that EN 50119 requires, over that uplift (recalled).
+
+    stopped: whether a stop limits the uplift.
+    """
+    return 1.5 if stopped else 2.0
 
 
 def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:

@@ -22,6 +22,7 @@ class Criterion:
     highest: float | None = None
     source: str = ""  # of the limits: the standard, and whether it was seen or is recalled
     note: str = ""  # meaning of value and limits
+    strict: bool = False  # whether a value equal to a limit breaks it
 
     @property
     def margin(self) -> float:
@@ -36,7 +37,9 @@ class Criterion:
     @property
     def kept(self) -> bool | None:
         """Whether the limits are kept; None without a limit."""
-        return None if math.isnan(self.margin) else self.margin >= 0
+        if math.isnan(self.margin):
+            return None
+        return self.margin > 0 if self.strict else self.margin >= 0
 
     @property
     def heading(self) -> str:
@@ -80,13 +83,16 @@ def remarks(criteria: Sequence[Criterion]) -> list[str]:
 
 def limits_in_words(criterion: Criterion) -> str:
     """The limits as text, e.g. "at most 0.2"; "" without limits."""
+    below, above = ("below", "above") if criterion.strict else ("at most", "at least")
     if criterion.lowest is None:
-        return "" if criterion.highest is None else f"at most {_digits(criterion.highest)}"
+        return "" if criterion.highest is None else f"{below} {_digits(criterion.highest)}"
     if criterion.highest is None:
-        return f"at least {_digits(criterion.lowest)}"
+        return f"{above} {_digits(criterion.lowest)}"
     return f"{_digits(criterion.lowest)} to {_digits(criterion.highest)}"
 
 
 def _digits(value: float) -> str:
-    """A value with one decimal from 10 on, with three below."""
+    """A value with one decimal from 10 on, with three below; 0 is exact."""
+    if value == 0:
+        return "0"
     return f"{value:.1f}" if abs(value) >= 10 else f"{value:.3f}"

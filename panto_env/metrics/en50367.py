@@ -1,11 +1,13 @@
-"""Limits of EN 50367 on the contact force; speeds in m/s, in the standard's formulas v is in km/h.
+"""Limits of EN 50367 and EN 50119 on the contact force, by power supply.
 
-The standard itself was not at hand: formulas are recalled, those for AC seen in public code as well.
+Speeds are in m/s; in the standards' formulas v is in km/h. The standards themselves were not at hand: all
+limits are recalled, the formulas for AC seen in public code as well.
 """
 
 from __future__ import annotations
 
 from ..base.units import to_kmh
+from ..plant.catenary.schema import PowerSystem
 from .criterion import Criterion
 from .figures import ARC, Figures
 from .labels import LABELS
@@ -18,49 +20,76 @@ LARGEST_MEAN = {
     "DC 1.5 kV": ((0.00178, 110.0), (0.00228, 90.0)),
     "DC 3 kV": ((0.00097, 110.0), (0.00097, 110.0)),
 }
-# a and b of the minimum mean force (N). For DC none is known to us.
-SMALLEST_MEAN = {"AC": (0.00047, 60.0)}
+# a and b of the minimum mean force (N).
+SMALLEST_MEAN = {"AC": (0.00047, 60.0), "DC 1.5 kV": (0.00112, 70.0), "DC 3 kV": (0.00096, 60.0)}
+SLOW_LARGEST = 300.0
+"""Maximum contact force up to FAST (N)."""
+FAST_LARGEST_AC, FAST_LARGEST_DC = 350.0, 400.0
+"""Maximum contact force above FAST (N)."""
 STD_OF_MEAN = 0.3
 """Maximum σ over F_m."""
 SOURCE = "EN 50367, recalled"
 
 
-def largest_mean(speed: float, system: str = "AC") -> float:
-    """Maximum mean force (N), which is also the target, under a system of ``LARGEST_MEAN``."""
-    a, b = LARGEST_MEAN[system][to_kmh(speed) > FAST]
+def largest_mean(speed: float, system: PowerSystem) -> float:
+    """Maximum mean force (N), which is also the target, under a power supply."""
+    a, b = LARGEST_MEAN[_formula(system)][to_kmh(speed) > FAST]
     return a * to_kmh(speed) ** 2 + b
 
 
-def smallest_mean(speed: float, system: str = "AC") -> float | None:
-    """Minimum mean force (N), where one is known."""
-    if system not in SMALLEST_MEAN:
-        return None
-    a, b = SMALLEST_MEAN[system]
+def smallest_mean(speed: float, system: PowerSystem) -> float:
+    """Minimum mean force (N)."""
+    a, b = SMALLEST_MEAN[_formula(system)]
     return a * to_kmh(speed) ** 2 + b
 
 
-def maximum_limit(speed: float) -> float:
+def maximum_limit(speed: float, system: PowerSystem) -> float:
     """Maximum contact force (N)."""
-    return 350.0 if to_kmh(speed) > FAST else 300.0
+    if to_kmh(speed) <= FAST:
+        return SLOW_LARGEST
+    return FAST_LARGEST_AC if _is_ac(system) else FAST_LARGEST_DC
 
 
-def arcing_limit(speed: float) -> float:
+def maximum_source(system: PowerSystem) -> str:
+    """Standard that we know the maximum contact force from."""
+    return "EN 50367" if _is_ac(system) else "EN 50119"
+
+
+def arcing_limit(speed: float, system: PowerSystem) -> float:
     """Maximum NQ (%)."""
-    return 0.2 if to_kmh(speed) > 250 else 0.1
+    v = to_kmh(speed)
+    return 0.2 if (v > 250 if _is_ac(system) else v >= 160) else 0.1
 
 
-def criteria(figures: Figures, arcing: float, speed: float, system: str = "AC") -> list[Criterion]:
-    """Mean force, σ, maximum and NQ (%) of a run, with their limits."""
-    lowest = smallest_mean(speed, system)
-    unknown = f"no formula is known to us for the minimum mean force under {system}" if lowest is None else ""
+def criteria(
+    figures: Figures, arcing: float, speed: float, system: PowerSystem, system_source: str
+) -> list[Criterion]:
+    """Mean force, σ, maximum and NQ (%) of a run, with their limits.
+
+    system_source: where the line's power supply comes from.
+    """
+    supply = f"this and other limits are those for {system}, the line's power supply ({system_source})"
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"
+    mean = smallest_mean(speed, system), largest_mean(speed, system)
+    highest, source = maximum_limit(speed, system), f"{maximum_source(system)}, recalled"
     return [
-        _force("mean", figures.mean, lowest, largest_mean(speed, system), unknown),
-        _force("std", figures.std, None, STD_OF_MEAN * figures.mean, ""),
-        _force("max", figures.max, None, maximum_limit(speed), ""),
-        Criterion("arcing", "arcing NQ", "%", arcing, None, arcing_limit(speed), SOURCE, length),
+        _force("mean", figures.mean, *mean, SOURCE, supply),
+        _force("std", figures.std, None, STD_OF_MEAN * figures.mean, SOURCE),
+        _force("max", figures.max, None, highest, source),
+        Criterion("arcing", "arcing NQ", "%", arcing, None, arcing_limit(speed, system), SOURCE, length),
     ]
 
 
-def _force(key: str, value: float, lowest: float | None, highest: float, note: str) -> Criterion:
-    return Criterion(key, LABELS[key].name, LABELS[key].unit, value, lowest, highest, SOURCE, note)
+def _force(
+    key: str, value: float, lowest: float | None, highest: float | None, source: str, note: str = ""
+) -> Criterion:
+    return Criterion(key, LABELS[key].name, LABELS[key].unit, value, lowest, highest, source, note)
+
+
+def _formula(system: PowerSystem) -> str:
+    """Key of a power supply among the formulas of the mean force, which hold for AC of any voltage."""
+    return "AC" if _is_ac(system) else system
+
+
+def _is_ac(system: PowerSystem) -> bool:
+    return system.startswith("AC")

@@ -13,6 +13,7 @@ class Label:
     short: str  # for narrow columns
     unit: str
     scale: float = 1.0  # from SI to ``unit``
+    si: str = ""  # unit in SI, where that is another one
 
     @property
     def heading(self) -> str:
@@ -37,7 +38,7 @@ LABELS = {
     "statistical_min": Label("statistical minimum F_m − 3σ", "F_m − 3σ", "N"),
     "max": Label("maximum", "max", "N"),
     "min": Label("minimum", "min", "N"),
-    "max_uplift": Label("maximum uplift at the supports", "uplift", "mm", 1e3),
+    "max_uplift": Label("maximum uplift at the supports", "uplift", "mm", 1e3, "m"),
     "contact_loss": Label("contact loss CL", "CL", "%"),
     "cost_function": Label("cost function CF", "CF", "N m"),
     "effort": Label("actuator force, rms", "effort", "N"),
@@ -45,3 +46,12 @@ LABELS = {
     "distance": Label("over a distance of", "distance", "m"),
 }
 """Label of every field of ``Figures``, in its order."""
+
+HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS.items()} | {
+    "speed_kmh": "speed (km/h)",
+    "nominal_force": "nominal_force (N)",
+    "time_step": "time_step (s)",
+    "spacing": "spacing (m)",
+    "window": "window (spans)",
+}
+"""Headings with units of figures and settings, which are in SI, in files of tables."""

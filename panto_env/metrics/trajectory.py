@@ -23,6 +23,7 @@ from ..base.units import to_kmh
 from ..plant.alignment import Alignment, Spans
 from .compliance import LineFacts, compliance
 from .criterion import Criterion
+from .droppers import evaluated, near_train
 from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
@@ -44,7 +45,9 @@ DAMAGED = (
 )
 """Errors that reading a damaged or forged file can raise, besides Arrow's own."""
 SUFFIXES = (".parquet",)
-"""Suffixes of the file of a saved run."""
+"""Suffixes of the file of a saved run, which can be read again."""
+OUTPUTS = (*SUFFIXES, ".csv", ".xlsx")
+"""Suffixes of files that a run can be written to."""
 SERIES = (
     "time",
     "position",
@@ -131,17 +134,15 @@ class Trajectory:
 
         Values of droppers need their record. Raises InputError as ``summary`` does.
         """
-        inside = self.inside(spans)
-        tension = self.dropper_force[inside]
-        train, dropper = map(self.alignment.span_of, (self.position[inside], self.dropper_position))
+        tension, _ = evaluated(self, spans)
         return compliance(
             self.summary(spans),
-            arcing(self.contact_force[inside], self.time_step),
+            arcing(self.contact_force[self.inside(spans)], self.time_step),
             self.line,
             self.speed,
             self.alignment.mean_length,
             tension,
-            tension[train[:, None] == dropper] if tension.size else tension,
+            tension[near_train(self, spans)] if tension.size else tension,
         )
 
     @property
@@ -192,12 +193,21 @@ class Trajectory:
             return np.ones(len(self.time), dtype=bool)
         return self.alignment.within(self.position, covered)
 
-    def save(self, path: str | Path) -> None:
-        """Write a Parquet file, whole or not at all. Raises InputError for a name with another suffix.
+    def save(self, path: str | Path, spans: SpanChoice = None) -> None:
+        """Write a Parquet, CSV or Excel file, whole or not at all, by its suffix.
 
-        The file has a column for each series, each support and each dropper, by number.
+        A Parquet file is the whole run, which ``load`` reads again; it has a column for each series, each
+        support and each dropper, by number. CSV has the same columns as far as the train came, and the
+        filtered force, with units in the headings. A workbook (.xlsx) has them without the droppers, and
+        sheets of figures, requirements included, and of droppers, both over ``spans`` as in ``summary``.
+        Raises InputError for a name with another suffix, and for a run that is too long for Excel.
         """
-        check_output(path, SUFFIXES)
+        check_output(path, OUTPUTS)
+        if Path(path).suffix.lower() not in SUFFIXES:
+            from .run_tables import save_tables
+
+            save_tables(self, path, spans)
+            return
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -223,6 +233,8 @@ class Trajectory:
 
         if not os.path.isfile(path):
             raise InputError(f"The trajectory file {path} does not exist; check the path.")
+        if Path(path).suffix.lower() in OUTPUTS[1:]:
+            raise InputError(f"{path} is for other programs: a run is read from its .parquet file only.")
         try:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 _check_size(file.metadata)

@@ -13,7 +13,7 @@ LARGEST_HEIGHT = 3.0
 LOSS_TIME = 0.5
 """Time without contact (s) after which a run ends."""
 FREE_UPLIFT = 0.24
-"""Default room for the contact wire's uplift at a support (m), up to the steady arm's stop: twice the 120 mm
+"""Default room for the contact wire's uplift at a support (m): twice the 120 mm
 for which high-speed lines are designed (recalled)."""
 
 LARGEST_SPEED = 20.0
@@ -27,7 +27,7 @@ class Ending(IntEnum):
     NONE = 0  # it did not
     HEAD = 1  # the head left HEAD_RANGE
     LOSS = 2  # contact was lost for LOSS_TIME
-    STOP = 3  # the contact wire reached the steady arm's stop
+    STOP = 3  # the contact wire took up all its room at a support
     WIRES = 4  # contact wire and messenger wire touched
     DIVERGED = 5  # the computation diverged: there is no result
     STROKE = 6  # a rig's cylinder came to the end of its stroke
@@ -43,8 +43,8 @@ def reason(ending: Ending, free_uplift: float) -> str:
         Ending.HEAD: f"the collector head left the range of ±{1e3 * HEAD_RANGE:.0f} mm about the contact "
         "wire's height at the support",
         Ending.LOSS: f"contact was lost for {LOSS_TIME:g} s",
-        Ending.STOP: "the contact wire rose to the steady arm's stop, "
-        f"{1e3 * free_uplift:.0f} mm above its rest at a support",
+        Ending.STOP: f"the contact wire rose by {1e3 * free_uplift:.0f} mm at a support, all the room "
+        "that it has there",
         Ending.WIRES: "contact wire and messenger wire touched",
         Ending.DIVERGED: "the computation diverged",
         Ending.STROKE: "the rig's cylinder came to the end of its stroke, as it does where the loop is "

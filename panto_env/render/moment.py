@@ -38,7 +38,8 @@ class Moment:
     force: Array  # (n,): contact force there, raw (N)
     filtered: Array  # (n,): low-passed at 20 Hz as EN 50317 does, so 31 ms late (N)
     nominal_force: float  # N
-    largest_force: float  # that EN 50367 allows (N)
+    largest_force: float  # that the standard allows (N)
+    standard: str  # which one
     actuators: dict[Place, float]  # forces of those that there are (N)
     force_limit: float  # of an actuator (N)
     figures: dict[str, str] = field(default_factory=dict)  # additional texts by name
@@ -95,7 +96,8 @@ def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Mom
         force=contact.force,
         filtered=contact.filtered,
         nominal_force=float(own[Row.NOMINAL_FORCE]),
-        largest_force=en50367.maximum_limit(speed),
+        standard=en50367.maximum_source(plant.catenary.system),
+        largest_force=en50367.maximum_limit(speed, plant.catenary.system),
         actuators={place: float(own[Row.FRAME_FORCE + place]) for place in task.actuator.places},
         force_limit=task.actuator.force_limit,
         figures=figures,

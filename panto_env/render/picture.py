@@ -75,12 +75,12 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment) -> None:
         canvas.line([(0, y), (right, y)], FAINT)
         words = f"{force} N" if force else "0 N: no contact"
         canvas.words(0.01 * layout.width, y - 0.6 * size, words, QUIET, 0.8 * size)
-    dashes = {"EN 50367": largest, "nominal": moment.nominal_force}
+    dashes = {moment.standard: largest, "nominal": moment.nominal_force}
     for name, level in dashes.items():
         y = float(layout.forces(level, largest))
         for x in np.arange(0, right, 14):
-            canvas.line([(x, y), (x + 7, y)], INK if name == "EN 50367" else QUIET)
-        if name == "EN 50367":
+            canvas.line([(x, y), (x + 7, y)], INK if name == moment.standard else QUIET)
+        if name == moment.standard:
             words = f"limit of {name}: {level:.0f} N"
             canvas.words(right - 6, y - 0.6 * size, words, QUIET, 0.8 * size, anchor="right")
     y = float(layout.forces(0.0, largest))

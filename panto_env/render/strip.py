@@ -38,7 +38,8 @@ class Strip:
         self._felt, self._position = felt(task, 0, SPANS), position_of(task, 0)
         self._alignment = plant.alignment
         self._time = plant.of(0, Row.STEP) * plant.time_step
-        self._limit = en50367.maximum_limit(float(task.speed[0]))
+        self._standard = en50367.maximum_source(plant.catenary.system)
+        self._limit = en50367.maximum_limit(float(task.speed[0]), plant.catenary.system)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = max(NARROW, min(options.max_width, WIDE))
@@ -49,7 +50,8 @@ class Strip:
         yield Text(self._title, style="bold", no_wrap=True, overflow="ellipsis")
         done = round(self._share * width)
         yield Text.assemble(("━" * done, "bright_blue"), ("━" * (width - done), "dim"))
-        yield Text("contact force (N), low-passed at 20 Hz; ╌ limit of EN 50367; x contact lost", style="dim")
+        limit = f"╌ limit of {self._standard}"
+        yield Text(f"contact force (N), low-passed at 20 Hz; {limit}; x contact lost", style="dim")
         yield from self._force_chart(across, columns)
         yield Text("height of the head (mm); 0: contact wire at a support", style="dim")
         yield from chart(across, 1e3 * seen.head, _round(1e3 * seen.head), HEIGHT_ROWS, columns)

@@ -47,8 +47,9 @@ def force_along(one: Findings) -> str:
         position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
         axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
-        limit = en50367.maximum_limit(run.speed)
-        axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=f"EN 50367: {limit:.0f} N")
+        limit = en50367.maximum_limit(run.speed, run.line.system)
+        words = f"{en50367.maximum_source(run.line.system)}: {limit:.0f} N"
+        axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
         axes.axhline(0, color=LIMIT, linewidth=0.9)
         for loss in one.losses:
             axes.plot(loss.position, 0, "v", color=LIMIT, markersize=5)

@@ -11,26 +11,19 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.criterion import Criterion
+from ..metrics.droppers import MovingDropper, moving_droppers
 from ..metrics.figures import Figures
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
+from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
 from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from ..plant.pantograph.schema import PantographData
 
 FOLDS = 240
 """Number of places in a span at which spans are compared."""
-
-
-class Dropper(NamedTuple):
-    """Forces of one dropper of a span, over all evaluated spans, while the train is in its span."""
-
-    position: float  # from the support (m)
-    largest: float  # N
-    smallest: float  # N
-    slack: float  # share of time (%)
 
 
 class Loss(NamedTuple):
@@ -128,22 +121,14 @@ class Findings:
         ]
 
     @cached_property
-    def droppers(self) -> list[Dropper]:
-        """Droppers by place in the span."""
-        run = self.run
-        if not run.dropper_force.size:
-            return []
-        train = run.alignment.span_of(run.position[self.inside])
-        tension = run.dropper_force[self.inside]
-        own, places = run.alignment.span_of(run.dropper_position), run.alignment.place(run.dropper_position)
-        found = []
-        for place in np.unique(places.round(6)):
-            which = np.flatnonzero(np.abs(places - place) < 1e-5)
-            values = np.concatenate([tension[train == own[k], k] for k in which])
-            if values.size:
-                slack = 100 * float((values <= 0).mean())
-                found.append(Dropper(float(place), float(values.max()), float(values.min()), slack))
-        return found
+    def at_rest(self) -> list[RestingDropper]:
+        """Droppers of a span of the line, as designed, at rest."""
+        return droppers_at_rest(self.line)
+
+    @cached_property
+    def droppers(self) -> list[MovingDropper]:
+        """Droppers by place in the span: forces over the evaluated run."""
+        return moving_droppers(self.run, "all" if self.covered is None else None)
 
     @cached_property
     def losses(self) -> list[Loss]:

@@ -1,13 +1,14 @@
 """Options of commands are the settings of a run: their units, their defaults in the help, and spans."""
 
 import json
+import re
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from panto_env import InputError
-from panto_env.analysis.options import with_settings
+from panto_env.analysis.options import PANELS, with_settings
 from panto_env.analysis.pool import check_passes
 from panto_env.cli import make_app
 from panto_env.control.settings import fields
@@ -46,3 +47,41 @@ def test_passes_are_counted_up_to_a_hundred_thousand():
     check_passes(100_000, "This")
     with pytest.raises(InputError, match="This has 100,001 passes; the maximum is 100,000"):
         check_passes(100_001, "This")
+
+
+def test_the_help_groups_options_and_learning_comes_last():
+    done = CliRunner().invoke(make_app(), ["simulate", "--help"], env={"COLUMNS": "120"})
+    panels = {}
+    for line in done.output.splitlines():
+        if line.startswith("╭─"):
+            panels[line.strip("╭╮─ ")] = options = []
+        elif found := re.match(r"│ +\*? *--([a-z-]+)", line):
+            options.append(found[1])
+    assert list(panels) == ["Options", "Line", "Pantograph", "Run", "Output", "Control and learning"]
+    assert panels["Options"] == ["help"]
+    assert {"catenary", "line-condition"} <= set(panels["Line"])
+    assert {"pantograph", "mean-force", "actuator", "sensors"} <= set(panels["Pantograph"])
+    assert {"speed", "policy", "spans", "seed", "time-step"} <= set(panels["Run"])
+    assert {"output", "plot", "json", "figures", "droppers"} <= set(panels["Output"])
+    assert {"washout", "history", "settle"} <= set(panels["Control and learning"])
+    assert panels["Run"].index("policy") < panels["Run"].index("time-step")
+
+
+@pytest.mark.parametrize("command", ["sweep", "film", "rig", "evaluate", "benchmark", "tune", "oracle"])
+def test_commands_with_settings_have_no_option_outside_a_panel(command):
+    done = CliRunner().invoke(make_app(), [command, "--help"], env={"COLUMNS": "120"})
+    first = done.output.partition("╭─ Options")[2].partition("╰")[0]
+    assert re.findall(r"--[a-z-]+", first) == ["--help"]
+    order = [panel for panel in PANELS if f"╭─ {panel} ─" in done.output]
+    assert order == sorted(order, key=lambda panel: done.output.index(f"╭─ {panel} ─"))
+    assert "Output" in order
+
+
+def test_commands_are_grouped_by_what_a_person_wants():
+    shown = CliRunner().invoke(make_app(), ["--help"], env={"COLUMNS": "120"}).output
+    places = [shown.index(f"╭─ {panel} ─") for panel in ("Simulate", "Judge", "Identify", "Control", "Learn")]
+    assert places == sorted(places)
+    assert "─ Commands ─" not in shown
+    assert "From other packages" not in shown, "a command of ours is in no panel"
+    assert places[0] < shown.index("│ simulate ") < places[1] < shown.index("│ report ") < places[2]
+    assert places[3] < shown.index("│ benchmark ") < places[4] < shown.index("│ train ")

@@ -195,7 +195,7 @@ def test_command_writes_the_rows_it_prints(tmp_path):
     assert "three-mass on periodic-stiffness" in result.stdout
     assert "3000" in result.stdout
     rows = pyarrow.csv.read_csv(tmp_path / "s.csv").to_pylist()
-    assert [row["std"] for row in rows] == pytest.approx([row["std"] for row in told])
+    assert [row["std (N)"] for row in rows] == pytest.approx([row["std"] for row in told])
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_command_writes_the_rows_it_prints(tmp_path):
         (["pantograph.mases.0=5"], "did you mean 'pantograph.masses.0'"),
         (["pantograph.masses.0=5,-5"], "pantograph.masses.0 cannot be -5"),
         (["speed_kmh=250", "--plot", "s.doc"], "must end in one of"),
-        (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .parquet"),
+        (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .xlsx, .parquet"),
     ],
 )
 def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path):
@@ -223,7 +223,7 @@ def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path
 
 
 def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
-    from panto_env.base.files import write_rows
+    from panto_env.base.table_file import write_rows
 
     path = tmp_path / "s.parquet"
     path.write_text("mine")

@@ -34,6 +34,8 @@ LIMIT = 8192
 """Bytes that a file may have once the run is over: a result has more."""
 COMMANDS = {
     "simulate": (["simulate", *SHORT, "--output", "run.parquet"], "run.parquet"),
+    "simulate as CSV": (["simulate", *SHORT, "--output", "run.csv"], "run.csv"),
+    "simulate as workbook": (["simulate", *SHORT, "--output", "run.xlsx"], "run.xlsx"),
     "simulate --json": (["simulate", *SHORT, "--json", "--output", "run.parquet"], "run.parquet"),
     "simulate --plot": (["simulate", *SHORT, "--plot", "run.png"], "run.png"),
     "simulate --plot of vectors": (["simulate", *SHORT, "--plot", "run.pdf"], "run.pdf"),

@@ -298,7 +298,8 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
     path = tmp_path / f"out{suffix}"
     outcome.save(path)
     read = pyarrow.csv.read_csv if suffix == ".csv" else pyarrow.parquet.read_table
-    assert read(path)["std"].to_pylist() == pytest.approx([r.figures.std for r in outcome.rows])
+    column = "std (N)" if suffix == ".csv" else "std"
+    assert read(path)[column].to_pylist() == pytest.approx([r.figures.std for r in outcome.rows])
 
 
 def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
@@ -368,7 +369,7 @@ def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> Non
         (["q"], "Unknown policy 'q'"),
         (["p", "--catenary", "nowhere"], "Unknown catenary"),
         (["p", "--actuator", "strong"], "key 'actuator'"),
-        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .parquet"),
+        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .xlsx, .parquet"),
         (["p", "--html", "out.txt"], "out.txt must end in .html"),
         (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
     ],

@@ -6,6 +6,7 @@ import pytest
 
 from panto_env import InputError
 from panto_env.catalog import load_catenary
+from panto_env.control.safety import limits
 from panto_env.envs import BARE
 from panto_env.metrics.low_pass import low_pass
 
@@ -57,6 +58,16 @@ def test_each_term_is_the_share_of_the_step_beyond_its_limit(term):
     shares = by_hand(env)[:, list(ZERO).index(term)]
     assert 0 < shares.mean() < 1, "the run does not show this"
     assert costs == pytest.approx(2 * shares)
+
+
+def test_limits_depend_on_power_supply_and_stop():
+    """Under DC, 400 N above 200 km/h; with a stop, two thirds of the room instead of half."""
+    line = LOW.model_copy(update={"system": "DC 3 kV", "uplift_stop": True})
+    speeds = np.array([200.0, 320.0]) / 3.6
+    for given, uplift, forces in ((LOW, 0.065, [300, 350]), (line, 0.26 / 3, [300, 400])):
+        found = limits(given, speeds)
+        assert found[0] == pytest.approx(uplift)
+        assert found[1].tolist() == forces
 
 
 def test_the_cost_is_their_sum_and_is_counted_after_settle():

@@ -167,7 +167,7 @@ def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
         ),
         (lambda rows: rows, ("--displacement-noise", "2"), "displacement_noise.* from 1e-08 to 0.1 m"),
         (lambda rows: rows, ("--lag", "100"), "lag.* from 0 to 5 s"),
-        (lambda rows: rows, ("--output", "force.txt"), "must end in one of .csv, .parquet"),
+        (lambda rows: rows, ("--output", "force.txt"), "must end in one of .csv, .xlsx, .parquet"),
     ],
 )
 def test_bad_input_to_the_command_is_one_sentence(change, options, message, record, tmp_path):

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from panto_env import Trajectory, simulate
-from panto_env.catalog import load_catenary
+from panto_env.catalog import available, load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics import en50367
+from panto_env.metrics.compliance import LineFacts, compliance
 from panto_env.metrics.criterion import Criterion, criteria_table, limits_in_words, remarks, worst
 from panto_env.metrics.figures import Figures, arcing, contact_loss
+from panto_env.report import save as save_report
 
 from ..command import panto
 from .test_summary import RUN, SPAN, replace
@@ -26,6 +28,10 @@ def figures(**given):
     return Figures(**zeros | given)
 
 
+def of_force(figures, nq, speed_kmh, system="AC"):
+    return by_key(en50367.criteria(figures, nq, speed_kmh / 3.6, system, "drawing 1"))
+
+
 # --- EN 50367 ------------------------------------------------------------------------------------
 
 
@@ -36,23 +42,23 @@ def figures(**given):
         ("AC", 200, 108.8, 78.8),
         ("AC", 201, 0.00097 * 201**2 + 70, 0.00047 * 201**2 + 60),
         ("AC", 300, 157.3, 102.3),
-        ("DC 1.5 kV", 150, 150.05, None),
-        ("DC 1.5 kV", 250, 232.5, None),
-        ("DC 3 kV", 100, 119.7, None),
-        ("DC 3 kV", 250, 170.625, None),
+        ("AC 25 kV", 300, 157.3, 102.3),
+        ("AC 15 kV", 100, 94.7, 64.7),
+        ("DC 1.5 kV", 150, 150.05, 95.2),
+        ("DC 1.5 kV", 250, 232.5, 140.0),
+        ("DC 3 kV", 100, 119.7, 69.6),
+        ("DC 3 kV", 250, 170.625, 120.0),
     ],
 )
 def test_mean_force_is_limited_by_speed_and_system(system, speed, largest, smallest):
     assert en50367.largest_mean(speed / 3.6, system) == pytest.approx(largest)
-    found = en50367.smallest_mean(speed / 3.6, system)
-    assert found == (None if smallest is None else pytest.approx(smallest))
+    assert en50367.smallest_mean(speed / 3.6, system) == pytest.approx(smallest)
     for mean, kept in ((largest - 0.01, True), (largest + 0.01, False)):
-        criterion = by_key(en50367.criteria(figures(mean=mean), 0.0, speed / 3.6, system))["mean"]
+        criterion = of_force(figures(mean=mean), 0.0, speed, system)["mean"]
         assert criterion.kept is kept
         assert criterion.margin == pytest.approx(largest - mean, abs=1e-9)
-    if smallest is not None:
-        too_low = by_key(en50367.criteria(figures(mean=smallest - 1), 0.0, speed / 3.6, system))["mean"]
-        assert (too_low.kept, too_low.margin) == (False, pytest.approx(-1.0))
+    too_low = of_force(figures(mean=smallest - 1), 0.0, speed, system)["mean"]
+    assert (too_low.kept, too_low.margin) == (False, pytest.approx(-1.0))
 
 
 def test_formulas_of_both_ranges_meet_at_200_kmh():
@@ -62,14 +68,60 @@ def test_formulas_of_both_ranges_meet_at_200_kmh():
 
 def test_other_limits_at_both_sides_of_their_speeds():
     at = figures(mean=100.0, std=31.0, max=320.0)
-    slow, medium, fast = (by_key(en50367.criteria(at, 0.15, v / 3.6)) for v in (190, 240, 280))
+    slow, medium, fast = (of_force(at, 0.15, v) for v in (190, 240, 280))
     assert [each["max"].highest for each in (slow, medium, fast)] == [300, 350, 350]
     assert [each["arcing"].highest for each in (slow, medium, fast)] == [0.1, 0.1, 0.2]
     assert [each["arcing"].kept for each in (slow, medium, fast)] == [False, False, True]
     assert [each["max"].kept for each in (slow, medium, fast)] == [False, True, True]
     assert (fast["std"].highest, fast["std"].kept) == (pytest.approx(30.0), False)
     assert fast["std"].margin == pytest.approx(-1.0)
-    assert [en50367.maximum_limit(v / 3.6) for v in (200, 205)] == [300, 350]
+    assert [en50367.maximum_limit(v / 3.6, "AC") for v in (200, 205)] == [300, 350]
+
+
+@pytest.mark.parametrize("system", ["DC 1.5 kV", "DC 3 kV"])
+def test_maximum_force_and_arcing_depend_on_the_power_supply(system):
+    """Recalled: 400 N above 200 km/h under DC; NQ of 0.2 % from 160 km/h under DC, above 250 under AC."""
+    at = figures(mean=150.0, max=380.0)
+    direct = [of_force(at, 0.15, v, system) for v in (159, 160, 200, 201, 300)]
+    assert [each["max"].highest for each in direct] == [300, 300, 300, 400, 400]
+    assert [each["max"].kept for each in direct] == [False, False, False, True, True]
+    assert [each["arcing"].highest for each in direct] == [0.1, 0.2, 0.2, 0.2, 0.2]
+    assert [each["arcing"].kept for each in direct] == [False, True, True, True, True]
+    assert {each["max"].source for each in direct} == {"EN 50119, recalled"}
+    for voltage in ("AC", "AC 15 kV", "AC 25 kV"):
+        other = of_force(at, 0.15, 201, voltage)
+        assert (other["max"].highest, other["arcing"].highest) == (350, 0.1)
+
+
+def test_minimum_force_must_be_positive():
+    line = LineFacts()
+    none = np.zeros((0, 0))
+
+    def minimum(value):
+        return by_key(compliance(figures(mean=100.0, min=value), 0.0, line, 70.0, 60.0, none, none))["min"]
+
+    assert [minimum(value).kept for value in (-1.0, 0.0, 0.1)] == [False, False, True]
+    assert minimum(0.1).margin == pytest.approx(0.1)
+    assert limits_in_words(minimum(5.0)) == "above 0"
+    assert minimum(5.0).source == "EN 50119, recalled"
+
+
+def test_room_for_the_uplift_is_smaller_where_a_stop_limits_it():
+    """Of 140 mm, twice is more than a room of 240 mm, and 1.5 times is not (EN 50119, recalled)."""
+    none = np.zeros((0, 0))
+
+    def uplift(stop):
+        line = LineFacts(free_uplift=0.24, free_uplift_source="drawing 2", uplift_stop=stop)
+        found = compliance(figures(mean=100.0, max_uplift=0.14), 0.0, line, 70.0, 60.0, none, none)
+        return by_key(found)["uplift"]
+
+    free, stopped = uplift(False), uplift(True)
+    assert (free.name, free.value, free.kept) == ("twice the uplift", pytest.approx(280.0), False)
+    assert (stopped.name, stopped.value) == ("1.5 times the uplift", pytest.approx(210.0))
+    assert stopped.kept
+    assert "no stop limits it" in free.note
+    assert "a stop limits it" in stopped.note
+    assert "drawing 2" in stopped.note
 
 
 def test_an_arc_is_a_loss_of_more_than_5_ms():
@@ -85,10 +137,10 @@ def test_an_arc_is_a_loss_of_more_than_5_ms():
 
 
 def test_sources_say_what_is_recalled():
-    criteria = en50367.criteria(figures(mean=100.0), 0.0, 70.0, "DC 3 kV")
-    assert all("recalled" in criterion.source for criterion in criteria)
-    assert "no formula is known" in by_key(criteria)["mean"].note
-    assert "contact loss CL counts all" in by_key(criteria)["arcing"].note
+    criteria = of_force(figures(mean=100.0), 0.0, 250, "DC 3 kV")
+    assert all("recalled" in criterion.source for criterion in criteria.values())
+    assert "DC 3 kV, the line's power supply (drawing 1)" in criteria["mean"].note
+    assert "contact loss CL counts all" in criteria["arcing"].note
 
 
 # --- criteria ------------------------------------------------------------------------------------
@@ -136,7 +188,8 @@ def test_every_criterion_of_a_run(reference_run):
     assert found["arcing"].value == 0.0
     assert found["uplift"].value == pytest.approx(2e3 * whole.max_uplift)
     assert found["uplift"].highest == 240.0
-    assert "default (recalled)" in found["uplift"].note
+    assert "recalled: twice the 120 mm" in found["uplift"].note
+    assert (found["min"].value, found["min"].lowest, found["min"].kept) == (whole.min, 0.0, True)
     assert (found["speed"].value, found["speed"].highest) == (pytest.approx(speed / wave), 0.7)
     assert found["doppler"].value == pytest.approx((wave - speed) / (wave + speed))
     assert found["doppler"].kept is None
@@ -180,7 +233,7 @@ def test_a_run_made_up_by_hand():
     run = replace(RUN, line=line, dropper_force=slack, dropper_position=position)
     found = by_key(run.compliance("all"))
     assert found["mean"].highest == pytest.approx(0.00097 * 180**2 + 110)
-    assert found["mean"].lowest is None
+    assert found["mean"].lowest == pytest.approx(0.00096 * 180**2 + 60)
     assert found["speed"].value == pytest.approx(0.5)
     assert found["doppler"].value == pytest.approx(1 / 3)
     assert found["dropper force"].value == 50.0
@@ -188,7 +241,7 @@ def test_a_run_made_up_by_hand():
     assert found["uplift"].value == pytest.approx(2e3 * 0.239)
     assert not found["uplift"].kept
     bare = by_key(RUN.compliance("all"))  # nothing is known of its line
-    assert set(bare) == {"mean", "std", "max", "arcing"}
+    assert set(bare) == {"mean", "std", "max", "arcing", "min"}
 
 
 def test_waves_come_back_from_what_they_meet():
@@ -216,7 +269,7 @@ def test_waves_come_back_from_what_they_meet():
 
 def test_a_line_without_wires_is_held_against_the_force_alone():
     run = simulate("periodic-stiffness", "three-mass", 250.0)
-    assert set(by_key(run.compliance())) == {"mean", "std", "max", "arcing"}
+    assert set(by_key(run.compliance())) == {"mean", "std", "max", "arcing", "min"}
 
 
 def test_a_saved_run_knows_its_line(tmp_path, reference_run):
@@ -235,15 +288,48 @@ def printed(*arguments):
     return result.stdout
 
 
-def test_a_line_says_its_system_and_its_room(tmp_path):
+def own_line(folder, values):
+    """A line of the user's: that of EN 50318:2002 with other values of power supply and room, or none."""
     text = (FOLDERS["catenary"] / "en50318-2002.toml").read_text()
-    mine = tmp_path / "dc.toml"
+    own = ("system", "free_uplift", "uplift_stop")
+    kept = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(own))
+    mine = folder / "mine.toml"
+    mine.write_text(kept.replace("[contact_wire]", f"{values}[contact_wire]", 1))
+    return mine
+
+
+def test_a_line_without_power_supply_is_judged_as_ac_and_says_so(tmp_path):
+    run = simulate(own_line(tmp_path, ""), speed_kmh=200.0)
+    found = by_key(run.compliance())
+    assert found["mean"].lowest == pytest.approx(78.8)
+    assert "AC, the line's power supply (default, as none is given)" in found["mean"].note
+    assert "(default, as none is given, recalled)" in found["uplift"].note
+    run.save(tmp_path / "run.parquet")
+    save_report([tmp_path / "run.parquet"], tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "AC, the line&#39;s power supply (default, as none is given)" in page
+    told = json.loads(printed("list", tmp_path / "mine.toml", "--json"))["catenary"]
+    assert told["sources"]["system"] == "default, as none is given"
+
+
+def test_every_line_of_the_catalogue_names_its_power_supply_with_a_source():
+    for name in available("catenary"):
+        source = load_catenary(name).source_of("system")
+        assert source.split(":")[0] in ("seen", "recalled", "own choice"), name
+    assert load_catenary("re330").system == "AC 15 kV"
+    assert load_catenary("ln2").system == "AC 25 kV"
+
+
+def test_a_line_says_its_system_and_its_room(tmp_path):
     room = 'free_uplift = { value = 0.2, source = "seen: my drawing" }\n'
-    mine.write_text(text.replace("[contact_wire]", f'system = "DC 3 kV"\n{room}[contact_wire]', 1))
+    mine = own_line(tmp_path, f'system = "DC 3 kV"\n{room}uplift_stop = true\n')
     told = json.loads(printed("simulate", "--catenary", mine, "--speed", 160, "--json"))["compliance"]
     found = {criterion["key"]: criterion for criterion in told}
     assert found["mean"]["highest"] == pytest.approx(0.00097 * 160**2 + 110)
-    assert found["mean"]["lowest"] is None
+    assert found["mean"]["lowest"] == pytest.approx(0.00096 * 160**2 + 60)
+    assert found["arcing"]["highest"] == 0.2
+    assert "DC 3 kV, the line's power supply (no source is named)" in found["mean"]["note"]
+    assert found["uplift"]["name"] == "1.5 times the uplift"
     assert found["uplift"]["highest"] == pytest.approx(200.0)
     assert "seen: my drawing" in found["uplift"]["note"]
     assert {"value", "margin", "kept", "source", "unit"} <= set(found["std"])
@@ -264,5 +350,6 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     (entry,) = json.loads(printed("evaluate", "passive", *light, "--line-condition", "new", "--json"))[
         "passes"
     ]
-    assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
+    keys = [criterion["key"] for criterion in entry["policy_compliance"]]
+    assert keys == ["mean", "std", "max", "arcing", "min"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]

@@ -15,6 +15,7 @@ from panto_baselines.report.command import report as report_command
 from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
+from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.report import save
 from panto_env.report.findings import Findings
@@ -221,7 +222,7 @@ def test_runs_that_share_a_name_stay_apart(run):
     text = html.unescape(page([Findings(run, "a"), Findings(without, "b"), Findings(edited, "c")]))
     headings = re.findall(r"<h3>(.*?)</h3>", text)
     assert headings == ["en50318-2002 (a, b)", "en50318-2002 (c)", "en50318-2002"]
-    captions = re.findall(r"<caption>(.*?): forces while", text)
+    captions = re.findall(r"<caption>(.*?): droppers of", text)
     assert captions == ["300 km/h (a)", "300 km/h (c)"]
     values = re.findall(r"<code>span_length</code></th><td[^>]*>([\d.]+)<", text)
     assert values == ["60.0", "61.0"]
@@ -235,3 +236,21 @@ def test_numbers_below_ten_have_three_decimals():
         "0.050",
         "–",
     ]
+
+
+def test_droppers_at_rest_are_on_the_page(run):
+    """Lengths, forces and stretches of the line as designed, for each dropper of a span."""
+    text = page([Findings(run, "run.parquet")])
+    table = text[text.index('class="at-rest"') :]
+    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th>(.*?)</tr>', table[: table.index("</table>")]))
+    for row, values in (
+        ("from the support (m)", [f"{each.position:.3f}" for each in droppers_at_rest(run_line(run))]),
+        ("length, unloaded (m)", [f"{each.length:.4f}" for each in droppers_at_rest(run_line(run))]),
+        ("static force (N)", [f"{each.static_force:.1f}" for each in droppers_at_rest(run_line(run))]),
+        ("stretch at rest (mm)", [f"{1e3 * each.stretch:.2f}" for each in droppers_at_rest(run_line(run))]),
+    ):
+        assert re.findall(r"<td>(.*?)</td>", rows[row]) == values
+
+
+def run_line(run):
+    return load_catenary(run.catenary)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -14,6 +14,8 @@ from ...base.shown import shown
 from ..alignment import Alignment
 from ..valid_range import FREE_UPLIFT
 
+PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV"]
+NO_SOURCE, BY_DEFAULT = "no source is named", "default, as none is given"
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 LONGEST_SPAN = 200.0  # m
 """Two and a half times the longest span of usual lines."""
@@ -37,12 +39,20 @@ class CatenaryData(Settings):
     span_length: Annotated[float, Between(2, LONGEST_SPAN, "m")] = Field(
         description="distance between supports (m)"
     )
-    system: Literal["AC", "DC 1.5 kV", "DC 3 kV"] = Field(
-        "AC", description="power supply, by which EN 50367 sets the mean force: AC, DC 1.5 kV or DC 3 kV"
+    system: PowerSystem = Field(
+        "AC",
+        description="power supply, on which limits of EN 50367 and EN 50119 depend: AC 25 kV, AC 15 kV, AC, "
+        "DC 3 kV or DC 1.5 kV",
     )
     free_uplift: Annotated[float, Between(0.01, 1.0, "m")] = Field(
         FREE_UPLIFT,
-        description="room for the contact wire's uplift at a support, up to the steady arm's stop (m)",
+        description="room for the contact wire's uplift at a support, up to the stop, or without one to what "
+        "the steady arm would strike (m)",
+    )
+    uplift_stop: bool = Field(
+        False,
+        description="whether a stop limits the uplift at a support; the room must be 1.5 times the uplift "
+        "then, otherwise twice",
     )
     spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
@@ -50,6 +60,10 @@ class CatenaryData(Settings):
     def __hash__(self) -> int:
         """Hash of all values except the sources, by which results for a line are cached."""
         return hash(tuple(getattr(self, name) for name in type(self).model_fields if name != "sources"))
+
+    def source_of(self, name: str) -> str:
+        """Source of a value that lines of every kind have; reports whether it is the default."""
+        return self.sources.get(name, NO_SOURCE if name in self.model_fields_set else BY_DEFAULT)
 
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""

@@ -14,7 +14,7 @@ from ...metrics import en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison
 from .equations import RUN_TIME, Equations
-from .passes import SPANS, Influence, Pass, Passes, largest_static_force
+from .passes import SPANS, SYSTEM, Influence, Pass, Passes, largest_static_force
 from .sensitivity import SHARES, Sensitivity
 
 
@@ -120,7 +120,7 @@ def static_force_table(passes: Sequence[Pass]) -> Table:
             f"{one_pass.speed_kmh:g}",
             f"{one_pass.force.max() / one_pass.nominal_force:.3f}",
             f"{one_pass.force.std() / one_pass.nominal_force:.3f}",
-            f"{en50367.maximum_limit(from_kmh(one_pass.speed_kmh)):g}",
+            f"{en50367.maximum_limit(from_kmh(one_pass.speed_kmh), SYSTEM):g}",
             f"{largest_static_force(one_pass):.0f}",
         )
         for one_pass in passes
@@ -162,7 +162,7 @@ def landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[s
     return {
         "sigma above 0.3 F_m from": first([row["std"] > 0.3 * row["mean"] for row in rows]),
         "maximum above its limit from": first(
-            [row["max"] > en50367.maximum_limit(from_kmh(row["speed_kmh"])) for row in rows]
+            [row["max"] > en50367.maximum_limit(from_kmh(row["speed_kmh"]), SYSTEM) for row in rows]
         ),
         "contact lost from": first([row["contact_loss"] > 0 for row in rows]),
         "sigma over F(v) greatest at": rows[int(np.argmax(shares))]["speed_kmh"],

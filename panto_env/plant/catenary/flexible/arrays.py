@@ -46,7 +46,7 @@ class FlexibleLine(NamedTuple):
     mobility: Array  # (wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N at the node (m/N)
     mast_row: Index  # (supports,): row of the node where uplift is recorded
     mast_segment: Index  # (supports,): its segment
-    free_uplift: float  # room for it up to the steady arm's stop (m)
+    free_uplift: float  # room for it at a support (m)
     largest_move: float  # maximum displacement in a step; beyond it the computation has diverged (m)
     spring_wire: Index  # (sets,): which wire springs to the ground hold
     spring_row: Index  # (sets,): in which row

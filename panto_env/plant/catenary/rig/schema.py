@@ -113,3 +113,7 @@ class RigData(CatenaryData):
             return values
         names = [name for name in CatenaryData.model_fields if name not in ("kind", "name", "description")]
         return {name: known[name] for name in names if name in known} | values
+
+    def source_of(self, name: str) -> str:
+        """Source of a value that lines of every kind have, by default that of ``line``."""
+        return self.sources.get(name) or self.line.source_of(name)

@@ -22,7 +22,7 @@ class ThreeSpanLine(NamedTuple):
     softness: Array  # (modes,): 1 / omega^2 (s^2)
     at_support: Array  # (2, modes): mode shapes at the two supports
     project: Array  # (modes, modes): modal coordinates in the next span from those in this one
-    free_uplift: float  # room for the uplift at a support up to the steady arm's stop (m)
+    free_uplift: float  # room for the uplift at a support (m)
 
 
 class ThreeSpanWire(NamedTuple):

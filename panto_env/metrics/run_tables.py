@@ -1,0 +1,169 @@
+"""A run as tables for other programs: its samples, figures with requirements, and droppers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import InputError
+from ..base.table_file import WORKBOOKS, Sheet, write_table, write_workbook
+from ..base.version import __version__
+from ..plant.catenary import CATENARIES
+from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
+from ..plant.catenary.flexible.dropper_table import droppers_at_rest
+from .droppers import HEADINGS as MOVING
+from .droppers import moving_droppers
+from .labels import HEADINGS, LABELS
+from .low_pass import low_pass
+from .spans import SpanChoice, in_words
+from .trajectory import SERIES, Trajectory
+
+FILTERED = "contact_force_filtered"
+UNITS = {
+    "time": "s",
+    "contact_force": "N",
+    "frame_force": "N",
+    "head_force": "N",
+    "head_velocity": "m/s",
+    "frame_velocity": "m/s",
+}
+"""Units of ``SERIES``; of others, m."""
+RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")
+"""What identifies a run in a table of several."""
+VERDICTS = {True: "kept", False: "broken", None: ""}
+
+
+def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
+    """All samples of a run, a row for each time step, with the force behind EN 50317's low-pass, too.
+
+    Uplift and dropper forces are those at supports and droppers that the train reached.
+    """
+    columns: dict[str, Any] = {name: getattr(run, name) for name in SERIES}
+    headings = {name: f"{name} ({UNITS.get(name, 'm')})" for name in SERIES}
+    columns[FILTERED] = low_pass(run.contact_force, run.time_step)
+    headings[FILTERED] = f"{FILTERED} to 20 Hz (N)"
+    measured = [("uplift", run.support_position, "m")]
+    measured += [("dropper_force", run.dropper_position, "N")] if with_droppers else []
+    for name, places, unit in measured:
+        for k, (column, place) in enumerate(zip(getattr(run, name).T, places, strict=False)):
+            if place <= run.distance:
+                columns[f"{name}_{k}"] = column
+                headings[f"{name}_{k}"] = f"{name} at {place:.6g} m ({unit})"
+    return Sheet("run", columns, headings)
+
+
+def figures(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
+    """Figures and requirements of runs, a row for each, in the units in which they are printed.
+
+    Raises InputError as ``Trajectory.summary`` does.
+    """
+    rows: list[dict[str, Any]] = []
+    for run in runs:
+        found, criteria = run.summary(spans), {each.key: each for each in run.compliance(spans)}
+        of_run = _of_run(run, spans)
+        for key, label in LABELS.items():
+            value = label.scale * getattr(found, key)
+            rows.append(of_run | _figure(key, label.name, label.unit, value, criteria.pop(key, None)))
+        for key, criterion in criteria.items():
+            rows.append(of_run | _figure(key, criterion.name, criterion.unit, criterion.value, criterion))
+    return Sheet.of_rows("figures", rows, {"speed_kmh": HEADINGS["speed_kmh"]})
+
+
+def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
+    """Droppers by place in the span: at rest, and over the evaluated run. Raises InputError for no droppers.
+
+    Values at rest are those of the line as designed; they are missing for lines that have none.
+    """
+    rows: list[dict[str, Any]] = []
+    for run in runs:
+        at_rest = {round(each["position"], 5): each for each in _at_rest(run.design)}
+        for moving in moving_droppers(run, spans):
+            known = at_rest.get(round(moving.position, 5), dict.fromkeys(("number", *AT_REST)))
+            rows.append(_of_run(run, spans) | known | moving._asdict())
+    if not rows:
+        raise InputError("No forces in droppers are recorded, so there is no table of them.")
+    return Sheet.of_rows("droppers", rows, {"speed_kmh": HEADINGS["speed_kmh"], **AT_REST, **MOVING})
+
+
+def facts(run: Trajectory, without: str = "") -> Sheet:
+    """What a run is: line, pantograph, settings, and where it ended, as text.
+
+    without: why it has no figures.
+    """
+    given: dict[str, Any] = {"version": __version__, **{name: getattr(run, name) for name in RUN}}
+    given |= {"nominal_force (N)": f"{run.nominal_force:.6g}", "power supply": run.line.system}
+    given |= {"ending": run.ending, "no figures because": without}
+    given |= {f"setting {name}": value for name, value in run.settings.items()}
+    known = {HEADINGS.get(name, name): str(value) for name, value in given.items() if value != ""}
+    return Sheet("about", {"name": list(known), "value": list(known.values())})
+
+
+def save_tables(run: Trajectory, path: str | Path, spans: SpanChoice = None) -> None:
+    """Write the samples of a run as CSV, or all of its tables as a workbook (.xlsx), whole or not at all.
+
+    The workbook has no dropper's force sample by sample: hundreds of columns, which Excel opens slowly.
+    """
+    if Path(path).suffix.lower() not in WORKBOOKS:
+        write_table(samples(run), path)
+        return
+    sheets, without = [], ""
+    try:
+        sheets = [figures([run], spans)]
+        if run.dropper_force.size:
+            sheets.append(droppers([run], spans))
+    except InputError as error:
+        if spans is not None:
+            raise
+        without = str(error)  # it ended early, or before its start died out
+    write_workbook([*sheets, samples(run, with_droppers=False), facts(run, without)], path)
+
+
+def save_figures(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice = None) -> None:
+    """Write ``figures`` of runs as CSV, Excel or Parquet, whole or not at all. Runs without are left out.
+
+    Raises InputError where no run has figures.
+    """
+    write_table(figures(_with_figures(runs, spans), spans), path)
+
+
+def save_droppers(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice = None) -> None:
+    """Write ``droppers`` of runs as CSV, Excel or Parquet, as ``save_figures`` does."""
+    write_table(droppers(_with_figures(runs, spans), spans), path)
+
+
+def _with_figures(runs: Sequence[Trajectory], spans: SpanChoice) -> Sequence[Trajectory]:
+    """Runs that did not end early; all of them where every one did, so that the error says why."""
+    return [run for run in runs if not run.terminated or spans is not None] or runs
+
+
+def _of_run(run: Trajectory, spans: SpanChoice) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in RUN} | {"spans": in_words(run.spans(spans))}
+
+
+def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dict[str, Any]:
+    """A row; criterion: that of the figure, if it has one."""
+    limits = ("lowest", "highest", "margin", "kept", "source", "note")
+    lowest, highest, margin, kept, source, note = (
+        getattr(criterion, each) if criterion is not None else None for each in limits
+    )
+    return {
+        "key": key,
+        "figure": name,
+        "value": value,
+        "unit": unit,
+        "lowest": lowest,
+        "highest": highest,
+        "margin": margin,
+        "verdict": VERDICTS[kept],
+        "source": source or "",
+        "note": note or "",
+    }
+
+
+def _at_rest(design: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Droppers at rest of the line of a run, which older files do not hold."""
+    if "catenary" not in design:
+        return []
+    line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
+    return [each._asdict() for each in droppers_at_rest(line)]
