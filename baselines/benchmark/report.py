@@ -18,8 +18,6 @@ from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 170
-"""Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # with the decimals shown
     "std": 2,
     "mean": 1,

@@ -17,8 +17,8 @@ from .moment import felt, position_of
 SPANS = 3.0
 """Length of the shown part of the line (spans)."""
 FORCE_ROWS, HEIGHT_ROWS = 10, 6
-NARROW, WIDE = 40, 120
-"""Minimum and maximum number of columns."""
+WIDE = 120
+"""Maximum number of columns."""
 AXIS = 9
 """Columns for the numbers next to a chart."""
 EMPTY = "\u2800"
@@ -41,7 +41,7 @@ class Strip:
         self._limit = en50367.maximum_limit(float(task.speed[0]))
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        width = max(NARROW, min(options.max_width, WIDE))
+        width = min(options.max_width, WIDE)
         columns = width - AXIS
         seen, length = self._felt, SPANS * self._alignment.mean_length
         begin = max(0.0, self._position - length)
