@@ -66,7 +66,7 @@ films: $(READY)
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \
 	  --output docs/films/pantograph-stiffness.mp4
-	$(BIN)/panto film pd --catenary ohl-three-span --pantograph dsa350 $(SMALL) \
+	$(BIN)/panto film pd --catenary ohl-three-span --pantograph own-two-mass $(SMALL) \
 	  --output docs/films/pantograph-three-span.mp4
 
 # Slow proofs: more lines against finite elements, longer trainings, random environments.

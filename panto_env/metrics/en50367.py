@@ -52,10 +52,13 @@ def arcing_limit(speed: float) -> float:
 def criteria(figures: Figures, arcing: float, speed: float, system: str = "AC") -> list[Criterion]:
     """Mean force, σ, maximum and NQ (%) of a run, with their limits."""
     lowest = smallest_mean(speed, system)
-    unknown = f"no formula is known to us for the minimum mean force under {system}" if lowest is None else ""
+    highest = largest_mean(speed, system)
+    notes = [f"no formula is known to us for the minimum mean force under {system}"] * (lowest is None)
+    if figures.mean > highest or (lowest is not None and figures.mean < lowest):
+        notes.append("the option --mean-force en50367 trims the static force for a mean at the upper limit")
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"
     return [
-        _force("mean", figures.mean, lowest, largest_mean(speed, system), unknown),
+        _force("mean", figures.mean, lowest, highest, "; ".join(notes)),
         _force("std", figures.std, None, STD_OF_MEAN * figures.mean, ""),
         _force("max", figures.max, None, maximum_limit(speed), ""),
         Criterion("arcing", "arcing NQ", "%", arcing, None, arcing_limit(speed), SOURCE, length),

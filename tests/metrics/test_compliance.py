@@ -266,3 +266,20 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     ]
     assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
+
+
+@pytest.mark.parametrize("mean", [60.0, 110.0])
+def test_a_broken_mean_force_names_the_option_that_trims_it(mean):
+    within, beyond = (en50367.criteria(figures(mean=each), 0.0, 200 / 3.6, "AC") for each in (100.0, mean))
+    assert by_key(within)["mean"].note == ""
+    assert by_key(beyond)["mean"].kept is False
+    assert "--mean-force en50367" in by_key(beyond)["mean"].note
+    assert any("--mean-force en50367" in line for line in remarks(beyond))
+
+
+def test_the_option_that_trims_the_mean_force_keeps_the_limit():
+    run = simulate("re250", "own-two-mass", 200.0, mean_force="en50367")
+    criterion = by_key(run.compliance())["mean"]
+    assert criterion.kept, criterion
+    assert criterion.margin < 0.15
+    assert criterion.note == ""

@@ -58,7 +58,7 @@ def count(frame, colour):
 LINES = {
     "flexible": {"catenary": "en50318-2002"},
     "as built": {"catenary": "shinkansen-simple", "line_condition": "as-built"},
-    "three spans": {"catenary": "ohl-three-span", "pantograph": "dsa350"},
+    "three spans": {"catenary": "ohl-three-span", "pantograph": "own-two-mass"},
     "rig": {"catenary": "rig-flexible"},
 }
 

@@ -1,6 +1,6 @@
 """Motors in the collector head (paper 2, section 4.3): what proportional control of the contact force buys.
 
-The pantograph is ``atr95``, the line ``en50318-2002``, the motors ``head-motor``. The paper says that
+The pantograph is ``own-motor-head``, the line ``en50318-2002``, the motors ``head-motor``. The paper says that
 actuators on the articulated frame reach low frequencies only and those in the head suspension medium ones;
 ``at_power`` and ``at_force_limit`` compare frame, head and both under equal terms.
 """
@@ -31,7 +31,7 @@ from ...plant.actuators.motor.arrays import MotorArrays
 from ...plant.actuators.motor.power import MotorPower, motor_power
 from ...plant.state import Place, Row
 
-PANTOGRAPH, CATENARY, MOTOR = "atr95", "en50318-2002", "head-motor"
+PANTOGRAPH, CATENARY, MOTOR = "own-motor-head", "en50318-2002", "head-motor"
 PLACES = ("frame", "head", "both")
 CONTROL_INTERVAL = 2.5e-3
 """Own choice (s): a controller of its own beside the motors, as the board of the paper's rig."""
@@ -200,7 +200,7 @@ def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence
 
 
 def recorded_power(one: MotorPass, place: Place) -> MotorPower:
-    """Current, voltage and watts over a whole pass, from its record; ``atr95`` has but two masses."""
+    """Current, voltage and watts over a whole pass, from its record; ``own-motor-head`` has but two masses."""
     motor, record = cast(MotorActuator, actuator_settings(MOTOR)), one.record
     if place == Place.FRAME:
         return motor_power(motor, record.frame_force, record.frame_velocity, record.time_step)
