@@ -51,7 +51,7 @@ class Strip:
         yield Text.assemble(("━" * done, "bright_blue"), ("━" * (width - done), "dim"))
         yield Text("contact force (N), low-passed at 20 Hz; ╌ limit of EN 50367; x contact lost", style="dim")
         yield from self._force_chart(across, columns)
-        yield Text("height of the head (mm); 0: contact wire at a support", style="dim")
+        yield Text("height of the head (mm); 0: contact wire without sag", style="dim")
         yield from chart(across, 1e3 * seen.head, _round(1e3 * seen.head), HEIGHT_ROWS, columns)
         ends = f"{begin:.0f} m", f"{begin + length:.0f} m"
         yield Text(" " * AXIS + ends[0] + ends[1].rjust(columns - len(ends[0])), style="dim")

@@ -66,7 +66,12 @@ PLACES: dict[str, tuple[str, str, float, dict[str, Any]]] = {
         {"actuator": {"place": "both", "lag": 0.015}, "sensors": LATE, "control_interval": 0.02},
     ),
     "stiffness": ("periodic-stiffness", "three-mass", 260.0, {"sensors": "realistic", "bilateral": True}),
-    "three spans": ("ohl-three-span", "own-two-mass", 240.0, {"sensors": "realistic", "line_condition": WEAR}),
+    "three spans": (
+        "ohl-three-span",
+        "own-two-mass",
+        240.0,
+        {"sensors": "realistic", "line_condition": WEAR},
+    ),
 }
 # Passes of the reference model without a policy.
 SETTINGS: dict[str, dict[str, Any]] = {

@@ -119,8 +119,8 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     assert np.mean(table["nis"].to_numpy()) == pytest.approx(told["nis"], rel=0.05)
     assert picture.stat().st_size > 10_000
     shown = panto(
-        "estimate", record, "--pantograph", "own-two-mass", "--displacements", "--speed", "250", "--span", "60",
-        "--force-model", "periodic", "--lag", "0.1",
+        "estimate", record, "--pantograph", "own-two-mass", "--displacements", "--speed", "250",
+        "--span", "60", "--force-model", "periodic", "--lag", "0.1",
     )  # fmt: skip
     assert shown.returncode == 0, shown.stderr
     assert "from displacements, periodic" in " ".join(shown.stdout.split())

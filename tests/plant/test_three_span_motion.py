@@ -104,7 +104,8 @@ def solution():
 @pytest.fixture(scope="module")
 def runs():
     length = SPANS * load_catenary("ohl-three-span").span_length
-    return [simulate("ohl-three-span", "own-two-mass", 3.6 * SPEED, distance=length, time_step=h) for h in STEPS]
+    line = ("ohl-three-span", "own-two-mass", 3.6 * SPEED)
+    return [simulate(*line, distance=length, time_step=h) for h in STEPS]
 
 
 def in_span(values, number):

@@ -1,7 +1,8 @@
 """Motors in the collector head (paper 2, section 4.3): what proportional control of the contact force buys.
 
-The pantograph is ``own-motor-head``, the line ``en50318-2002``, the motors ``head-motor``. The paper says that
-actuators on the articulated frame reach low frequencies only and those in the head suspension medium ones;
+The pantograph is ``own-motor-head``, the line ``en50318-2002``, the motors ``head-motor``. The paper says
+that actuators on the articulated frame reach low frequencies only and those in the head suspension medium
+ones;
 ``at_power`` and ``at_force_limit`` compare frame, head and both under equal terms.
 """
 
@@ -200,7 +201,7 @@ def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence
 
 
 def recorded_power(one: MotorPass, place: Place) -> MotorPower:
-    """Current, voltage and watts over a whole pass, from its record; ``own-motor-head`` has but two masses."""
+    """Current, voltage and watts over a whole pass, from its record; the pantograph has two masses."""
     motor, record = cast(MotorActuator, actuator_settings(MOTOR)), one.record
     if place == Place.FRAME:
         return motor_power(motor, record.frame_force, record.frame_velocity, record.time_step)
