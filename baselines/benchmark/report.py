@@ -32,7 +32,7 @@ FIGURES = {  # with the decimals shown
 }
 OWN_LABELS = {
     "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
-    "power": Label("mechanical power of the actuators", "power", "W"),
+    "power": Label("mechanical power of the actuators", "mech. power", "W"),
     "saturation": Label("share of commands at the limit", "at limit", "-"),
 }
 LEGEND = (

@@ -212,11 +212,21 @@ def recorded_power(one: MotorPass, place: Place) -> MotorPower:
 def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) -> Table:
     """Change of the contact force's rms by band, sigma, and what it took; the first row has no motors.
 
+    Electrical: what the supply gives, net. Mechanical: magnitude of force times speed, as in the benchmark.
     Heat: of the hottest place's armatures, over what they bear; beyond 100 % no train could go on so.
     """
-    headings = ["motors on", "gain", "W", "heat (%)", "rms (N)", "F_m (N)", "σ (N)"]
+    headings = [
+        "motors on",
+        "gain",
+        "electrical (W)",
+        "mechanical (W)",
+        "heat (%)",
+        "rms (N)",
+        "F_m (N)",
+        "σ (N)",
+    ]
     headings += [f"{low:g}–{high:g} Hz (%)" for low, high in BANDS]
-    first: list[Any] = ["none", *"––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
+    first: list[Any] = ["none", *"–––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
     rows = [(*first, *(f"{rms:.2f} N" for rms in passive.bands))]
     for one in passes:
         figures, pairs = one.figures, zip(one.bands, passive.bands, strict=True)
@@ -226,6 +236,7 @@ def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) ->
                 one.place,
                 f"{one.gain:.2f}",
                 f"{one.power:.1f}",
+                f"{one.record.mechanical_power(SPANS):.1f}",
                 f"{100 * one.heat:.0f}",
                 f"{figures.effort:.1f}",
                 f"{figures.mean:.1f}",
