@@ -121,6 +121,7 @@ def on_terminal(*arguments, columns=100, interrupt=b""):
     process, terminal = pty.fork()
     if process == 0:
         os.environ["TERM"] = "xterm-256color"
+        os.environ.pop("COLUMNS", None)  # the terminal's own width counts
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # tests started in the background ignore it
         os.execv(Path(sys.executable).with_name("panto"), ["panto", *map(str, arguments)])
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 60, columns, 0, 0))
