@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from panto_env.metrics.criterion import Criterion, criteria_table, limits_in_wor
 from panto_env.metrics.figures import Figures, arcing, contact_loss
 
 from ..command import panto
+from ..pages import DOCS
 from .test_summary import RUN, SPAN, replace
 
 
@@ -283,3 +285,15 @@ def test_the_option_that_trims_the_mean_force_keeps_the_limit():
     assert criterion.kept, criterion
     assert criterion.margin < 0.15
     assert criterion.note == ""
+
+
+def test_the_tutorial_s_first_runs_keep_all_requirements():
+    """It had broken the mean force twice, with a pantograph whose values are invented."""
+    text = (DOCS / "own-line.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"panto list (\S+) --toml > my-line.toml", text)
+    runs = re.findall(r"panto simulate --catenary my-line.toml --pantograph (\S+) --speed (\d+)", text)
+    assert len(runs) == 2
+    for pantograph, speed in runs:
+        assert not pantograph.startswith("own-")
+        criteria = simulate(line, pantograph, float(speed)).compliance()
+        assert [each.name for each in criteria if each.kept is False] == []
