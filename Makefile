@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries clean
+.PHONY: demo benchmark test lint docs notebook proofs studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -66,8 +66,14 @@ films: $(READY)
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \
 	  --output docs/films/pantograph-stiffness.mp4
-	$(BIN)/panto film pd --catenary ohl-three-span --pantograph dsa350 $(SMALL) \
+	$(BIN)/panto film pd --catenary ohl-three-span --pantograph own-two-mass $(SMALL) \
 	  --output docs/films/pantograph-three-span.mp4
+
+# The project's address in what is published, once it has one: `make urls URL=https://...`.
+PLACEHOLDER := https://example.org/panto-env
+urls:
+	@test -n "$(URL)" || { echo "Name the address: make urls URL=https://..."; exit 1; }
+	sed -i 's|$(PLACEHOLDER)|$(URL)|; s|^# Placeholders:.*||' pyproject.toml CITATION.cff
 
 # Slow proofs: more lines against finite elements, longer trainings, random environments.
 CASES := 2000

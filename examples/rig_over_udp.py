@@ -23,7 +23,7 @@ from panto_env.catalog import load_pantograph
 from panto_env.rig import RigComputer
 from panto_env.rig.computer import load_rig
 
-RIG, PANTOGRAPH, SPEED_KMH = "rig-flexible", "dsa350", 250.0
+RIG, PANTOGRAPH, SPEED_KMH = "rig-flexible", "own-two-mass", 250.0
 NUMBER = struct.Struct("<d")
 PATIENCE = 20.0
 """Seconds after which either side gives up."""

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
+import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import rich.progress
 import rich.table
 import typer
-from rich.console import Console, ConsoleOptions, RenderableType
+from rich.console import Console, ConsoleDimensions, ConsoleOptions, Group, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
 from rich.text import Text
 
@@ -65,6 +70,16 @@ Plot = Annotated[
 ]
 
 
+WIDE = 200
+"""Columns of output where there is no terminal."""
+NARROW = 80
+"""Columns from which help is printed as tables."""
+UNLIMITED = 100_000
+"""Columns in which every table has its natural width."""
+LONGEST_WORD = 24
+"""Letters up to which a word of a table is never broken; only paths and names that users chose are longer."""
+
+
 class PlainConsole(Console):
     """A console for names and descriptions from users' files.
 
@@ -78,11 +93,73 @@ class PlainConsole(Console):
         """Escape strings and cells before they are measured, so that none is cut."""
         return super().render_str(harmless(text), **settings)
 
+    @property  # type: ignore[misc]  # nobody sets it
+    def size(self) -> ConsoleDimensions:
+        """Size of the terminal; where there is none at all, a pipe or a file takes wide tables."""
+        size = super().size
+        if any(map(os.isatty, (0, 1, 2))) or self._width is not None or "COLUMNS" in os.environ:
+            return size
+        return ConsoleDimensions(max(WIDE, size.width), size.height)
+
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Escape everything that is printed."""
+        """Escape everything that is printed, and print tables that are too wide for their words as lists."""
+        if isinstance(renderable, rich.table.Table) and renderable.box is not None:
+            renderable = _fitting(renderable, self, options or self.options)
         for segment in super().render(renderable, options):
             text, style, control = segment
             yield segment if control else Segment(harmless(text), style)
+
+
+def _fitting(table: rich.table.Table, to: Console, options: ConsoleOptions) -> RenderableType:
+    """A table in which no number is cut, in columns where they fit, otherwise as a list."""
+    unlimited = options.update(width=UNLIMITED)
+    if (natural := Measurement.get(to, unlimited, table).maximum) <= options.max_width:
+        return table
+    cells = [[column.header, *column.cells] for column in table.columns]
+    sizes = [[Measurement.get(to, unlimited, each) for each in column] for column in cells]
+    minimum = [min(LONGEST_WORD, max(size.minimum for size in column)) for column in sizes]
+    wishes = [max(size.maximum for size in column) for column in sizes]
+    spare = options.max_width - (natural - sum(wishes)) - sum(minimum)
+    if spare < 0:
+        return _as_list(table, options.max_width)
+    more = [wish - least for wish, least in zip(wishes, minimum, strict=True)]
+    shown, shown_columns = copy.copy(table), []
+    for column, least, wish in zip(table.columns, minimum, more, strict=True):
+        width = least + spare * wish // max(1, sum(more))
+        broken: list[RenderableType] = [_text(cell, width) for cell in column.cells]
+        shown_columns.append(replace(column, width=width, no_wrap=False, overflow="fold", _cells=broken))
+    shown.columns = shown_columns
+    return shown
+
+
+def _as_list(table: rich.table.Table, width: int) -> RenderableType:
+    """The rows of a table below each other, each with one value per line after its heading."""
+    lines: list[Text] = [] if table.title is None else [_text(table.title, width), Text()]
+    for row, *cells in zip(table.rows, *(column.cells for column in table.columns), strict=True):
+        for column, content in zip(table.columns, cells, strict=True):
+            cell, name = _text(content, width - 2), _one_line(column.header)
+            if not cell.plain.strip():
+                continue
+            cell.stylize(row.style or "")
+            if column is table.columns[0] and column.justify == "left":
+                lines.append(cell)  # the row's name
+            else:
+                lines.append(Text.assemble("  ", (f"{name}: " if name else "", "dim"), cell, overflow="fold"))
+        lines.append(Text())
+    return Group(*lines)
+
+
+def _text(cell: RenderableType, width: int) -> Text:
+    """A cell whose words that are wider than a width break after "=", and otherwise anywhere."""
+    text = cell.copy() if isinstance(cell, Text) else Text(harmless(str(cell)))
+    text.plain = re.sub(rf"\S{{{width + 1},}}", lambda word: word[0].replace("=", "= "), text.plain)
+    text.overflow = "fold"
+    return text
+
+
+def _one_line(heading: RenderableType) -> str:
+    """A heading without the line ends that make its column narrow."""
+    return re.sub(r"([._])\n", r"\1", str(heading)).replace("\n", " ")
 
 
 console = PlainConsole()

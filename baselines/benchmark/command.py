@@ -14,8 +14,8 @@ from panto_env.cluster import RayAddress
 from panto_env.terminal import (
     Force,
     Json,
-    PlainConsole,
     Plot,
+    console,
     counting,
     print_json,
     refuse_overwriting,
@@ -88,7 +88,7 @@ def benchmark(
     from ..report.page import save as save_page
     from ..report.result import parse_result
     from .plot import plot as draw
-    from .report import WIDTH, tables
+    from .report import tables
     from .seeds import salt_hash
 
     line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
@@ -116,9 +116,6 @@ def benchmark(
         if json:
             print_json(outcome.as_dict())
             return
-        console = PlainConsole()
-        if not console.is_terminal:
-            console = PlainConsole(width=WIDTH)
         console.print(tables(outcome))
         if settings.salt is not None:
             words = f"Seeds are made from the salt '{settings.salt}', SHA-256 {salt_hash(settings.salt)}."

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from panto_env.analysis.plots import SUPPORTS, mark_supports
+from panto_env.analysis.plots import mark_supports
+from panto_env.base import marks
 from panto_env.base.colours import LIMIT, series_colour
 from panto_env.base.units import from_kmh
 from panto_env.metrics import en50367
@@ -80,14 +81,14 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
-    words = f"limit of {en50367.maximum_source(run.line.system)}"
-    axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
-    axes.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
+    supply = run.line.system
+    marks.fit_force_axis(
+        [axes], en50367.maximum_limit(from_kmh(speed), supply), en50367.maximum_source(supply)
+    )
     mark_supports(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
-        xlabel=SUPPORTS,
+        xlabel=marks.POSITION,
         ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
         xlim=run.alignment.limits(shown),
     )

@@ -18,8 +18,6 @@ from .run import Benchmark
 from .settings import REFERENCE
 from .statistics import Cell
 
-WIDTH = 170
-"""Characters per line that a table needs; in a narrower terminal the policies' names are folded."""
 FIGURES = {  # with the decimals shown
     "std": 2,
     "mean": 1,
@@ -34,7 +32,7 @@ FIGURES = {  # with the decimals shown
 }
 OWN_LABELS = {
     "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
-    "power": Label("mechanical power of the actuators", "power", "W"),
+    "power": Label("mechanical power of the actuators", "mech. power", "W"),
     "saturation": Label("share of commands at the limit", "at limit", "-"),
 }
 LEGEND = (

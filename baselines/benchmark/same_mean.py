@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from panto_env import Trajectory, simulate
 from panto_env.base.errors import InputError
 
@@ -36,14 +34,3 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
         return NONE
     figures = passive.summary(spans)
     return PassiveFigures(figures.std, figures.cost_function)
-
-
-def power(run: Trajectory, spans: tuple[int, int]) -> float:
-    """Mechanical power (W) of the actuators, mean of its magnitude over the spans.
-
-    The frame's actuator acts between the ground and the frame, the head's between the frame and the head.
-    """
-    inside = run.inside(spans)
-    on_frame = run.frame_force * run.frame_velocity
-    on_head = run.head_force * (run.head_velocity - run.frame_velocity)
-    return float(np.mean(np.abs(on_frame) + np.abs(on_head), where=inside))

@@ -24,7 +24,7 @@ from ..oracle.stored import stored_actions
 from .actions import Played
 from .apart import find_apart
 from .controls import BLIND, ORACLE_TAPE, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
-from .same_mean import NONE, PassiveFigures, passive_at_mean_of, power
+from .same_mean import NONE, PassiveFigures, passive_at_mean_of
 from .settings import REFERENCE, BenchmarkSettings, Line
 from .trace import Trace, trace
 
@@ -58,7 +58,7 @@ class Row:
     figures: Figures
     action_rate: float  # rms change of the commanded force between control steps, per second (N/s)
     saturation: float  # share of control steps that command the actuator's maximum force
-    power: float  # mean magnitude of the actuators' mechanical power (W)
+    power: float  # mechanical, `Trajectory.mechanical_power` (W)
     pressed_std: float  # sigma of the passive pantograph at the same mean force (N)
     pressed_cost_function: float  # CF of that passive pantograph (N m)
 
@@ -107,7 +107,7 @@ def run_pass(
         changes = np.diff(commands, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
-        watts = power(run, spans)
+        watts = run.mechanical_power(spans)
         if policy != REFERENCE:
             arguments = _arguments(settings, line, speed_kmh, seed)
             at_same_mean = passive_at_mean_of(run, spans, arguments)

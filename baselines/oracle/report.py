@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
+from panto_env.base import marks
 from panto_env.base.colours import BLUE
 from panto_env.base.legend import legend_above
 from panto_env.base.table import Table
@@ -137,7 +138,7 @@ def plot(oracle: Oracle) -> Figure:
     for values, label in ((run.frame_force, "on the frame"), (run.head_force, "on the head")):
         if np.any(values):
             actuator.plot(position, values[inside], linewidth=0.9, label=label)
-    actuator.set(ylabel="actuator force (N)", xlabel="position (m); grey lines: supports")
+    actuator.set(ylabel="actuator force (N)", xlabel=marks.POSITION)
     for axis in (force, actuator):
         mark_supports(axis, run)
         axis.set_xlim(position[0], position[-1])

@@ -76,7 +76,7 @@ def leaderboard(result: Result) -> Table:
         Column("passes improved", lambda one: _share(one.improved)),
         Column("better than the next in", lambda one: _better(one, after.get(one.policy))),
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
-        Column("power (W)", lambda one: _figure(one.power, 1)),
+        Column("mechanical power (W)", lambda one: _figure(one.power, 1)),
         Column("at limit", lambda one: _share(one.saturation)),
         Column("mean moved in", lambda one: _moved(one.moved, one.passes)),
         Column("maximum ΔF_m of a pass (%)", lambda one: _signed(one.most_moved, 1)),

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.colours import BLUE, GREEN, LIMIT, PURPLE, VERMILION
+from ..base import marks
+from ..base.colours import BLUE, GREEN, PURPLE, VERMILION
 from ..base.files import PICTURES, check_output, write_whole
 from ..base.legend import legend_above
 from ..metrics import en50367
+from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
@@ -22,9 +24,6 @@ from ..plant.alignment import Spans
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-SUPPORTS = "position (m); grey lines: supports"
 
 
 def save(figure: Figure, path: str | Path) -> None:
@@ -63,6 +62,8 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
     covered, shown = run.spans(spans), run.inside(spans)
     position = run.position[shown]
     _draw_force(contact, run, shown, raw="0.75")
+    supply = run.line.system
+    marks.fit_force_axis([contact], en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply))
     height.plot(position, 1e3 * run.wire[shown], color=VERMILION, label="contact wire")
     height.plot(position, 1e3 * run.head[shown], color=BLUE, label="collector head")
     height.set(ylabel="height (mm)")
@@ -74,7 +75,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
         mark_supports(axis, run)
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
-    figure.axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(run, covered)}", xlim=(begin, end))
+    figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
     where = f"pantograph {run.pantograph}, line {run.catenary}, {run.speed_kmh:g} km/h"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
     figure.suptitle(f"{where}, policy {run.policy}, {shown_spans}")
@@ -92,16 +93,19 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
         note = ", ended early" if run.terminated else ""
         axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
         mark_supports(axis, run)
+    limit = en50367.maximum_limit(runs[0].speed, runs[0].line.system)
+    marks.fit_force_axis(axes.tolist(), limit, en50367.maximum_source(runs[0].line.system))
     legend_above(axes[0])
-    axes[-1].set(xlabel=f"{SUPPORTS}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans))
+    axes[-1].set(
+        xlabel=f"{marks.POSITION}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans)
+    )
     figure.suptitle(title)
     return figure
 
 
 def mark_supports(axis: Axes, run: Trajectory) -> None:
-    """Draw thin lines at the supports."""
-    for number in range(run.alignment.span_of(run.position[-1]) + 1):
-        axis.axvline(run.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
+    """Draw dashed lines at the supports of a run."""
+    marks.mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
 
 
 def say_what_is_hidden(axis: Axes) -> None:
@@ -120,16 +124,13 @@ def say_what_is_hidden(axis: Axes) -> None:
 
 
 def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str) -> None:
-    """Draw the contact force and its limits; shown: samples, (n,); raw: colour of the unfiltered force."""
+    """Draw the contact force; shown: samples, (n,); raw: colour of the unfiltered force."""
     position = run.position[shown]
     filtered = zero_phase_low_pass(run.contact_force, run.time_step)[shown]
-    limit = en50367.maximum_limit(run.speed, run.line.system)
-    words = f"{en50367.maximum_source(run.line.system)}: at most {limit:g} N"
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
     axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")
     axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
-    axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
-    axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
+    marks.mark_losses(axis, position[losses_of_contact(run.contact_force[shown])[0]].tolist())
     axis.set(ylabel="contact force (N)")
 
 

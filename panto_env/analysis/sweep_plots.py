@@ -7,6 +7,7 @@ from math import isnan
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from ..base import marks
 from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
 from ..base.units import from_kmh
 from ..metrics import en50367
@@ -74,10 +75,11 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
         for axis, key in zip(others, shown, strict=True):
             scaled = [LABELS[key].scale * row[key] for row in of_policy]
             axis.plot(values, scaled, color=colour, marker=".")
-    _draw_limits(force, others[shown.index("std")], next(iter(by_policy.values())), parameter)
+    notes = _draw_limits(force, others[shown.index("std")], next(iter(by_policy.values())), parameter)
     force.set(ylabel="contact force (N)")
     if no_loss:
-        force.set_title("No contact is lost in any pass.", loc="left", fontsize="small")
+        notes.append("No contact is lost in any pass.")
+    force.set_title(" ".join(notes), loc="left", fontsize="small")
     for axis, key in zip(others, shown, strict=True):
         axis.set(ylabel=f"{LABELS[key].name}\n({LABELS[key].unit})")
         if key == "contact_loss":  # never below 0
@@ -89,6 +91,7 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
     ]
     words = f"{en50367.maximum_source(rows[0]['system'])}: maximum; σ of 0.3 F_m ({next(iter(by_policy))})"
     handles.append(Line2D([], [], color=LIMIT, linestyle=DASHES, linewidth=0.9, label=words))
+    handles.append(Line2D([], [], color=LIMIT, linewidth=0.9, label="0 N: no contact"))
     handles += [
         Line2D([], [], color=series_colour(k), marker=".", label=name) for k, name in enumerate(by_policy)
     ]
@@ -97,16 +100,24 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
     return figure
 
 
-def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) -> None:
-    """Draw the line of no contact, and the maximum force and σ; σ at the first policy's mean force."""
+def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) -> list[str]:
+    """Draw the line of no contact, and the maximum force and σ; σ at the first policy's mean force.
+
+    Returns what is to be said: a maximum that is far above all forces is left out of the axis.
+    """
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
     limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
-    force.plot(values, limits, drawstyle="steps-pre", **style)
+    high = force.dataLim.y1
+    if min(limits) > marks.NEAR * high:
+        most = " or ".join(f"{limit:g}" for limit in sorted({*limits}))
+        notes = [f"{en50367.maximum_source(rows[0]['system'])}'s maximum of {most} N is above the axis."]
+    else:
+        notes = []
+        force.plot(values, limits, drawstyle="steps-pre", **style)
     std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
-    place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "bottom", "fontsize": "x-small"}
-    force.annotate("0 N: no contact", (0.01, 0), **place)
+    return notes
 
 
 def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str]) -> Figure:

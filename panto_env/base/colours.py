@@ -6,6 +6,8 @@ SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BROWN)
 """Colours of several series, in this order."""
 LIMIT = "0.1"
 """Colour of limits: nearly black, unlike all series."""
+SUPPORT = "0.55"
+"""Colour of the lines at supports, darker than a grid."""
 HIGH_IS_BAD, LOW_IS_BAD = "cividis", "cividis_r"
 """Colour maps of Matplotlib: in both dark is good and bright is bad."""
 

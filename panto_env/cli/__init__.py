@@ -17,6 +17,7 @@ from ..base.plain_characters import show_always
 from ..base.shown import one_line
 from ..base.standard_streams import guarded_streams, say
 from ..base.version import __version__
+from ..terminal import NARROW, console
 from .panels import PanelGroup
 
 UsageError: Any = typer.BadParameter.__base__
@@ -116,6 +117,8 @@ def make_app() -> typer.Typer:
         pretty_exceptions_enable=False,
         help="Pantograph-catenary simulation, control and learning.",
         context_settings={"help_option_names": ["-h", "--help"]},
+        # Typer's tables cut words in a narrow terminal; plain help folds them.
+        rich_markup_mode="rich" if console.width >= NARROW else None,
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)

@@ -11,7 +11,7 @@ from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..terminal import Json, Plot, console, print_json, print_table, progress_console, written_last
 
 RIGS = ("rig", "rig-flexible")
-PANTOGRAPH, SPEED_KMH = "dsa350", 250.0
+PANTOGRAPH, SPEED_KMH = "own-two-mass", 250.0
 REFERENCE = "en50318-2002"
 """Line with which a rig is compared if its own line has no droppers: paper 2's finite elements were of it."""
 
@@ -48,7 +48,7 @@ def rig(
 ) -> None:
     """Run a pantograph on a rig and on the line itself, and print how well the rig follows the line.
 
-    By default that is pantograph dsa350 at 250 km/h, as in paper 2.
+    By default that is pantograph own-two-mass at 250 km/h, as in paper 2.
     """
     from ..catalog import load_catenary, load_pantograph
     from ..rig import report

@@ -30,6 +30,9 @@ from ..terminal import (
     written_last,
 )
 
+LIVE_COLUMNS = 40
+"""Minimum width of a terminal for the live picture."""
+
 
 @with_settings(left_out=("observation",))
 def simulate(
@@ -110,14 +113,15 @@ def _shown(
     live: bool, policy: str
 ) -> Iterator[tuple[Callable[[float], None] | None, Callable[[Any], None] | None]]:
     """Progress of a run as a bar or as a live picture: arguments ``progress`` and ``watch`` of the run."""
-    if live and console.is_terminal and not console.is_dumb_terminal:
+    drawable = console.is_terminal and not console.is_dumb_terminal and console.width >= LIVE_COLUMNS
+    if live and drawable:
         from ..render.live import live as on_terminal
 
         with on_terminal(console, policy) as watch:
             yield None, watch
         return
     if live:
-        say("--live needs a terminal to draw in; the run continues without.")
+        say(f"--live needs a terminal of {LIVE_COLUMNS} columns to draw in; the run continues without.")
     with Progress(
         console=progress_console, transient=True, disable=not progress_console.is_terminal
     ) as progress:

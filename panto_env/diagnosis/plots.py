@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import marks
 from ..base.colours import BLUE, LIMIT, ORANGE
 from ..base.legend import legend_above
 from .diagnosis import Diagnosis
@@ -32,17 +33,15 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
-        for number in evidence.alignment.supports_within(diagnosis.begin, diagnosis.end):
-            axis.axvline(evidence.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
+        supports = evidence.alignment.supports_within(diagnosis.begin, diagnosis.end)
+        marks.mark_supports(axis, map(evidence.alignment.support, supports))
         for finding in diagnosis.findings:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {finding.span}, {place(finding)}"
         above = force.get_xaxis_transform()
         force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
-    score.set(
-        ylabel="score (-)", xlabel="position (m); grey lines: supports", xlim=(diagnosis.begin, diagnosis.end)
-    )
+    score.set(ylabel="score (-)", xlabel=marks.POSITION, xlim=(diagnosis.begin, diagnosis.end))
     legend_above(score, 3)
     figure.suptitle(title)
     return figure

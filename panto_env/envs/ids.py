@@ -21,7 +21,7 @@ IDS: dict[str, dict[str, Any]] = {
         "reward": "benchmark",
     },
     "PantographStiffness-v0": {"catenary": "periodic-stiffness", "pantograph": "three-mass"},
-    "PantographThreeSpan-v0": {"catenary": "ohl-three-span", "pantograph": "dsa350"},
+    "PantographThreeSpan-v0": {"catenary": "ohl-three-span", "pantograph": "own-two-mass"},
 }
 """Registered ids and the arguments that set them apart."""
 BARE = {name: default(name) for name in IDS["Pantograph-v0"]}

@@ -68,12 +68,14 @@ def criteria(
 
     system_source: where the line's power supply comes from.
     """
-    supply = f"this and other limits are those for {system}, the line's power supply ({system_source})"
+    notes = [f"this and other limits are those for {system}, the line's power supply ({system_source})"]
+    lowest_mean, highest_mean = smallest_mean(speed, system), largest_mean(speed, system)
+    if not lowest_mean <= figures.mean <= highest_mean:
+        notes.append("the option --mean-force en50367 trims the static force for a mean at the upper limit")
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"
-    mean = smallest_mean(speed, system), largest_mean(speed, system)
     highest, source = maximum_limit(speed, system), f"{maximum_source(system)}, recalled"
     return [
-        _force("mean", figures.mean, *mean, SOURCE, supply),
+        _force("mean", figures.mean, lowest_mean, highest_mean, SOURCE, "; ".join(notes)),
         _force("std", figures.std, None, STD_OF_MEAN * figures.mean, SOURCE),
         _force("max", figures.max, None, highest, source),
         Criterion("arcing", "arcing NQ", "%", arcing, None, arcing_limit(speed, system), SOURCE, length),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array
 
@@ -56,11 +57,17 @@ def contact_loss(force: Array) -> float:
     return float(100 * np.mean(force <= 0))
 
 
+def losses_of_contact(force: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The first sample of each loss of contact and the first one after it, (losses,) each; force: (n,), N."""
+    edges = np.diff(np.concatenate([[0], (force <= 0).astype(int), [0]]))
+    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+
+
 def arcing(force: Array, time_step: float) -> float:
     """NQ (%): share of time in contact losses longer than ``ARC``, at the resolution of the time step.
 
     The current is assumed to flow all the time. CL, in contrast, counts contact losses of any length.
     """
-    edges = np.diff(np.concatenate([[0], (force <= 0).astype(int), [0]]))
-    steps = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
+    begins, ends = losses_of_contact(force)
+    steps = ends - begins
     return float(100 * steps[steps * time_step > ARC + 1e-9].sum() / len(force))

@@ -145,6 +145,17 @@ class Trajectory:
             tension[near_train(self, spans)] if tension.size else tension,
         )
 
+    def mechanical_power(self, spans: SpanChoice = None) -> float:
+        """Mechanical power (W) of the actuators, mean of its magnitude over the spans.
+
+        The frame's actuator acts between the ground and the frame, the head's between the head and the mass
+        below it. It is not what a supply gives: motors lose power, and feed some back. Raises InputError as
+        ``spans`` does.
+        """
+        on_frame = self.frame_force * self.frame_velocity
+        on_head = self.head_force * (self.head_velocity - self.frame_velocity)
+        return float(np.mean(np.abs(on_frame) + np.abs(on_head), where=self.inside(spans)))
+
     @property
     def speed_kmh(self) -> float:
         """Speed of the train, its mean where it drifts (km/h)."""

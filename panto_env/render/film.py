@@ -13,9 +13,10 @@ from ..analysis.simulation import ready_pass, steps_of_policy
 from ..base.errors import InputError
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
+from ..metrics.trajectory import Trajectory
 from ..plant.state import Row
 from .filmed import Filmed, alike
-from .moment import moment_of
+from .moment import BEHIND, moment_of
 from .picture import Picture
 
 FASTEST = 25.0
@@ -59,7 +60,8 @@ def frames(
     size: width and height of the film (px). progress: called with the finished share.
     """
     width, height = size[0], size[1] // len(filmed)
-    passes = [_Pass(each, figures_in_words(each, filmed[0]), (width, height)) for each in filmed]
+    highest = max(_highest(each.run, what) for each in filmed)  # one scale for all
+    passes = [_Pass(each, figures_in_words(each, filmed[0]), (width, height), highest) for each in filmed]
     number = 0
     while passes[0].time < what.end and all(each.step() for each in passes):
         if passes[0].time < what.begin:
@@ -73,14 +75,23 @@ def frames(
         number += 1
 
 
+def _highest(run: Trajectory, what: Excerpt) -> float:
+    """Maximum contact force (N) of a run that a film shows: its first frame shows some before it begins."""
+    begin = what.begin - BEHIND * run.alignment.mean_length / run.speed
+    shown = run.contact_force[(run.time >= begin) & (run.time <= what.end)]
+    return float(shown.max(initial=0.0))
+
+
 class _Pass:
     """One pass that is drawn while it runs."""
 
-    def __init__(self, filmed: Filmed, figures: dict[str, str], size: tuple[int, int]) -> None:
+    def __init__(
+        self, filmed: Filmed, figures: dict[str, str], size: tuple[int, int], highest: float
+    ) -> None:
         run = filmed.run
         self.task, driver = ready_pass(filmed.policy, filmed.settings, filmed.seed)
         self._steps = steps_of_policy(self.task, driver, run.policy)
-        self._picture = Picture(*size)
+        self._picture = Picture(*size, highest)
         self._title = f"{filmed.title}: pantograph {run.pantograph}, line {run.catenary}"
         self._figures = figures
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.marks import NEAR
 from .moment import AHEAD, BEHIND, Moment
 
 TITLE, CHART, ROOF = 0.075, 0.30, 0.045
@@ -18,6 +19,10 @@ MINIMUM_HEIGHT = 0.35
 """Minimum height that a picture shows above the contact wire (m)."""
 CHAIN = 0.55
 """Share of the distance from wire to roof over which the pantograph's masses are spread."""
+MARGIN = 0.075
+"""Share of the frame's width to the left of the chart, for the labels of its axis."""
+OF_NOMINAL, ROUND_FORCE = 2.0, 20.0
+"""Minimum maximum of the chart's axis, of the nominal force, and what it is rounded up to (N)."""
 ARROW = 0.11
 """Length of the maximum force's arrow, as a share of the frame's height."""
 ROUND_TO = (1, 2, 5, 10, 15, 20, 30, 50, 100, 200)
@@ -83,10 +88,15 @@ class Layout:
         """Pixels, (n, 2), of a line of places and heights (m)."""
         return np.column_stack([self.across(places, position), self.up(heights)])
 
+    @property
+    def margin(self) -> float:
+        """Left end of the chart (px from the left)."""
+        return MARGIN * self.width
+
     def forces(self, forces: Array | float, largest: float) -> Array:
-        """Pixels from the top for contact forces (N) in the chart, from 0 to beyond the limit."""
+        """Pixels from the top for contact forces (N) in the chart, from 0 to ``largest``."""
         top, bottom = self.chart
-        low, high = -0.06 * largest, 1.12 * largest
+        low, high = -0.06 * largest, 1.06 * largest
         shown = np.clip(forces, low, high)
         return bottom - (bottom - top) * (np.asarray(shown) - low) / (high - low)
 
@@ -102,6 +112,15 @@ class Layout:
     def arrow(self, force: float, limit: float) -> float:
         """Length of a force's arrow (px), negative where it points down."""
         return float(np.clip(force / limit, -1.0, 1.0)) * ARROW * self.height
+
+
+def force_axis(highest: float, nominal: float, limit: float) -> float:
+    """Maximum (N) of an axis for contact forces up to ``highest``; the limit is on it where it is near.
+
+    With a nominal force of 54 N, an axis up to a limit of 350 N would be two thirds empty.
+    """
+    maximum = ROUND_FORCE * np.ceil(max(OF_NOMINAL * nominal, highest) / ROUND_FORCE)
+    return float(max(maximum, limit) if limit <= NEAR * maximum else maximum)
 
 
 def lost(force: Array) -> NDArray[np.bool_]:

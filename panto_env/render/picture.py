@@ -11,12 +11,15 @@ from ..base.arrays import Array
 from ..base.colours import BLUE, ORANGE, VERMILION
 from ..base.units import to_kmh
 from ..plant.state import Place
-from .canvas import Canvas, rgb, zigzag
-from .layout import Layout, lost
+from .canvas import Canvas, Colour, rgb, zigzag
+from .layout import TITLE, Layout, force_axis, lost
 from .moment import Moment
 
 GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222, 227, 232)
 METAL, TRAIN, RAW = (70, 78, 88), (196, 204, 213), (186, 194, 203)
+SUPPORT = (135, 144, 154)
+STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
+"""Possible distances of the lines of the chart (N), and how many there are at most."""
 FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
 NEAREST = 4
 """Minimum distance of the points of a wire (px)."""
@@ -27,9 +30,13 @@ WORDS = 0.0222
 class Picture:
     """Draws moments of one lane, frame after frame."""
 
-    def __init__(self, width: int, height: int) -> None:
-        """Raises InputError where OpenCV is not installed."""
+    def __init__(self, width: int, height: int, highest: float = 0.0) -> None:
+        """highest: maximum contact force (N) of all frames, where it is known; otherwise the axis grows.
+
+        Raises InputError where OpenCV is not installed.
+        """
         self._size = width, height
+        self._known_highest = self._highest = highest
         self.canvas, self._still = Canvas(width, height), Canvas(width, height)
         self._layout: Layout | None = None
         self._drawn_for: tuple[object, ...] = ()
@@ -39,17 +46,20 @@ class Picture:
         layout = self._layout
         if layout is None or layout.span != moment.alignment.mean_length or moment.time == 0:
             layout = self._layout = Layout.of(moment, *self._size)
+            self._highest = self._known_highest
+        self._highest = max(self._highest, float(moment.force.max(initial=0.0)))
+        axis = force_axis(self._highest, moment.nominal_force, moment.largest_force)
         rows = _rows(moment)
-        what = (layout, moment.title, moment.largest_force, moment.nominal_force, *rows)
+        what = (layout, moment.title, axis, moment.largest_force, moment.nominal_force, *rows)
         if self._drawn_for != what:
             self._drawn_for = what
-            _draw_still(self._still, layout, moment)
+            _draw_still(self._still, layout, moment, axis)
             _draw_rows(self._still, layout, list(rows), named=True)
         self.canvas.start_from(self._still)
         _draw_line(self.canvas, layout, moment)
         _draw_pantograph(self.canvas, layout, moment)
         _draw_actuators(self.canvas, layout, moment)
-        _draw_force(self.canvas, layout, moment)
+        _draw_force(self.canvas, layout, moment, axis)
         _draw_rows(self.canvas, layout, list(rows.values()), named=False)
         return self.canvas.pixels
 
@@ -58,36 +68,58 @@ def _size(layout: Layout) -> float:
     return WORDS * layout.height
 
 
-def _draw_still(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw the parts that do not change from frame to frame."""
+def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
+    """Draw the parts that do not change from frame to frame; axis: maximum of the chart (N)."""
     canvas.fill(GROUND)
-    size, right = _size(layout), layout.pantograph
+    size, left, right = _size(layout), layout.margin, layout.pantograph
     canvas.words(0.015 * layout.width, 0.04 * layout.height, moment.title, INK, 1.35 * size, bold=True)
     _draw_scale(canvas, layout)
     canvas.box(0, layout.roof, layout.pantograph + 0.1 * layout.width, 0.027 * layout.height, TRAIN)
     words = "train"
     canvas.words(0.01 * layout.width, layout.roof + 0.0135 * layout.height, words, METAL, 0.8 * size)
     top, bottom = layout.chart
-    canvas.box(0, top, right, bottom - top, (255, 255, 255))
-    largest = moment.largest_force
-    for force in range(0, int(largest) + 1, 100):
-        y = float(layout.forces(float(force), largest))
-        canvas.line([(0, y), (right, y)], FAINT)
-        words = f"{force} N" if force else "0 N: no contact"
-        canvas.words(0.01 * layout.width, y - 0.6 * size, words, QUIET, 0.8 * size)
-    dashes = {moment.standard: largest, "nominal": moment.nominal_force}
-    for name, level in dashes.items():
-        y = float(layout.forces(level, largest))
-        for x in np.arange(0, right, 14):
-            canvas.line([(x, y), (x + 7, y)], INK if name == moment.standard else QUIET)
-        if name == moment.standard:
-            words = f"limit of {name}: {level:.0f} N"
-            canvas.words(right - 6, y - 0.6 * size, words, QUIET, 0.8 * size, anchor="right")
-    y = float(layout.forces(0.0, largest))
-    canvas.line([(0, y), (right, y)], INK)
-    x = 0.01 * layout.width
-    for words, colour in (("contact force", INK), ("low-passed at 20 Hz", FORCE), ("raw", QUIET)):
-        x += canvas.words(x, top - 0.75 * size, words, colour, 0.9 * size, bold=colour == INK) + size
+    canvas.box(left, top, right - left, bottom - top, (255, 255, 255))
+    for force in range(0, int(axis) + 1, next(step for step in STEPS if axis <= MOST_STEPS * step)):
+        y = float(layout.forces(float(force), axis))
+        canvas.line([(left, y), (right, y)], INK if force == 0 else FAINT)
+        canvas.words(left - 0.4 * size, y, f"{force} N", QUIET, 0.8 * size, anchor="right")
+    _dashes(canvas, left, right, float(layout.forces(moment.nominal_force, axis)), QUIET)
+    if moment.largest_force <= axis:
+        _dashes(canvas, left, right, float(layout.forces(moment.largest_force, axis)), INK)
+    _draw_legend(canvas, layout, moment, axis)
+
+
+def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
+    """Draw the names of the chart's lines and marks above it, where they cover nothing."""
+    size, y = 0.85 * _size(layout), layout.chart[0] - 0.75 * _size(layout)
+    x = layout.margin
+    limit = f"{moment.standard}: {moment.largest_force:.0f} N"
+    if moment.largest_force > axis:
+        limit += ", above"
+    entries = (("contact force to 20 Hz", FORCE), ("raw", RAW), ("contact lost", BAD), ("support", SUPPORT))
+    for words, colour in entries:
+        _draw_sign(canvas, x, y, size, words, colour)
+        x += 1.8 * size
+        x += canvas.words(x, y, words, QUIET, size) + 0.9 * size
+    canvas.words(layout.pantograph, y, limit, INK, size, anchor="right")
+
+
+def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colour: Colour) -> None:
+    """Draw what an entry of the legend stands for, as the chart has it."""
+    if words == "contact lost":
+        canvas.box(x + 0.7 * size, y - 0.35 * size, 0.7 * size, 0.7 * size, colour)
+    elif words == "support":
+        for k in range(2):
+            top = y + (0.7 * k - 0.6) * size
+            canvas.line([(x + 1.1 * size, top), (x + 1.1 * size, top + 0.45 * size)], colour)
+    else:
+        canvas.line([(x, y), (x + 1.5 * size, y)], colour, 2.4)
+
+
+def _dashes(canvas: Canvas, left: float, right: float, y: float, colour: Colour) -> None:
+    """Draw a dashed level line."""
+    for x in np.arange(left, right, 14):
+        canvas.line([(x, y), (min(x + 7, right), y)], colour)
 
 
 def _draw_scale(canvas: Canvas, layout: Layout) -> None:
@@ -98,7 +130,8 @@ def _draw_scale(canvas: Canvas, layout: Layout) -> None:
     canvas.line([(right - long, y), (right, y)], QUIET, 2)
     canvas.words(right - 0.5 * long, y - 0.7 * size, "10 m", QUIET, 0.8 * size, anchor="middle")
     canvas.line([(right, y), (right, y + high)], QUIET, 2)
-    canvas.words(right - 0.5 * size, y + 0.5 * high, "10 cm", QUIET, 0.8 * size, anchor="right")
+    beside = y + (0.5 * high if high > 1.2 * size else high + 0.3 * size)  # clear of the level line
+    canvas.words(right - 0.5 * size, beside, "10 cm", QUIET, 0.8 * size, anchor="right")
     words = f"heights × {layout.exaggeration}" if layout.exaggeration > 1 else "heights to scale"
     canvas.words(right - long - size, y, words, QUIET, 0.9 * size, anchor="right")
 
@@ -134,7 +167,8 @@ def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | N
     canvas.words(x, float(contact[0, 1]) + size, "contact wire", QUIET, size)
     if upper is not None:
         highest = float(upper[:, 1].min())
-        canvas.words(x, highest - 0.4 * size, "messenger wire", QUIET, size)
+        below_title = (TITLE + 0.01) * layout.height
+        canvas.words(x, max(highest - 1.2 * size, below_title), "messenger wire", QUIET, size)
     if slack:
         canvas.words(x, float(contact[0, 1]) + 2.4 * size, "slack dropper", BAD, size)
 
@@ -209,19 +243,23 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
         canvas.words(x - 20 * scale, y, words, (176, 110, 0), _size(layout), anchor="right")
 
 
-def _draw_force(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw the contact force below the places where it acted."""
-    if len(moment.places) < 2:
+def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
+    """Draw the contact force below the places where it acted, and dashed lines at supports."""
+    begin = moment.position - (layout.pantograph - layout.margin) / layout.per_metre
+    for number in moment.alignment.supports_within(begin, moment.position):
+        at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
+        for y in np.arange(layout.chart[0], layout.chart[1], 11):
+            canvas.line([(at, y), (at, min(y + 6, layout.chart[1]))], SUPPORT)
+    shown = moment.places >= begin
+    if shown.sum() < 2:
         return
-    x, largest = layout.across(moment.places, moment.position), moment.largest_force
-    for support in layout.across(moment.line.supports, moment.position).tolist():
-        if support < layout.pantograph:
-            canvas.line([(support, layout.chart[0]), (support, layout.chart[1])], FAINT)
-    canvas.line(np.column_stack([x, layout.forces(moment.force, largest)]), RAW)
-    canvas.line(np.column_stack([x, layout.forces(moment.filtered, largest)])[::-2], FORCE, 2.4)
-    for place in x[lost(moment.force)].tolist():
-        canvas.box(place - 1, float(layout.forces(0.0, largest)) - 4, 3, 9, BAD)
-    canvas.dot(layout.pantograph, float(layout.forces(float(moment.filtered[-1]), largest)), 5, FORCE, GROUND)
+    x, force = layout.across(moment.places[shown], moment.position), moment.force[shown]
+    filtered = moment.filtered[shown]
+    canvas.line(np.column_stack([x, layout.forces(force, axis)]), RAW)
+    canvas.line(np.column_stack([x, layout.forces(filtered, axis)])[::-2], FORCE, 2.4)
+    for place in x[lost(force)].tolist():
+        canvas.box(place - 1, float(layout.forces(0.0, axis)) - 4, 3, 9, BAD)
+    canvas.dot(layout.pantograph, float(layout.forces(float(filtered[-1]), axis)), 5, FORCE, GROUND)
 
 
 def _rows(moment: Moment) -> dict[str, str]:

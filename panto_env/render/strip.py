@@ -17,8 +17,8 @@ from .moment import felt, position_of
 SPANS = 3.0
 """Length of the shown part of the line (spans)."""
 FORCE_ROWS, HEIGHT_ROWS = 10, 6
-NARROW, WIDE = 40, 120
-"""Minimum and maximum number of columns."""
+WIDE = 120
+"""Maximum number of columns."""
 AXIS = 9
 """Columns for the numbers next to a chart."""
 EMPTY = "\u2800"
@@ -42,7 +42,7 @@ class Strip:
         self._limit = en50367.maximum_limit(float(task.speed[0]), plant.catenary.system)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        width = max(NARROW, min(options.max_width, WIDE))
+        width = min(options.max_width, WIDE)
         columns = width - AXIS
         seen, length = self._felt, SPANS * self._alignment.mean_length
         begin = max(0.0, self._position - length)
@@ -53,7 +53,7 @@ class Strip:
         limit = f"╌ limit of {self._standard}"
         yield Text(f"contact force (N), low-passed at 20 Hz; {limit}; x contact lost", style="dim")
         yield from self._force_chart(across, columns)
-        yield Text("height of the head (mm); 0: contact wire at a support", style="dim")
+        yield Text("height of the head (mm); 0: contact wire without sag", style="dim")
         yield from chart(across, 1e3 * seen.head, _round(1e3 * seen.head), HEIGHT_ROWS, columns)
         ends = f"{begin:.0f} m", f"{begin + length:.0f} m"
         yield Text(" " * AXIS + ends[0] + ends[1].rjust(columns - len(ends[0])), style="dim")

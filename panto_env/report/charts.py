@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.colours import BLUE, LIMIT, series_colour
+from ..base import marks
+from ..base.colours import BLUE, series_colour
 from ..base.legend import legend_above
 from ..metrics import en50367
 from ..metrics.low_pass import zero_phase_low_pass
@@ -22,15 +23,18 @@ HIGHEST = 25.0
 """Maximum frequency of the spectra (Hz)."""
 
 
-def drawn(draw: Callable[[Axes], Any], height: float = 3.2) -> str:
-    """A function's drawing as SVG; the same drawing gives the same text."""
+def drawn(draw: Callable[[Axes], Any], height: float = 3.2, *, along_line: bool = False) -> str:
+    """A function's drawing as SVG; the same drawing gives the same text.
+
+    along_line: whether its vertical lines are supports, so that the grid has none.
+    """
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, height), layout="constrained")
     axes = figure.subplots()
     draw(axes)
-    axes.grid(color="0.92")
+    axes.grid(color="0.92", axis="y" if along_line else "both")
     axes.set_axisbelow(True)
     file = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": "panto-env"}):
@@ -39,27 +43,27 @@ def drawn(draw: Callable[[Axes], Any], height: float = 3.2) -> str:
     return text[text.index("<svg") :]
 
 
-def force_along(one: Findings) -> str:
-    """Contact force along the evaluated spans."""
+def force_along(one: Findings, found: Sequence[Findings]) -> str:
+    """Contact force along the evaluated spans; found: all runs of the page, for the same scale."""
+    extremes = [
+        extreme(each.run.contact_force[each.inside]) for each in found for extreme in (np.min, np.max)
+    ]
 
     def draw(axes: Axes) -> None:
         run, inside = one.run, one.inside
         position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
         axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
-        limit = en50367.maximum_limit(run.speed, run.line.system)
-        words = f"{en50367.maximum_source(run.line.system)}: {limit:.0f} N"
-        axes.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
-        axes.axhline(0, color=LIMIT, linewidth=0.9)
-        for loss in one.losses:
-            axes.plot(loss.position, 0, "v", color=LIMIT, markersize=5)
-        for number in run.alignment.supports_within(position[0], position[-1]):
-            axes.axvline(run.alignment.support(number), color="0.85", linewidth=0.8, zorder=0)
-        axes.set(xlabel="position (m); grey lines: supports", ylabel="contact force (N)")
-        axes.set_xlim(position[0], position[-1])
-        legend_above(axes, 4)
+        marks.mark_losses(axes, [loss.position for loss in one.losses])
+        supply = run.line.system
+        limit, standard = en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply)
+        marks.fit_force_axis([axes], limit, standard, extremes)
+        supports = run.alignment.supports_within(position[0], position[-1])
+        marks.mark_supports(axes, map(run.alignment.support, supports))
+        axes.set(xlabel=marks.POSITION, ylabel="contact force (N)", xlim=(position[0], position[-1]))
+        legend_above(axes, 3)
 
-    return drawn(draw)
+    return drawn(draw, along_line=True)
 
 
 def force_folded(names: Mapping[Findings, str]) -> str:
@@ -103,10 +107,8 @@ def spectrum(names: Mapping[Findings, str]) -> str:
         places = np.diff([dropper.position for dropper in first.droppers])
         if places.size:
             passing[f"per dropper{of}"] = run.speed / float(np.median(places))
-        for words, at in passing.items():
-            axes.axvline(at, color="0.5", linestyle=":", linewidth=1)
-            axes.annotate(f"{words}: {at:.2f} Hz", (at, 0.98), xycoords=("data", "axes fraction"),
-                          rotation=90, va="top", ha="right", fontsize="small")  # fmt: skip
+        for (words, at), style in zip(passing.items(), (":", "-."), strict=False):
+            axes.axvline(at, color="0.4", linestyle=style, linewidth=1.2, label=f"{words}: {at:.2f} Hz")
         axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N), raw force", xlim=(0, HIGHEST))
         axes.set_ylim(bottom=0)
         legend_above(axes, 4)

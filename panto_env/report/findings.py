@@ -12,7 +12,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.criterion import Criterion
 from ..metrics.droppers import MovingDropper, moving_droppers
-from ..metrics.figures import Figures
+from ..metrics.figures import Figures, losses_of_contact
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
@@ -134,9 +134,7 @@ class Findings:
     def losses(self) -> list[Loss]:
         """Contact losses in the evaluated spans."""
         run = self.run
-        lost = (run.contact_force[self.inside] <= 0).astype(int)
-        edges = np.diff(np.concatenate([[0], lost, [0]]))
-        begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        begins, ends = losses_of_contact(run.contact_force[self.inside])
         position = run.position[self.inside]
         return [
             Loss(float(position[begin]), float((end - begin) * run.time_step))

@@ -49,7 +49,7 @@ def page(found: Sequence[Findings]) -> str:
         lines=lines,
         pantographs=_different(found, "pantograph"),
         stiffness={one: charts.stiffness(one) for one in lines if one.elasticity},
-        along=[charts.force_along(one) for one in found],
+        along=[charts.force_along(one, found) for one in found],
         folded=charts.force_folded(judged) if judged else "",
         spectrum=charts.spectrum(judged) if judged else "",
         uplifts=charts.uplifts(names) if any(one.uplifts for one in found) else "",

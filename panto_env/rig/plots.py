@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import mark_supports
+from ..base import marks
 from ..base.colours import series_colour
 from ..base.legend import legend_above
 from ..metrics.low_pass import zero_phase_low_pass
@@ -50,7 +51,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         axis.grid(axis="y", color="0.92")
         mark_supports(axis, first)
     legend_above(axes[0], 4)
-    axes[2].set_xlabel("position (m); grey lines: supports")
+    axes[2].set_xlabel(marks.POSITION)
     for k, (who, run) in enumerate(drawn.items()):
         force = run.contact_force[run.inside(pairs[0].spans)]
         frequency, amplitude = amplitudes(force, run.time_step)

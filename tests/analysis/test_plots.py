@@ -120,3 +120,64 @@ def test_a_sweep_s_limit_of_sigma_is_three_tenths_of_the_mean():
     limits = [0.3 * row["mean"] for row in rows]
     drawn = [line.get_ydata() for axis in figure.axes for line in axis.lines]
     assert any(len(values) == 2 and values == pytest.approx(limits) for values in map(list, drawn))
+
+
+def dashed_verticals(axis):
+    """Places of vertical dashed lines."""
+    lines = [line for line in axis.lines if line.get_xdata()[0] == line.get_xdata()[-1] and line.is_dashed()]
+    return [line.get_xdata()[0] for line in lines]
+
+
+def names(axis):
+    return [text.get_text() for text in axis.get_legend().get_texts()]
+
+
+@pytest.fixture(scope="module")
+def light():
+    """A pantograph of 54 N that loses contact."""
+    return simulate("shinkansen-simple", "identified-2dof", 320.0)
+
+
+def test_the_axis_of_a_light_force_fits_it_and_names_the_limit(light):
+    """It had been two thirds empty, up to a limit of 350 N."""
+    for axis in (plot_run(light).axes[0], *plot_forces([light], ["it"], (10, 12), "it").axes):
+        low, high = axis.get_ylim()
+        force = light.contact_force[light.inside()]
+        assert low < 0 < force.max() < high < 1.2 * force.max()
+        assert "EN 50367: at most 350 N, above the axis" in names(axis)
+
+
+def test_a_limit_that_is_near_is_drawn(run):
+    assert run.contact_force[run.inside()].max() > 350 / 1.4
+    axis = plot_run(run).axes[0]
+    assert axis.get_ylim()[1] > 350
+    assert "EN 50367: at most 350 N" in names(axis)
+
+
+def test_losses_of_contact_are_squares_with_a_name(light, reference_run):
+    axis = plot_run(light).axes[0]
+    squares = curve(axis, "contact lost")
+    assert squares.get_marker() == "s"
+    inside = light.inside()
+    lost = light.contact_force[inside] <= 0
+    begins = light.position[inside][lost & ~np.concatenate([[False], lost[:-1]])]
+    np.testing.assert_allclose(squares.get_xdata(), begins)
+    assert "contact lost" in names(axis)
+    assert "contact lost" not in names(plot_run(reference_run).axes[0])
+
+
+def test_supports_are_dashed_in_every_picture_along_a_line(light):
+    figure = plot_run(light)
+    for axis in figure.axes:
+        assert {450.0, 500.0, 950.0} <= set(dashed_verticals(axis))
+    assert "dashed lines: supports" in figure.axes[-1].get_xlabel()
+
+
+def test_labels_of_a_sweep_are_outside_its_panels(light):
+    rows = sweep({"speed_kmh": [250.0, 300.0]}, catenary="shinkansen-simple", pantograph="identified-2dof")
+    figure = plot_sweep(rows, ["speed_kmh"])
+    force = figure.axes[0]
+    assert not force.texts
+    assert force.get_ylim()[1] < 200
+    assert "EN 50367's maximum of 350 N is above the axis." in force.get_title("left")
+    assert "0 N: no contact" in [text.get_text() for text in figure.legends[0].get_texts()]

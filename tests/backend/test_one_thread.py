@@ -136,7 +136,7 @@ def test_a_copy_made_in_use_is_not_in_use():
 
 @pytest.fixture(params=["en50318-2002", "periodic-stiffness", "ohl-three-span"])
 def task(request):
-    pantograph = {"periodic-stiffness": "three-mass", "ohl-three-span": "dsa350"}.get(request.param)
+    pantograph = {"periodic-stiffness": "three-mass", "ohl-three-span": "own-two-mass"}.get(request.param)
     given = {"catenary": request.param, "pantograph": pantograph or "en50318-2002", "distance": 60.0}
     return Task(run_settings(given), lanes=3)
 
@@ -176,7 +176,7 @@ def test_the_kernel_makes_no_step_beyond_an_episode_s_end(task):
 @pytest.mark.parametrize("catenary", ["en50318-2002", "periodic-stiffness", "ohl-three-span"])
 @pytest.mark.parametrize("lanes", [1, 3])
 def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
-    pantograph = "three-mass" if catenary == "periodic-stiffness" else "dsa350"
+    pantograph = "three-mass" if catenary == "periodic-stiffness" else "own-two-mass"
     given = {"catenary": catenary, "pantograph": pantograph, "distance": 60.0, "accuracy": "fast"}
     task = Task(run_settings(given), lanes=lanes)
     task.reset(np.arange(lanes), np.random.default_rng(0))

@@ -11,7 +11,7 @@ from panto_env.plant.plant import Plant
 from panto_env.plant.step import step_lane
 from panto_env.plant.train import Train
 
-LINES = {"en50318-2002": "en50318-2002", "ohl-three-span": "dsa350", "periodic-stiffness": "three-mass"}
+LINES = {"en50318-2002": "en50318-2002", "ohl-three-span": "own-two-mass", "periodic-stiffness": "three-mass"}
 
 
 def plant(line):

@@ -80,7 +80,7 @@ def test_threads_end_with_their_owner():
 
 @pytest.mark.parametrize("catenary", ["en50318-2002", "periodic-stiffness", "ohl-three-span"])
 def test_bits_do_not_depend_on_the_number_of_threads(catenary, monkeypatch):
-    pantograph = {"periodic-stiffness": "three-mass"}.get(catenary, "dsa350")
+    pantograph = {"periodic-stiffness": "three-mass"}.get(catenary, "own-two-mass")
     settings = {"catenary": catenary, "pantograph": pantograph, "sensors": "realistic", "distance": 200.0}
     monkeypatch.setattr(threads, "WORTH", 0.0)
     seen = []

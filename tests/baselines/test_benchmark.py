@@ -305,8 +305,9 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
 def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
     figure = plot.plot(outcome)
     forces, sigmas, changes = figure.axes
-    limits = ["nominal force", "limit of EN 50367", "0 N: no contact"]
-    assert forces.get_legend_handles_labels()[1] == ["passive", P, *limits]
+    *named, limit, none = forces.get_legend_handles_labels()[1]
+    assert [*named, none] == ["passive", P, "nominal force", "0 N: no contact"]
+    assert limit.startswith("EN 50367: at most 350 N")
     assert forces.get_xlim() == (180, 300)  # the last two spans evaluated
     means = [cell.figures["mean"] for cell in outcome.cells if cell.policy == "passive"]
     assert list(sigmas.lines[-1].get_ydata()) == pytest.approx([0.3 * mean for mean in means])

@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.report import OWN_LABELS
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.report import charts
 from panto_baselines.report.command import report
@@ -24,6 +25,8 @@ from panto_baselines.report.toml import as_toml
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import with_checksum, write_checked
+
+from ..pages import DOCS
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
 VOID = {"meta", "input"}
@@ -379,3 +382,14 @@ def test_panto_report_prints_it_and_writes_no_page(tmp_path):
     assert told.exit_code == 0, told.output
     assert "| policy | 250 km/h | 300 km/h | all | 95 % |" in told.output
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_tables_and_documents_say_that_power_is_mechanical():
+    """The motors of a head take several times as much from the supply."""
+    text = page([parse_result(result(), "it")])
+    assert "mechanical power (W)" in text
+    assert not re.search(r">power \(W\)", text)
+    assert OWN_LABELS["power"].short_heading == "mech. power (W)"
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    assert "| mechanical power (W) |" in readme
+    assert "| power (W) |" not in readme

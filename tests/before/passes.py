@@ -30,11 +30,11 @@ LINES = {
     "sweden-st15": 200.0,
 }
 PANTOGRAPHS = (
-    "atr95",
+    "own-motor-head",
     "benchmark-2015",
     "cx",
     "dsa250",
-    "dsa350",
+    "own-two-mass",
     "dsa380",
     "en50318-2002",
     "identified-2dof",
@@ -66,7 +66,12 @@ PLACES: dict[str, tuple[str, str, float, dict[str, Any]]] = {
         {"actuator": {"place": "both", "lag": 0.015}, "sensors": LATE, "control_interval": 0.02},
     ),
     "stiffness": ("periodic-stiffness", "three-mass", 260.0, {"sensors": "realistic", "bilateral": True}),
-    "three spans": ("ohl-three-span", "dsa350", 240.0, {"sensors": "realistic", "line_condition": WEAR}),
+    "three spans": (
+        "ohl-three-span",
+        "own-two-mass",
+        240.0,
+        {"sensors": "realistic", "line_condition": WEAR},
+    ),
 }
 # Passes of the reference model without a policy.
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -85,7 +90,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 # Rigs, the pantograph on each, and the speed (km/h).
-RIGS = {"rig": ("atr95", 200.0), "rig-flexible": ("atr95", 200.0)}
+RIGS = {"rig": ("own-motor-head", 200.0), "rig-flexible": ("own-motor-head", 200.0)}
 
 
 def cases() -> dict[str, Callable[[Tape], None]]:

@@ -124,7 +124,7 @@ def _rows() -> dict[str, Row]:
     for line, pantograph, passes in (
         ("en50318-2002", "en50318-2002", 2),
         ("periodic-stiffness", "three-mass", 10),
-        ("ohl-three-span", "dsa350", 2),
+        ("ohl-three-span", "own-two-mass", 2),
     ):
         prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph)
         found[f"simulate, {line}"] = Row("passes/s", passes, prepare)

@@ -50,7 +50,7 @@ def values(entry: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
 def test_every_entry_that_is_promised_is_there() -> None:
     assert set(available("pantograph")) >= {
         *("en50318-2002", "benchmark-2015", "identified-2dof", "three-mass"),
-        *("dsa380", "dsa250", "cx", "dsa350", "atr95"),
+        *("dsa380", "dsa250", "cx", "own-two-mass", "own-motor-head"),
     }
     assert set(available("catenary")) >= {
         *("en50318-2002", "benchmark-2015", "shinkansen-simple"),
@@ -433,3 +433,10 @@ def test_wrong_kind_is_said_alone(tmp_path: Path) -> None:
     message = refusal("pantograph", write(tmp_path, LINE))
     assert "key 'kind' must be 'pantograph' (given: 'flexible')" in message
     assert "span_length" not in message
+
+
+@pytest.mark.parametrize("name", available("pantograph"))
+def test_values_that_are_invented_do_not_have_the_name_of_a_product(name: str) -> None:
+    sources = load_pantograph(name).sources
+    own = [sources[key].startswith("own choice") for key in ("masses", "stiffnesses", "dampings")]
+    assert name.startswith("own-") == all(own)

@@ -36,10 +36,10 @@ def empty_store(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "pantograph", "speed", "wanted", "target"),
     [
-        ("en50318-2002", "dsa250", 250.0, "en50367", 0.00097 * 250**2 + 70),
-        ("en50318-2002", "en50318-2002", 180.0, "en50367", 0.00047 * 180**2 + 90),
+        ("en50318-2002", "dsa250", 250.0, "en50367", 0.00097 * 250**2 + 70 - 0.05),
+        ("en50318-2002", "en50318-2002", 180.0, "en50367", 0.00047 * 180**2 + 90 - 0.05),
         ("shinkansen-simple", "identified-2dof", 300.0, 54.0, 54.0),
-        ("ohl-three-span", "dsa350", 250.0, 130.0, 130.0),
+        ("ohl-three-span", "own-two-mass", 250.0, 130.0, 130.0),
         ("periodic-stiffness", "identified-2dof", 300.0, "60", 60.0),
     ],
 )
@@ -71,8 +71,8 @@ def test_under_a_policy_the_passive_pantograph_meets_it():
 def test_a_dc_line_has_another_target():
     line = load_catenary("en50318-2002").model_copy(update={"system": "DC 3 kV"})
     run = simulate(line, speed_kmh=160.0, mean_force="en50367", record_droppers=False)
-    assert run.target_mean == pytest.approx(0.00097 * 160**2 + 110)
-    assert run.compliance()[0].margin == pytest.approx(0.0, abs=0.1)
+    assert run.target_mean == pytest.approx(0.00097 * 160**2 + 110 - 0.05)
+    assert 0 <= run.compliance()[0].margin <= 0.1
 
 
 def test_a_pantograph_says_whether_its_force_is_applied_or_the_mean():
@@ -213,7 +213,7 @@ def test_the_command_takes_it_and_says_what_it_applied():
     assert text.returncode == 0, text.stderr
     assert "trimmed for a passive mean of 60.0 N" in text.stdout
     told = json.loads(panto(*command, "en50367", "--json").stdout)
-    assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC"))
+    assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC") - mean_force.TOLERANCE)
     assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=0.1)
     assert told["nominal_force"] > told["target_mean"]
     bad = panto(*command, "much")

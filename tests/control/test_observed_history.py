@@ -166,4 +166,4 @@ def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, mon
     file.write_text(json.dumps(table))
     assert make() == first
     assert len(runs) == 2
-    assert make(pantograph="dsa350") != first
+    assert make(pantograph="own-two-mass") != first

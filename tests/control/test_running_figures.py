@@ -11,7 +11,7 @@ from panto_env.envs import BARE
 
 SPAN = load_catenary("ohl-three-span").span_length
 MASSLESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 330, "distance": 150.0}
-WITH_SUPPORTS = {"catenary": "ohl-three-span", "pantograph": "dsa350", "distance": 2 * SPAN - 1.0}
+WITH_SUPPORTS = {"catenary": "ohl-three-span", "pantograph": "own-two-mass", "distance": 2 * SPAN - 1.0}
 
 
 def make(settings):

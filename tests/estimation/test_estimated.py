@@ -15,7 +15,7 @@ from panto_env.estimation.model import build_model
 from panto_env.estimation.settings import EstimatorSettings
 from panto_env.plant.state import Row
 
-FLEXIBLE = {"catenary": "en50318-2002", "pantograph": "dsa350", "speed_kmh": 250.0}
+FLEXIBLE = {"catenary": "en50318-2002", "pantograph": "own-two-mass", "speed_kmh": 250.0}
 MASSLESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 250.0}
 
 
@@ -133,7 +133,7 @@ def test_policies_and_estimator_may_know_another_pantograph_than_the_true_one():
     known = load_pantograph("benchmark-2015")
     settings = {**FLEXIBLE, "observation": "estimated"}
     true, mistaken = (Task(run_settings(settings | more)) for more in ({}, {"known_pantograph": known}))
-    assert true.context(0).pantograph == load_pantograph("dsa350")
+    assert true.context(0).pantograph == load_pantograph("own-two-mass")
     assert mistaken.context(0).pantograph == known
     right, wrong = readings(true, 300), readings(mistaken, 300)
     assert len(mistaken.sensors.shape) == 3

@@ -20,7 +20,7 @@ from ..command import panto
 
 @pytest.fixture(scope="module")
 def run():
-    return simulate("en50318-2002", "dsa350", 250, time_step=5e-4, record_droppers=False)
+    return simulate("en50318-2002", "own-two-mass", 250, time_step=5e-4, record_droppers=False)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_twenty_samples_are_the_fewest_of_a_record(motion, tmp_path):
 def test_the_command_prints_compares_and_writes(record, tmp_path):
     output, picture = tmp_path / "force.parquet", tmp_path / "force.png"
     shown = panto(
-        "estimate", record, "--pantograph", "dsa350", "--output", output, "--plot", picture, "--json"
+        "estimate", record, "--pantograph", "own-two-mass", "--output", output, "--plot", picture, "--json"
     )
     assert shown.returncode == 0, shown.stderr
     told = json.loads(shown.stdout)
@@ -119,8 +119,8 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     assert np.mean(table["nis"].to_numpy()) == pytest.approx(told["nis"], rel=0.05)
     assert picture.stat().st_size > 10_000
     shown = panto(
-        "estimate", record, "--pantograph", "dsa350", "--displacements", "--speed", "250", "--span", "60",
-        "--force-model", "periodic", "--lag", "0.1",
+        "estimate", record, "--pantograph", "own-two-mass", "--displacements", "--speed", "250",
+        "--span", "60", "--force-model", "periodic", "--lag", "0.1",
     )  # fmt: skip
     assert shown.returncode == 0, shown.stderr
     assert "from displacements, periodic" in " ".join(shown.stdout.split())
@@ -136,7 +136,7 @@ def test_a_table_of_scores_has_the_units_of_its_headings():
 def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
     seen = measure(run, rate=250.0, displacement_noise=6e-5)
     write_motion(seen, tmp_path / "noisy.csv")
-    shown = panto("estimate", tmp_path / "noisy.csv", "--pantograph", "dsa350", "--tune", "--json")
+    shown = panto("estimate", tmp_path / "noisy.csv", "--pantograph", "own-two-mass", "--tune", "--json")
     assert shown.returncode == 0, shown.stderr
     told = json.loads(shown.stdout)
     assert told["settings"]["displacement_noise"] == pytest.approx(6e-5, rel=0.1)
@@ -173,7 +173,7 @@ def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
 def test_bad_input_to_the_command_is_one_sentence(change, options, message, record, tmp_path):
     path = tmp_path / "mine.csv"
     path.write_text("\n".join(change(record.read_text().splitlines())) + "\n")
-    given = options if "--pantograph" in options else ("--pantograph", "dsa350", *options)
+    given = options if "--pantograph" in options else ("--pantograph", "own-two-mass", *options)
     shown = panto("estimate", path, *given, cwd=tmp_path)
     assert shown.returncode == 2
     assert re.search(message, " ".join(shown.stderr.split())), shown.stderr

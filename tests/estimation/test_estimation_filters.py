@@ -22,7 +22,7 @@ from panto_env.estimation.model import build_model
 from panto_env.estimation.settings import EstimatorSettings
 from panto_env.estimation.smoother import smooth_force, smoothed_variance
 
-PANTOGRAPH = load_pantograph("dsa350")
+PANTOGRAPH = load_pantograph("own-two-mass")
 N = 14
 """Samples of small problems."""
 

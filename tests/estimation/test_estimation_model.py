@@ -15,7 +15,7 @@ from panto_env.estimation.settings import PAPER2, EstimatorSettings
 from ..pantograph_alone import equations
 
 SPEED, SPAN, STEP = 250 / 3.6, 60.0, 2e-3
-TWO = load_pantograph("dsa350")
+TWO = load_pantograph("own-two-mass")
 
 
 def built(pantograph=TWO, step=STEP, **settings):

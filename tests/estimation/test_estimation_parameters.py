@@ -23,7 +23,7 @@ from panto_env.estimation.parameters import (
 from panto_env.estimation.settings import PAPER2, EstimatorSettings
 from panto_env.estimation.tuning import tune
 
-TRUE = load_pantograph("dsa350")
+TRUE = load_pantograph("own-two-mass")
 STEP, N = 2e-3, 5000
 SETTLED = 500  # samples of the first second
 PLAIN = EstimatorSettings(frame_intensity=0.02, **PAPER2)
@@ -135,7 +135,7 @@ def test_a_wrong_lift_scales_all_parameters_alike(motion):
 
 
 def test_unknown_parameters_are_refused(motion):
-    with pytest.raises(InputError, match=r"'masses.7' is no parameter of 'dsa350'"):
+    with pytest.raises(InputError, match=r"'masses.7' is no parameter of 'own-two-mass'"):
         estimate_parameters(motion, TRUE, PLAIN, ("masses.7",))
     with pytest.raises(InputError, match=r"The head's mass, 'masses.0', can't be estimated"):
         estimate_parameters(motion, TRUE, PLAIN, parameter_names(TRUE))

@@ -17,12 +17,12 @@ from panto_env.estimation.plausibility import check_motion, rezeroed, suspension
 from panto_env.estimation.settings import EstimatorSettings
 from panto_env.estimation.verdict import judge
 
-TRUE = load_pantograph("dsa350")
+TRUE = load_pantograph("own-two-mass")
 
 
 @pytest.fixture(scope="module")
 def motion():
-    return measure(simulate("en50318-2002", "dsa350", 250, time_step=5e-4, record_droppers=False))
+    return measure(simulate("en50318-2002", "own-two-mass", 250, time_step=5e-4, record_droppers=False))
 
 
 def with_value(motion, name, place, value):

@@ -38,7 +38,7 @@ def force_of(time):
     return tones(time, seed=3, highest=8.0, count=12)
 
 
-@pytest.fixture(scope="module", params=["dsa350", "dsa380"])
+@pytest.fixture(scope="module", params=["own-two-mass", "dsa380"])
 def driven(request):
     """Motion of a pantograph of two or three masses under a known contact force, by SciPy's integrator."""
     pantograph = load_pantograph(request.param)

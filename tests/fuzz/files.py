@@ -146,7 +146,7 @@ def write_files(folder: Path) -> None:
     with warnings.catch_warnings(action="ignore"):
         run = simulate("periodic-stiffness", "three-mass", distance=100.0)
         run.save(folder / "run.parquet")
-        moved = simulate("periodic-stiffness", "dsa350", distance=300.0)
+        moved = simulate("periodic-stiffness", "own-two-mass", distance=300.0)
     write_motion(measure(moved), folder / "motion.csv")
 
 

@@ -63,7 +63,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         f"line {name}": Subject("TOML", _entry(name, folder), _line) for name in available("catenary")
     } | {
         f"pantograph {name}": Subject("TOML", _entry(name, folder), _pantograph)
-        for name in ("three-mass", "dsa350")
+        for name in ("three-mass", "own-two-mass")
     }
     configs = ROOT / "configs"
     found |= {
@@ -103,7 +103,7 @@ def _line(path: Path) -> Any:
     line = load_catenary(path)
     if line.kind == "rig":
         return line, load_rig(line)
-    pantograph = "three-mass" if line.kind == "periodic-stiffness" else "dsa350"
+    pantograph = "three-mass" if line.kind == "periodic-stiffness" else "own-two-mass"
     return line, _pass(line, pantograph, 40.0)
 
 

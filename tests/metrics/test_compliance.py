@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from panto_env.metrics.figures import Figures, arcing, contact_loss
 from panto_env.report import save as save_report
 
 from ..command import panto
+from ..pages import DOCS
 from .test_summary import RUN, SPAN, replace
 
 
@@ -353,3 +355,32 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     keys = [criterion["key"] for criterion in entry["policy_compliance"]]
     assert keys == ["mean", "std", "max", "arcing", "min"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
+
+
+@pytest.mark.parametrize("mean", [60.0, 110.0])
+def test_a_broken_mean_force_names_the_option_that_trims_it(mean):
+    within, beyond = (en50367.criteria(figures(mean=each), 0.0, 200 / 3.6, "AC") for each in (100.0, mean))
+    assert by_key(within)["mean"].note == ""
+    assert by_key(beyond)["mean"].kept is False
+    assert "--mean-force en50367" in by_key(beyond)["mean"].note
+    assert any("--mean-force en50367" in line for line in remarks(beyond))
+
+
+def test_the_option_that_trims_the_mean_force_keeps_the_limit():
+    run = simulate("re250", "own-two-mass", 200.0, mean_force="en50367")
+    criterion = by_key(run.compliance())["mean"]
+    assert criterion.kept, criterion
+    assert criterion.margin < 0.15
+    assert criterion.note == ""
+
+
+def test_the_tutorial_s_first_runs_keep_all_requirements():
+    """It had broken the mean force twice, with a pantograph whose values are invented."""
+    text = (DOCS / "own-line.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"panto list (\S+) --toml > my-line.toml", text)
+    runs = re.findall(r"panto simulate --catenary my-line.toml --pantograph (\S+) --speed (\d+)", text)
+    assert len(runs) == 2
+    for pantograph, speed in runs:
+        assert not pantograph.startswith("own-")
+        criteria = simulate(line, pantograph, float(speed)).compliance()
+        assert [each.name for each in criteria if each.kept is False] == []

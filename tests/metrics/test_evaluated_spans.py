@@ -18,7 +18,7 @@ USUAL = (FIRST_SETTLED, LAST_USUAL)
 LINE = Alignment.equal(60.0, 20)
 
 
-@pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")])
+@pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("ohl-three-span", "own-two-mass")])
 def test_a_pass_goes_on_until_ten_spans_after_its_start_are_covered(line):
     run = simulate(*line, record_droppers=False)
     assert run.spans() == USUAL == (10, 19)

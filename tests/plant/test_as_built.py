@@ -155,5 +155,6 @@ def test_a_grid_is_stable_under_the_largest_tension_that_may_be_drawn():
 
 @pytest.mark.parametrize("scatter", [{"support_scatter": 1e-3}, {"tension_scatter": 1e-3}])
 def test_only_a_flexible_line_scatters(scatter):
+    settings = run_settings({"catenary": "ohl-three-span", "line_condition": scatter})
     with pytest.raises(InputError, match="Only a flexible catenary has droppers and supports"):
-        Task(run_settings({"catenary": "ohl-three-span", "pantograph": "dsa350", "line_condition": scatter}))
+        Task(settings)

@@ -189,7 +189,7 @@ def test_a_motor_that_turns_back_crosses_its_play_as_long_as_the_continuous_one(
 
 
 def test_rotors_are_a_mass_between_the_ends():
-    motor, data = MotorActuator(place="both", **SMOOTH), load_pantograph("atr95")
+    motor, data = MotorActuator(place="both", **SMOOTH), load_pantograph("own-motor-head")
     mass = motor.motors * (26 / 0.2) ** 2 * (142e-7 + 9.1e-7)
     assert motor.reflected_masses == pytest.approx((mass, mass))
     assert MotorActuator(backlash=0.01).reflected_masses == (0.0, 0.0)

@@ -96,7 +96,7 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
     """A frame alone on its spring: the closed form of Coulomb friction."""
     spring, friction = 4000.0, 6.0
     changed = {"masses": (10.0,), "stiffnesses": (spring,), "dampings": (0.0,), "frame_friction": friction}
-    data = load_pantograph("dsa350").model_copy(update=changed | {"static_force": 0.0})
+    data = load_pantograph("own-two-mass").model_copy(update=changed | {"static_force": 0.0})
     plant = Plant(load_catenary("en50318-2002"), Train.of(data), numerics=Numerics(time_step=2e-4, window=3))
     plant.start(0, 50.0)
     _, _, pantographs, _, run = plant.arrays
@@ -115,7 +115,7 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
 @pytest.mark.skipif(not JIT, reason="a whole run takes minutes in plain Python")
 def test_friction_in_the_frame_dampens_its_motion_under_a_line():
     """And one that is larger than all that pulls holds it where it is."""
-    smooth = load_pantograph("dsa350")
+    smooth = load_pantograph("own-two-mass")
     spreads = []
     for friction in (0.0, 5.0, 100.0):
         run = simulate("ohl-three-span", smooth.model_copy(update={"frame_friction": friction}), 250)

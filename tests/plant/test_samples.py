@@ -125,7 +125,7 @@ def test_elastic_strip_is_compressed_by_the_force_over_its_stiffness():
 
 @pytest.mark.parametrize(
     ("catenary", "pantograph"),
-    [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350"), ("ohl-three-span", "three-mass")],
+    [("en50318-2002", "en50318-2002"), ("ohl-three-span", "own-two-mass"), ("ohl-three-span", "three-mass")],
 )
 def test_head_stands_a_compressed_strip_above_a_wire_with_mass(catenary, pantograph):
     data = load_pantograph(pantograph)
@@ -148,7 +148,7 @@ def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
 
     steps = 400
     used, fresh = (
-        Plant(load_catenary("ohl-three-span"), Train.of(load_pantograph("dsa350"))) for _ in range(2)
+        Plant(load_catenary("ohl-three-span"), Train.of(load_pantograph("own-two-mass"))) for _ in range(2)
     )
     samples = used.samples(steps + 1)
     assert uplift(used, samples, 330.0 / 3.6, steps)[:, 1].max() > 0

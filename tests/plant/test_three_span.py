@@ -73,7 +73,7 @@ def test_projection_moves_the_deflection_back_by_one_span(data):
 
 def test_steady_run_is_periodic_in_the_span():
     """After the start, one span is like the next: the re-projection does not pump energy."""
-    run = simulate("ohl-three-span", "dsa350", 200.0, distance=540.0)
+    run = simulate("ohl-three-span", "own-two-mass", 200.0, distance=540.0)
     spans = [run.summary((k, k)) for k in (6, 7, 8, 9)]
     assert np.ptp([s.std for s in spans]) < 0.05 * spans[0].std
     assert np.ptp([s.mean for s in spans]) < 1.0
@@ -81,7 +81,7 @@ def test_steady_run_is_periodic_in_the_span():
 
 def test_converges_in_the_time_step():
     fine, coarse = (
-        simulate("ohl-three-span", "dsa350", 250.0, time_step=step).summary((5, 6)).std
+        simulate("ohl-three-span", "own-two-mass", 250.0, time_step=step).summary((5, 6)).std
         for step in (2.5e-4, None)  # None: the default
     )
     assert coarse == pytest.approx(fine, rel=0.01)

@@ -60,7 +60,7 @@ class Wire:
 
 
 def judge():
-    line, pantograph = load_catenary("ohl-three-span"), load_pantograph("dsa350")
+    line, pantograph = load_catenary("ohl-three-span"), load_pantograph("own-two-mass")
     wire, span = Wire(line), line.span_length
     projection, omega, n = wire.projection(), wire.frequency, line.modes
     (m1, m2), (k1, k2), (c1, c2) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
@@ -104,7 +104,8 @@ def solution():
 @pytest.fixture(scope="module")
 def runs():
     length = SPANS * load_catenary("ohl-three-span").span_length
-    return [simulate("ohl-three-span", "dsa350", 3.6 * SPEED, distance=length, time_step=h) for h in STEPS]
+    line = ("ohl-three-span", "own-two-mass", 3.6 * SPEED)
+    return [simulate(*line, distance=length, time_step=h) for h in STEPS]
 
 
 def in_span(values, number):

@@ -56,7 +56,7 @@ def test_a_run_within_the_range_goes_to_its_end(reference_run):
 
 
 @pytest.mark.parametrize(
-    ("line", "pantograph"), [("en50318-2002", "en50318-2002"), ("ohl-three-span", "dsa350")]
+    ("line", "pantograph"), [("en50318-2002", "en50318-2002"), ("ohl-three-span", "own-two-mass")]
 )
 def test_the_steady_arm_s_stop_ends_a_run(line, pantograph):
     free = simulate(line, pantograph)

@@ -1,9 +1,12 @@
 """What is installed elsewhere: built of the packed sources, with all files, typed for those who use it."""
 
+import email
 import os
+import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -112,3 +115,41 @@ def test_the_citation_names_this_version():
     assert citation["version"] == panto_env.__version__
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert f"## {panto_env.__version__} ({citation['date-released']})" in changelog
+
+
+def test_what_is_published_names_authors_and_addresses_that_a_release_fills_in(tmp_path):
+    """Each address begins with a placeholder until `make urls` replaces it, in both files."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert [each["name"] for each in project["authors"]] == [each["name"] for each in citation["authors"]]
+    assert {"Homepage", "Source", "Issues", "Changelog"} <= set(project["urls"])
+    addresses = [*project["urls"].values(), citation["url"], citation["repository-code"]]
+    if not all(address.startswith("https://example.org/panto-env") for address in addresses):
+        assert not any("example.org" in address for address in addresses)
+        return
+    for name in ("Makefile", "pyproject.toml", "CITATION.cff"):
+        shutil.copy(ROOT / name, tmp_path)
+    own = "https://forge.invalid/us/panto-env"
+    assert run(["make", "urls"], cwd=tmp_path).returncode != 0
+    done = run(["make", "urls", f"URL={own}"], cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for name in ("pyproject.toml", "CITATION.cff"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert own in text
+        assert "example.org" not in text
+        assert "Placeholders" not in text
+    filled = tomllib.loads((tmp_path / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]
+    assert filled["Issues"] == f"{own}/issues"
+
+
+def test_the_wheel_says_for_whom_it_is_and_what_it_needs(wheel):
+    with zipfile.ZipFile(wheel) as packed:
+        (name,) = (each for each in packed.namelist() if each.endswith(".dist-info/METADATA"))
+        told = email.message_from_bytes(packed.read(name))
+    assert told["Author"] == "The panto-env authors"
+    classifiers = told.get_all("Classifier")
+    assert {"Typing :: Typed", "Intended Audience :: Science/Research"} <= set(classifiers)
+    assert "Topic :: Scientific/Engineering :: Physics" in classifiers
+    minimum = told["Requires-Python"].removeprefix(">=")
+    assert f"Programming Language :: Python :: {minimum}" in classifiers
+    assert [each.partition(", ")[0] for each in told.get_all("Project-URL")]

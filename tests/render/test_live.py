@@ -116,14 +116,15 @@ def test_a_run_that_is_watched_is_the_same_bit_for_bit(policy, settings):
     assert f"{plain.distance:.0f} m" in terminal.file.getvalue()  # the end is drawn
 
 
-def on_terminal(*arguments, interrupt=b""):
+def on_terminal(*arguments, columns=100, interrupt=b""):
     """Output and exit status of a command on a terminal, interrupted once it has written something."""
     process, terminal = pty.fork()
     if process == 0:
         os.environ["TERM"] = "xterm-256color"
+        os.environ.pop("COLUMNS", None)  # the terminal's own width counts
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # tests started in the background ignore it
         os.execv(Path(sys.executable).with_name("panto"), ["panto", *map(str, arguments)])
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 100, 0, 0))
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 60, columns, 0, 0))
     written = b""
     while True:
         try:
@@ -152,6 +153,14 @@ def test_the_command_draws_on_a_terminal_and_tells_the_same_figures(tmp_path):
     np.testing.assert_array_equal(*(run.contact_force for run in runs))
 
 
+def test_a_terminal_too_narrow_for_the_picture_is_said():
+    settings = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 200]
+    written, status = on_terminal("simulate", "--live", *settings, columns=30)
+    assert status == 0
+    assert b"--live needs a terminal of 40 columns" in written
+    assert b"height of the head (mm)" not in written
+
+
 def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
     (tmp_path / "slow.py").write_text(
         "import time\nclass Slow:\n    def reset(self, context): pass\n"
@@ -169,6 +178,8 @@ def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
 def test_without_a_terminal_it_says_so_and_goes_on():
     told = panto("simulate", "--live", "--catenary", "periodic-stiffness", "--pantograph", "three-mass")
     assert told.returncode == 0
-    assert told.stderr == "panto: --live needs a terminal to draw in; the run continues without.\n"
+    assert (
+        told.stderr == "panto: --live needs a terminal of 40 columns to draw in; the run continues without.\n"
+    )
     assert "standard deviation" in told.stdout
     assert "height of the head" not in told.stdout

@@ -25,7 +25,7 @@ from panto_env.plant.catenary.rig.build import assumed, bank, outer_lead
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
 
-LINE, PANTOGRAPH, SPEED = "en50318-2002", "dsa350", 250
+LINE, PANTOGRAPH, SPEED = "en50318-2002", "own-two-mass", 250
 EXACT = {
     "cylinder": {
         "natural_frequency": 200,

@@ -18,7 +18,7 @@ from panto_env.rig.comparison import compare
 from panto_env.rig.margins import Loop, analog_response, dynamic_stiffness, is_stable, margins_of, threshold
 from panto_env.rig.real_time import Timing, against_the_clock
 
-PANTOGRAPH, SPEED = load_pantograph("dsa350"), 250.0
+PANTOGRAPH, SPEED = load_pantograph("own-two-mass"), 250.0
 
 
 def force(k):

@@ -86,6 +86,20 @@ def test_power_that_a_record_tells_is_what_the_plant_books(at_15_watts):
         assert told.copper[inside].mean() == pytest.approx(one.copper, rel=0.05)
 
 
+def test_mechanical_power_is_that_of_the_arms_and_a_fraction_of_the_electrical(at_15_watts):
+    for place, row in (("frame", Place.FRAME), ("head", Place.HEAD)):
+        one = at_15_watts[place]
+        inside = one.record.inside(motors.SPANS)
+        arms = np.abs(motors.recorded_power(one, row).mechanical[inside]).mean()
+        assert one.record.mechanical_power(motors.SPANS) == pytest.approx(arms, rel=0.1)  # but for the rotors
+        assert 0.1 < one.record.mechanical_power(motors.SPANS) / one.power < 0.3
+    both = at_15_watts["both"].record
+    frame = np.abs(both.frame_force * both.frame_velocity)
+    head = np.abs(both.head_force * (both.head_velocity - both.frame_velocity))
+    mean = (frame + head)[both.inside(motors.SPANS)].mean()
+    assert both.mechanical_power(motors.SPANS) == pytest.approx(mean)
+
+
 def test_heat_is_that_of_the_current_over_the_nominal_one(at_15_watts):
     """Of two motors at 6 A: 21.5 W."""
     head = at_15_watts["head"]
@@ -105,8 +119,10 @@ def test_tables_name_what_a_pass_took(passive, at_15_watts):
     assert [row[0] for row in table.rows[1:]] == list(motors.PLACES)
     assert all(len(row) == len(table.headings) for row in table.rows)
     frame = at_15_watts["frame"]
+    assert table.headings[2:4] == ("electrical (W)", "mechanical (W)")
     assert table.rows[1][2] == f"{frame.power:.1f}"
-    assert table.rows[1][7] == f"{100 * (frame.bands[0] / passive.bands[0] - 1):+.0f}"
+    assert table.rows[1][3] == f"{frame.record.mechanical_power(motors.SPANS):.1f}"
+    assert table.rows[1][8] == f"{100 * (frame.bands[0] / passive.bands[0] - 1):+.0f}"
 
 
 # --- the bench --------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ...analysis.plots import mark_supports, say_what_is_hidden
+from ...base import marks
 from ...base.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, series_colour
 from ...base.legend import legend_above
 from ...metrics.labels import LABELS
@@ -88,7 +89,7 @@ def forces_along_line(speed: int) -> Figure:
     upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
     upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 120))
     lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
-    lower.set(ylabel="control force (N)", xlabel="distance (m); grey lines: supports", ylim=(-110, 110))
+    lower.set(ylabel="control force (N)", xlabel=marks.POSITION, ylim=(-110, 110))
     for axis in (upper, lower):
         mark_supports(axis, active)
         legend_above(axis, 3)

@@ -19,7 +19,7 @@ from ..study import Comparison, Outcome, Report
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PANTOGRAPH, LINE, RIG = "atr95", "en50318-2002", "rig-flexible"
+PANTOGRAPH, LINE, RIG = "own-motor-head", "en50318-2002", "rig-flexible"
 POLICY, CONTROL_INTERVAL = "p:gain=1", 5e-3
 SPEEDS_KMH = (250.0, 300.0, 350.0)
 FORCE_LIMIT = 50.0

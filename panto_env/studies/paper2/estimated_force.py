@@ -9,7 +9,7 @@ from ...analysis.simulation import simulate
 from ...base.table import Table
 from ..study import Outcome, Report
 
-PANTOGRAPH, LINE = "dsa350", "en50318-2002"
+PANTOGRAPH, LINE = "own-two-mass", "en50318-2002"
 SPEEDS_KMH = (250.0, 300.0, 350.0)
 POLICIES = ("p", "pd", "fb+ff")
 LATE = "realistic"

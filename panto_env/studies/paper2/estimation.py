@@ -36,7 +36,7 @@ from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.build import with_scatter
 from ...plant.pantograph.schema import PantographData
 
-CATENARY, PANTOGRAPH = "en50318-2002", "dsa350"
+CATENARY, PANTOGRAPH = "en50318-2002", "own-two-mass"
 """The paper's line with both wires and droppers, and its rig's pantograph, static load 120 N."""
 SPEEDS_KMH = (150.0, 200.0, 250.0, 300.0, 350.0)
 SPEED_KMH = 250.0

@@ -1,7 +1,7 @@
 """One collector on a bench, controlled by a DC motor (paper 2, Figs 14 and 15).
 
-The collector is half of the head of ``atr95``, on half of its suspension, whose foot stands still; one of the
-two motors acts on it. It runs under a contact point that moves as that of the line: the strongest
+The collector is half of the head of ``own-motor-head``, on half of its suspension, whose foot stands still;
+one of the two motors acts on it. It runs under a contact point that moves as that of the line: the strongest
 harmonics of the span in the height of the contact wire over the pantograph, found by a pass along the line
 without motors. Paper 2 says neither how the collector was excited nor what it touched.
 """

@@ -1,7 +1,8 @@
 """Motors in the collector head (paper 2, section 4.3): what proportional control of the contact force buys.
 
-The pantograph is ``atr95``, the line ``en50318-2002``, the motors ``head-motor``. The paper says that
-actuators on the articulated frame reach low frequencies only and those in the head suspension medium ones;
+The pantograph is ``own-motor-head``, the line ``en50318-2002``, the motors ``head-motor``. The paper says
+that actuators on the articulated frame reach low frequencies only and those in the head suspension medium
+ones;
 ``at_power`` and ``at_force_limit`` compare frame, head and both under equal terms.
 """
 
@@ -31,7 +32,7 @@ from ...plant.actuators.motor.arrays import MotorArrays
 from ...plant.actuators.motor.power import MotorPower, motor_power
 from ...plant.state import Place, Row
 
-PANTOGRAPH, CATENARY, MOTOR = "atr95", "en50318-2002", "head-motor"
+PANTOGRAPH, CATENARY, MOTOR = "own-motor-head", "en50318-2002", "head-motor"
 PLACES = ("frame", "head", "both")
 CONTROL_INTERVAL = 2.5e-3
 """Own choice (s): a controller of its own beside the motors, as the board of the paper's rig."""
@@ -200,7 +201,7 @@ def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence
 
 
 def recorded_power(one: MotorPass, place: Place) -> MotorPower:
-    """Current, voltage and watts over a whole pass, from its record; ``atr95`` has but two masses."""
+    """Current, voltage and watts over a whole pass, from its record; the pantograph has two masses."""
     motor, record = cast(MotorActuator, actuator_settings(MOTOR)), one.record
     if place == Place.FRAME:
         return motor_power(motor, record.frame_force, record.frame_velocity, record.time_step)
@@ -211,11 +212,21 @@ def recorded_power(one: MotorPass, place: Place) -> MotorPower:
 def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) -> Table:
     """Change of the contact force's rms by band, sigma, and what it took; the first row has no motors.
 
+    Electrical: what the supply gives, net. Mechanical: magnitude of force times speed, as in the benchmark.
     Heat: of the hottest place's armatures, over what they bear; beyond 100 % no train could go on so.
     """
-    headings = ["motors on", "gain", "W", "heat (%)", "rms (N)", "F_m (N)", "σ (N)"]
+    headings = [
+        "motors on",
+        "gain",
+        "electrical (W)",
+        "mechanical (W)",
+        "heat (%)",
+        "rms (N)",
+        "F_m (N)",
+        "σ (N)",
+    ]
     headings += [f"{low:g}–{high:g} Hz (%)" for low, high in BANDS]
-    first: list[Any] = ["none", *"––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
+    first: list[Any] = ["none", *"–––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
     rows = [(*first, *(f"{rms:.2f} N" for rms in passive.bands))]
     for one in passes:
         figures, pairs = one.figures, zip(one.bands, passive.bands, strict=True)
@@ -225,6 +236,7 @@ def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) ->
                 one.place,
                 f"{one.gain:.2f}",
                 f"{one.power:.1f}",
+                f"{one.record.mechanical_power(SPANS):.1f}",
                 f"{100 * one.heat:.0f}",
                 f"{figures.effort:.1f}",
                 f"{figures.mean:.1f}",

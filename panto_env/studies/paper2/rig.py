@@ -24,7 +24,7 @@ from ...rig.plots import plot_pairs
 from ...rig.report import Stability, pair_facts, stability, stability_facts, stability_table
 from ..study import Comparison, Outcome, Report
 
-PANTOGRAPH, LINE, SPEED_KMH = "dsa350", "en50318-2002", 250.0
+PANTOGRAPH, LINE, SPEED_KMH = "own-two-mass", "en50318-2002", 250.0
 RIGS = ("rig", "rig-flexible")
 SPEEDS_KMH = (150.0, 200.0, 250.0, 300.0)
 VARIANTS: Mapping[str, dict[str, dict[str, Any]]] = {

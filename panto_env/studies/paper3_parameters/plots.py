@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base import marks
 from ...base.colours import series_colour
 from .passes import SPANS, SPEED_KMH, Influence, Pass, Passes
 
@@ -63,9 +64,8 @@ def _draw(influence: Influence, quantity: str, pulling: Sequence[Pass], pushing:
         axis.axhline(0.0, color="0.5", linewidth=0.8)
     span = pulling[0].span
     masts = [span * k for k in range(SPANS[0] - 1, SPANS[1] + 1)]
-    axis.set(xlim=(masts[0], masts[-1]), xlabel="distance (m); grey lines: masts")
-    for mast in masts:
-        axis.axvline(mast, color="0.7", linewidth=0.8, zorder=0)
+    axis.set(xlim=(masts[0], masts[-1]), xlabel=marks.POSITION)
+    marks.mark_supports(axis, masts)
     what = "head displacement $z_1$" if quantity == "displacement" else "contact force $F_C$"
     axis.set(ylabel=f"{what} ({'mm' if quantity == 'displacement' else 'N'})")
     at = "" if influence.key == "speed" else f", {SPEED_KMH:g} km/h"

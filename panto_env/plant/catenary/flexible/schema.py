@@ -23,7 +23,7 @@ class Droppers(Settings):
         min_length=1, max_length=100, description="distance from support (m)"
     )
     sag: tuple[Annotated[float, Between(-0.2, 0.5, "m")], ...] = Field(
-        description="how far the contact wire hangs below its height at the support (m)"
+        description="how far the contact wire hangs at the dropper below height 0 (m)"
     )
     stiffness: Annotated[float, Between(100, 1e8, "N/m")] | None = Field(
         None, description="stiffness in tension (N/m)"
