@@ -81,10 +81,8 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    supply = run.line.system
-    marks.fit_force_axis(
-        [axes], en50367.maximum_limit(from_kmh(speed), supply), en50367.maximum_source(supply)
-    )
+    limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
+    marks.fit_force_axis([axes], limit, en50367.maximum_source(run.line.system))
     mark_supports(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",

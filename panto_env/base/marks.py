@@ -30,7 +30,7 @@ def mark_losses(axis: Axes, places: Sequence[float]) -> None:
 
 
 def fit_force_axis(axes: Sequence[Axes], limit: float, standard: str, others: Sequence[float] = ()) -> None:
-    """Fit axes to the contact forces drawn (N), from 0 N on, and name the limit of a standard in their legends.
+    """Fit axes to the contact forces drawn (N), from 0 N on, and name a standard's limit in their legends.
 
     The limit is within the axis where it is near the force: a force of 60 N would use a sixth of one up to
     350 N. axes: all have the same extent. others: forces of pictures beside these (N), for the same extent.
