@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from .base.shown import shortly, shown
 from .control.action import numbers
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
+
+MODELS = ".safetensors"
+"""Suffix of model files that hold no code."""
 
 
 class PolicyError(InputError):
@@ -60,22 +63,46 @@ def find_policy(source: Any) -> Policy:
             f"A policy must have the methods reset and act, or be a name; {shown(source)} is neither."
         )
     name, _, parameters = str(source).partition(":")
-    known = plugins.installed(plugins.POLICIES)
-    if name in known:
-        return _make(plugins.load(known[name]), str(source), parameters)
-    path = Path(source)
-    loaders = plugins.installed(plugins.LOADERS)
-    if name.endswith(".py"):
-        return _policy_from_file(str(source), Path(name), parameters)
-    if path.suffix[1:] in loaders:
-        if not os.path.isfile(path):
-            raise InputError(f"The model file {path} does not exist; check the path.")
-        loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
-        return loaded
+    path, loaders = Path(source), plugins.installed(plugins.LOADERS)
+    match _kind(str(source)):
+        case "installed":
+            return _make(maker_of(name), str(source), parameters)
+        case "code":
+            return _policy_from_file(str(source), Path(name), parameters)
+        case "model":
+            if not os.path.isfile(path):
+                raise InputError(f"The model file {path} does not exist; check the path.")
+            loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
+            return loaded
     raise InputError(
-        f"Unknown policy '{source}': {suggest(name, list(known))}; or give the path of a model file "
+        f"Unknown policy '{source}': {suggest(name, policy_names())}; or give the path of a model file "
         f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
     )
+
+
+def _kind(source: str) -> Literal["installed", "code", "model", "unknown"]:
+    """What a policy's name stands for."""
+    name = source.partition(":")[0]
+    if name in plugins.installed(plugins.POLICIES):
+        return "installed"
+    if name.endswith(".py"):
+        return "code"
+    return "model" if Path(source).suffix[1:] in plugins.installed(plugins.LOADERS) else "unknown"
+
+
+def check_named(policy: str, where: str | Path) -> None:
+    """Raise InputError where a policy that a file names would run code from a path.
+
+    Anyone may have written the file, and the code would have all rights of the user, who has not named it.
+    Our own model files hold no code; those of other loaders may. where: the file, for the message.
+    """
+    kind = _kind(policy)
+    if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
+        raise InputError(
+            f"{where} names the policy {shown(policy)}, but a file may name only installed policies and "
+            f"model files ({MODELS}): code from a path runs only where you name it yourself, on the command "
+            "line or in Python."
+        )
 
 
 def wishes(policy: Any) -> dict[str, Any]:
