@@ -26,7 +26,7 @@ from .episodes import with_longest_episode
 from .groups import lanes_of
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
-from .one_thread import InUse, one_at_a_time
+from .one_thread import CopiedAlone, InUse, one_at_a_time
 from .settings import VectorSettings, render_metadata
 from .stable_baselines import NamedToStableBaselines
 
@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 
 
 class PantographVectorEnv(
-    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]], metaclass=NamedToStableBaselines
+    CopiedAlone,
+    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]],
+    metaclass=NamedToStableBaselines,
 ):
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
@@ -185,6 +187,7 @@ class PantographVectorEnv(
                 infos |= self._figures()
         return observation, reward, terminated, truncated, infos
 
+    @one_at_a_time
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Frames, (height, width, 3), of the drawn lanes, with render_mode "rgb_array".
 
@@ -203,6 +206,7 @@ class PantographVectorEnv(
             frames.append(self._viewer.frame(task, place, title, float(self._reward_so_far[lane])))
         return tuple(frames)
 
+    @one_at_a_time
     def context(self, lane: int) -> Context:
         """Information about a lane's episode that a policy may use."""
         task, place = self._lanes.task_of(lane)
