@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import os
 import runpy
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -72,7 +71,9 @@ def find_policy(source: Any) -> Policy:
         case "model":
             if not os.path.isfile(path):
                 raise InputError(f"The model file {path} does not exist; check the path.")
-            loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
+            loader = loaders[path.suffix[1:]]
+            with plugins.blamed(loader):
+                loaded: Policy = plugins.load(loader)(path)
             return loaded
     raise InputError(
         f"Unknown policy '{source}': {suggest(name, policy_names())}; or give the path of a model file "
@@ -128,8 +129,14 @@ def policy_names() -> list[str]:
 
 
 def maker_of(name: str) -> Callable[..., Policy]:
-    """The class or function that makes an installed policy from its parameters."""
-    maker: Callable[..., Policy] = plugins.load(plugins.installed(plugins.POLICIES)[name])
+    """The class or function that makes an installed policy from its parameters.
+
+    Raises InputError, which names its package, where it can't be loaded or is neither.
+    """
+    point = plugins.installed(plugins.POLICIES)[name]
+    with plugins.blamed(point):
+        maker: Callable[..., Policy] = plugins.load(point)
+        parameters_of(maker)
     return maker
 
 
@@ -148,7 +155,7 @@ def errors_name(policy: str, method: str) -> Iterator[None]:
     except InputError as error:
         raise PolicyError(f"The policy '{policy}' failed in {method}: {error}") from error
     except Exception as error:  # a policy is foreign code
-        raise PolicyError(f"The policy '{policy}' failed in {method}, {_failure(error)}.") from error
+        raise PolicyError(f"The policy '{policy}' failed in {method}, {plugins.failure(error)}.") from error
 
 
 def checked_action(returned: Any, shape: tuple[int, ...]) -> Array:
@@ -157,13 +164,6 @@ def checked_action(returned: Any, shape: tuple[int, ...]) -> Array:
     if action is None or action.shape != shape or not np.isfinite(action).all():
         raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
     return action
-
-
-def _failure(error: BaseException) -> str:
-    """Place, class and message of an error."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    words = " ".join(str(error).split()).removesuffix(".")
-    return f"at {place.filename}:{place.lineno}: {type(error).__name__}{f': {words}' if words else ''}"
 
 
 def _make(maker: Any, source: str, text: str) -> Policy:
@@ -182,7 +182,7 @@ def _make(maker: Any, source: str, text: str) -> Policy:
     except (TypeError, ValueError) as error:
         raise InputError(f"Policy '{source}' cannot be made: {str(error).removesuffix('.')}.") from error
     except Exception as error:
-        raise InputError(f"Policy '{source}' cannot be made, {_failure(error)}.") from error
+        raise InputError(f"Policy '{source}' cannot be made, {plugins.failure(error)}.") from error
     return policy
 
 
@@ -206,4 +206,4 @@ def _run_file(path: Path, _modified: int) -> dict[str, Any]:
     try:
         return runpy.run_path(str(path))
     except (Exception, SystemExit) as error:
-        raise InputError(f"{path} cannot be run, {_failure(error)}.") from error
+        raise InputError(f"{path} cannot be run, {plugins.failure(error)}.") from error
