@@ -11,7 +11,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.shown import shown
 from panto_env.control.context import Context
 from panto_env.control.observation import OBSERVATION_SETTINGS
-from panto_env.policies import Policy, find_policy
+from panto_env.policies import Policy, check_named, find_policy
 
 from .actor import Actor
 from .model_file import Facts, Needs, read_model
@@ -26,7 +26,9 @@ class TrainedPolicy:
     """Deterministic policy of a model file; it runs only in tasks that match its training."""
 
     def __init__(self, path: Path, facts: Facts, actor: Actor) -> None:
-        """path: of the model file, for error messages."""
+        """path: of the model file. Raises InputError where its base policy would run code from a path."""
+        if facts.residual_of is not None:
+            check_named(facts.residual_of, path)
         self.path, self.facts = path, facts
         self._policy = policy_of(actor, facts)
         needs = facts.needs

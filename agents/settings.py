@@ -20,6 +20,7 @@ from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
+from panto_env.policies import check_named
 
 from .algorithm import Algorithm
 from .base_policy import check_wishes
@@ -169,6 +170,7 @@ def _check_policies(training: Training) -> None:
     settings = run_settings(training.arguments)
     for name in (training.start_from, training.residual_of):
         if name is not None:
+            check_named(name, "it")
             check_wishes(name, settings)
 
 

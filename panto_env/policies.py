@@ -5,12 +5,11 @@ from __future__ import annotations
 import inspect
 import os
 import runpy
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,9 @@ from .base.shown import shortly, shown
 from .control.action import numbers
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
+
+MODELS = ".safetensors"
+"""Suffix of model files that hold no code."""
 
 
 class PolicyError(InputError):
@@ -60,22 +62,48 @@ def find_policy(source: Any) -> Policy:
             f"A policy must have the methods reset and act, or be a name; {shown(source)} is neither."
         )
     name, _, parameters = str(source).partition(":")
-    known = plugins.installed(plugins.POLICIES)
-    if name in known:
-        return _make(plugins.load(known[name]), str(source), parameters)
-    path = Path(source)
-    loaders = plugins.installed(plugins.LOADERS)
-    if name.endswith(".py"):
-        return _policy_from_file(str(source), Path(name), parameters)
-    if path.suffix[1:] in loaders:
-        if not os.path.isfile(path):
-            raise InputError(f"The model file {path} does not exist; check the path.")
-        loaded: Policy = plugins.load(loaders[path.suffix[1:]])(path)
-        return loaded
+    path, loaders = Path(source), plugins.installed(plugins.LOADERS)
+    match _kind(str(source)):
+        case "installed":
+            return _make(maker_of(name), str(source), parameters)
+        case "code":
+            return _policy_from_file(str(source), Path(name), parameters)
+        case "model":
+            if not os.path.isfile(path):
+                raise InputError(f"The model file {path} does not exist; check the path.")
+            loader = loaders[path.suffix[1:]]
+            with plugins.blamed(loader):
+                loaded: Policy = plugins.load(loader)(path)
+            return loaded
     raise InputError(
-        f"Unknown policy '{source}': {suggest(name, list(known))}; or give the path of a model file "
+        f"Unknown policy '{source}': {suggest(name, policy_names())}; or give the path of a model file "
         f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
     )
+
+
+def _kind(source: str) -> Literal["installed", "code", "model", "unknown"]:
+    """What a policy's name stands for."""
+    name = source.partition(":")[0]
+    if name in plugins.installed(plugins.POLICIES):
+        return "installed"
+    if name.endswith(".py"):
+        return "code"
+    return "model" if Path(source).suffix[1:] in plugins.installed(plugins.LOADERS) else "unknown"
+
+
+def check_named(policy: str, where: str | Path) -> None:
+    """Raise InputError where a policy that a file names would run code from a path.
+
+    Anyone may have written the file, and the code would have all rights of the user, who has not named it.
+    Our own model files hold no code; those of other loaders may. where: the file, for the message.
+    """
+    kind = _kind(policy)
+    if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
+        raise InputError(
+            f"{where} names the policy {shown(policy)}, but a file may name only installed policies and "
+            f"model files ({MODELS}): code from a path runs only where you name it yourself, on the command "
+            "line or in Python."
+        )
 
 
 def wishes(policy: Any) -> dict[str, Any]:
@@ -101,8 +129,14 @@ def policy_names() -> list[str]:
 
 
 def maker_of(name: str) -> Callable[..., Policy]:
-    """The class or function that makes an installed policy from its parameters."""
-    maker: Callable[..., Policy] = plugins.load(plugins.installed(plugins.POLICIES)[name])
+    """The class or function that makes an installed policy from its parameters.
+
+    Raises InputError, which names its package, where it can't be loaded or is neither.
+    """
+    point = plugins.installed(plugins.POLICIES)[name]
+    with plugins.blamed(point):
+        maker: Callable[..., Policy] = plugins.load(point)
+        parameters_of(maker)
     return maker
 
 
@@ -121,7 +155,7 @@ def errors_name(policy: str, method: str) -> Iterator[None]:
     except InputError as error:
         raise PolicyError(f"The policy '{policy}' failed in {method}: {error}") from error
     except Exception as error:  # a policy is foreign code
-        raise PolicyError(f"The policy '{policy}' failed in {method}, {_failure(error)}.") from error
+        raise PolicyError(f"The policy '{policy}' failed in {method}, {plugins.failure(error)}.") from error
 
 
 def checked_action(returned: Any, shape: tuple[int, ...]) -> Array:
@@ -130,13 +164,6 @@ def checked_action(returned: Any, shape: tuple[int, ...]) -> Array:
     if action is None or action.shape != shape or not np.isfinite(action).all():
         raise InputError(f"its action must be finite numbers of shape {shape}, not {shortly(returned)}.")
     return action
-
-
-def _failure(error: BaseException) -> str:
-    """Place, class and message of an error."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    words = " ".join(str(error).split()).removesuffix(".")
-    return f"at {place.filename}:{place.lineno}: {type(error).__name__}{f': {words}' if words else ''}"
 
 
 def _make(maker: Any, source: str, text: str) -> Policy:
@@ -155,7 +182,7 @@ def _make(maker: Any, source: str, text: str) -> Policy:
     except (TypeError, ValueError) as error:
         raise InputError(f"Policy '{source}' cannot be made: {str(error).removesuffix('.')}.") from error
     except Exception as error:
-        raise InputError(f"Policy '{source}' cannot be made, {_failure(error)}.") from error
+        raise InputError(f"Policy '{source}' cannot be made, {plugins.failure(error)}.") from error
     return policy
 
 
@@ -179,4 +206,4 @@ def _run_file(path: Path, _modified: int) -> dict[str, Any]:
     try:
         return runpy.run_path(str(path))
     except (Exception, SystemExit) as error:
-        raise InputError(f"{path} cannot be run, {_failure(error)}.") from error
+        raise InputError(f"{path} cannot be run, {plugins.failure(error)}.") from error

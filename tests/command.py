@@ -8,7 +8,17 @@ import sys
 import warnings
 from unittest import mock
 
-from panto_env.cli import main
+from typer.main import get_command
+
+from panto_env.cli import main, make_app
+
+
+def whole():
+    """The command `panto` with all those below it loaded, which else are when they are called."""
+    group = get_command(make_app())
+    for name in list(group.commands):
+        group.get_command(None, name)
+    return group
 
 
 def panto(*arguments, cwd=None):

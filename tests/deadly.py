@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .plugin import install
+
 SOURCE = """
 import os, signal
 from pathlib import Path
@@ -25,9 +27,11 @@ class Deadly:
 def deadly(folder: Path, wanted: Path) -> str:
     """The policy, in a new file of ``folder``, as ``find_policy`` takes it.
 
+    With the folder on Python's path it is installed, by the name "deadly".
+
     It kills in the 30th control step of an episode, once ``wanted`` exists; then "deadly.dead" is beside
     it, and from then on it is harmless.
     """
-    path = folder / "deadly.py"
-    path.write_text(SOURCE.replace("{WANTED}", str(wanted)))
-    return f"{path}:Deadly"
+    source = SOURCE.replace("{WANTED}", str(wanted))
+    install(folder, {"panto_env.policies": {"deadly": "deadly:Deadly"}}, {"deadly": source})
+    return f"{folder / 'deadly.py'}:Deadly"

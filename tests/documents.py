@@ -18,10 +18,11 @@ from panto_agents.settings import load_training
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.oracle.settings import oracle_settings
 from panto_env.base.errors import InputError
-from panto_env.cli import make_app
 from panto_env.control.settings import run_settings
 from panto_env.policies import find_policy
 from panto_env.studies import STUDIES
+
+from .command import whole
 
 ROOT = Path(__file__).parents[1]
 GENERATED = ("_build", "generated")
@@ -110,7 +111,7 @@ def python(page):
 @cache
 def panto():
     """The command `panto`."""
-    return typer.main.get_command(make_app())
+    return whole()
 
 
 def check(command):

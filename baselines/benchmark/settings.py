@@ -27,7 +27,9 @@ from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensors import SensorSettings, sensor_settings
+from panto_env.policies import check_named
 
+from .controls import policy_of
 from .seeds import TEST, check_seeds, salted_seed
 
 S = TypeVar("S", bound=Settings)
@@ -195,6 +197,10 @@ def load_benchmark(path: str | Path) -> BenchmarkSettings:
 
     Paths in it are relative to the working folder.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, where it cannot be read, is not valid, or names a policy
+    whose code would run from a path.
     """
-    return parse(BenchmarkSettings, read_toml(find(path, "benchmark")), str(path))
+    settings = parse(BenchmarkSettings, read_toml(find(path, "benchmark")), str(path))
+    for policy in chain.from_iterable(settings.policies_on(line) for line in settings.lines):
+        check_named(policy_of(policy), path)
+    return settings

@@ -17,6 +17,7 @@ from panto_env.base.ranges import Between
 from panto_env.base.settings import NonNegative, Settings, parse
 from panto_env.base.shown import shown
 from panto_env.control.settings import description
+from panto_env.policies import check_named
 
 from ..benchmark.seeds import DATA
 
@@ -139,9 +140,13 @@ def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
 def load_episodes(path: str | Path) -> EpisodesSettings:
     """Read a TOML file of ``EpisodesSettings``, given by its path or by a name of ``configs/``.
 
-    Raises InputError, naming the file and the key, if it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, if it cannot be read, is not valid, or names a policy
+    whose code would run from a path.
     """
-    return parse(EpisodesSettings, read_toml(find(path, "dataset")), str(path))
+    settings = parse(EpisodesSettings, read_toml(find(path, "dataset")), str(path))
+    for policy in (policy for each in settings.sets for policy in each.policies):
+        check_named(policy, path)
+    return settings
 
 
 def chosen(settings: EpisodesSettings, names: tuple[str, ...]) -> EpisodesSettings:

@@ -16,6 +16,7 @@ from panto_env.base.checksums import read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
+from panto_env.catalog.content import is_entry
 from panto_env.control.settings import run_settings
 
 from .search import METHOD, Oracle
@@ -145,18 +146,21 @@ def load(path: Path = RESULTS) -> dict[str, Any]:
 def stored_actions(given: Mapping[str, Any], path: Path = RESULTS) -> NDArray[np.float64] | None:
     """Actions, (control steps, actions), of a stored oracle from the start of its pass on; None without one.
 
-    The oracle may be for another condition of the line: line and pantograph, by their names, speed and
-    actuator are those of ``given``, settings of a run by name.
+    The oracle may be for another condition of the line: line and pantograph, by their values, speed and
+    actuator are those of ``given``, settings of a run by name. Those of files are not found.
     """
     settings = run_settings(given)
-    actuator, names = settings.actuator, (settings.line.name, settings.pantograph.name)
+    actuator = settings.actuator.model_dump(mode="json")
     for one in load(path)["cells"]:
-        same = (one["catenary"], one["pantograph"]) == names and one["speed_kmh"] == settings.speed_kmh[0]
-        if same and one["actuator"] == actuator.model_dump(mode="json"):
+        same = one["speed_kmh"] == settings.speed_kmh[0] and one["actuator"] == actuator
+        same = same and is_entry(settings.line, one["catenary"], None)
+        if same and is_entry(settings.pantograph, one["pantograph"], None):
             found = one["passes"][0]
             commands = np.array(found["commands"])
             before = np.zeros((found["first_step"], commands.shape[1]))
-            return np.asarray(np.concatenate([before, commands]) / actuator.force_limit, dtype=np.float64)
+            return np.asarray(
+                np.concatenate([before, commands]) / settings.actuator.force_limit, dtype=np.float64
+            )
     return None
 
 

@@ -17,7 +17,10 @@ from panto_env.base.files import read_toml
 from panto_env.base.remember import remembered
 from panto_env.base.settings import Settings, parse
 from panto_env.base.units import to_kmh
+from panto_env.catalog.content import is_entry
 from panto_env.control.context import Context
+from panto_env.plant.catenary.schema import CatenaryData
+from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.state import Place
 
 Source = str | Sequence[float]
@@ -31,6 +34,8 @@ class Tuning(Settings):
 
     catenary: str
     pantograph: str
+    catenary_sha256: str | None = Field(None, description="of its values, unless it is the catalogue's")
+    pantograph_sha256: str | None = Field(None, description="likewise")
     place: str = Field(description="where the actuator acts: frame, head or both")
     names: tuple[str, ...] = Field(description="of the gains")
     speeds_kmh: tuple[float, ...] = Field(min_length=1, description="rising (km/h)")
@@ -54,6 +59,14 @@ class Tuning(Settings):
         if list(self.speeds_kmh) != sorted(set(self.speeds_kmh)):
             raise ValueError("speeds_kmh must rise")
         return self
+
+    def is_for(self, catenary: CatenaryData, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made for this line and pantograph, by their values, and place of the actuator."""
+        return (
+            place == self.place
+            and is_entry(catenary, self.catenary, self.catenary_sha256)
+            and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
+        )
 
 
 class GainFile(Settings):
@@ -86,21 +99,24 @@ def place_of(channels: Sequence[int]) -> str:
 def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
     """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
 
-    Raises InputError if none are stored for line, pantograph, place of the actuator and speed.
+    Stored ones are found by the values of line and pantograph, whatever their names. Raises InputError if
+    there are none for them, for the place of the actuator, and for the speed.
     """
     if not isinstance(source, str):
         if len(source) != len(names):
             raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
         return np.array(source, dtype=float)
     path = gain_file(source)
-    line, pantograph = context.catenary.name, context.pantograph.name
-    place = place_of(context.channels)
-    for tuning in load_gains(path).tunings:
-        if (tuning.catenary, tuning.pantograph, tuning.place) == (line, pantograph, place):
+    place, tunings = place_of(context.channels), load_gains(path).tunings
+    for tuning in tunings:
+        if tuning.is_for(context.catenary, context.pantograph, place):
             return _at_speed(tuning, names, to_kmh(context.speed), path)
+    line, pantograph = context.catenary.name, context.pantograph.name
+    named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
     raise InputError(
         f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
-        f"at {place}: make them with `panto tune`, or take a policy that needs none."
+        f"at {place}{', only for others of these names with other values' if named else ''}: make them with "
+        "`panto tune`, or take a policy that needs none."
     )
 
 

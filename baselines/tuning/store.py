@@ -11,6 +11,7 @@ from typing import Any
 from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, write_whole
 from panto_env.base.version import __version__
+from panto_env.catalog.content import content_unless_catalogue
 from panto_env.control.settings import RunSettings
 
 from ..policies.gains import GainFile, Tuning, load_gains
@@ -30,6 +31,8 @@ def make_tuning(
     return Tuning(
         catenary=settings.line.name,
         pantograph=settings.pantograph.name,
+        catenary_sha256=content_unless_catalogue(settings.line),
+        pantograph_sha256=content_unless_catalogue(settings.pantograph),
         place=settings.actuator.place,
         names=tuple(names),
         speeds_kmh=tuple(each.speed_kmh for each in tuned),
@@ -57,8 +60,8 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
-    case = settings.line.name, settings.pantograph.name, settings.actuator.place
-    if not force and case in map(_case, file.tunings):
+    case = settings.line, settings.pantograph, settings.actuator.place
+    if not force and any(each.is_for(*case) for each in file.tunings):
         raise InputError(
             f"{path} already holds gains for {settings.pantograph.name} on {settings.line.name}, "
             f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
@@ -79,12 +82,15 @@ def as_toml(file: GainFile) -> str:
     for tuning in file.tunings:
         lines += ["", "[[tunings]]"]
         for key, value in tuning:
+            if value is None:
+                continue
             lines.append(f"{key} = {_value(value)}")
     return "\n".join(lines) + "\n"
 
 
-def _case(tuning: Tuning) -> tuple[str, str, str]:
-    return tuning.catenary, tuning.pantograph, tuning.place
+def _case(tuning: Tuning) -> tuple[str | None, ...]:
+    line, pantograph = tuning.catenary_sha256, tuning.pantograph_sha256
+    return line or tuning.catenary, pantograph or tuning.pantograph, tuning.place
 
 
 def _value(value: Any) -> str:

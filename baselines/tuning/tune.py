@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,15 +45,18 @@ class Tuned:
 
 def tunable(name: str) -> type[TunableLaw]:
     """Class of the policy with this name. Raises InputError if it can't be tuned."""
-    makers = {each: maker_of(each) for each in policy_names()}
-    able = {
-        each: maker
-        for each, maker in makers.items()
-        if isinstance(maker, type) and issubclass(maker, TunableLaw)
-    }
-    if name not in able:
-        raise InputError(f"'{name}' has no gains to tune; policies with gains are {', '.join(able)}.")
-    return able[name]
+    maker = maker_of(name) if name in policy_names() else None
+    if _has_gains(maker):
+        return maker
+    able = []
+    for each in policy_names():
+        with suppress(InputError):  # a plug-in that can't be loaded
+            able += [each] if _has_gains(maker_of(each)) else []
+    raise InputError(f"'{name}' has no gains to tune; policies with gains are {', '.join(able)}.")
+
+
+def _has_gains(maker: Any) -> TypeGuard[type[TunableLaw]]:
+    return isinstance(maker, type) and issubclass(maker, TunableLaw)
 
 
 def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:

@@ -13,6 +13,7 @@ from ..control.identity import identity, settings_of
 from ..control.settings import run_settings
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import SUFFIXES, Trajectory
+from ..policies import check_named
 from .simulation import simulate
 
 TOLERANCE = 0.1
@@ -55,8 +56,12 @@ def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
 
 
 def check_made_anew(run: Trajectory, settings: dict[str, Any], path: str | Path) -> None:
-    """Repeat a saved run, and raise InputError unless its contact force is that of the file."""
+    """Repeat a saved run, and raise InputError unless its contact force is that of the file.
+
+    Its policy must be an installed one or a model file: the run may be anyone's.
+    """
     try:
+        check_named(run.policy, "it")
         repeated = simulate(policy=run.policy, seed=run.seed, record_droppers=False, **settings)
     except InputError as error:
         raise InputError(f"The run of {path} cannot be repeated: {error}") from error

@@ -1,4 +1,4 @@
-"""The error for invalid input of any kind, and the warning about accuracy."""
+"""The error for invalid input of any kind, and the warnings about accuracy and plug-ins."""
 
 from .shown import one_line
 
@@ -13,3 +13,7 @@ class InputError(ValueError):
 
 class AccuracyWarning(UserWarning):
     """Figures are less accurate than usual: one sentence that says why and by how much."""
+
+
+class PlugInWarning(UserWarning):
+    """A plug-in of another package is left out: one sentence that says which one and why."""

@@ -11,14 +11,13 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer import Abort
 
-from ..base import plugins
-from ..base.errors import AccuracyWarning, InputError
+from ..base.errors import AccuracyWarning, InputError, PlugInWarning
 from ..base.plain_characters import show_always
 from ..base.shown import one_line
 from ..base.standard_streams import guarded_streams, say
 from ..base.version import __version__
 from ..terminal import NARROW, console
-from .panels import PanelGroup
+from .group import PlugInGroup, give_options_once
 
 UsageError: Any = typer.BadParameter.__base__
 """Click's class, which older releases of Typer import and newer ones include."""
@@ -86,14 +85,14 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
-    if issubclass(category, AccuracyWarning):
+    if issubclass(category, AccuracyWarning | PlugInWarning):
         say(f"warning: {message}")
     elif sys.stderr is not None:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def make_app() -> typer.Typer:
-    """The command with all its sub-commands, including those of installed packages."""
+    """The command with all its sub-commands; it finds those of installed packages when they are called."""
     from . import (
         catalogue,
         diagnose,
@@ -111,7 +110,7 @@ def make_app() -> typer.Typer:
 
     app = typer.Typer(
         name="panto",
-        cls=PanelGroup,
+        cls=PlugInGroup,
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -133,12 +132,7 @@ def make_app() -> typer.Typer:
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)
-    for name, point in plugins.installed(plugins.COMMANDS).items():
-        command = plugins.load(point)
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
-        else:
-            app.command(name)(command)
+    give_options_once(app)
     return app
 
 

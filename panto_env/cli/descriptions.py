@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
 from ..base.errors import InputError
-from ..base.files import read_toml
+from ..base.files import finite, read_toml
 from ..base.names import suggest
 from ..catalog import available, load_catenary, load_family, load_pantograph
 from ..catalog.family import LineFamily
@@ -57,7 +58,7 @@ def everything() -> dict[str, list[Description]]:
             family: [_entry(family, load(name)) for name in available(family)]
             for family, load in LOADERS.items()
         },
-        POLICY: [_policy(name) for name in policy_names()],
+        POLICY: [_policy_or_why_not(name) for name in policy_names()],
         **{family: [_preset(family, name) for name in presets] for family, presets in PRESETS.items()},
     }
 
@@ -93,6 +94,15 @@ def _entry(family: str, entry: Entry) -> Description:
     return Description(family, entry.name, entry.description, headings, rows, data, droppers)
 
 
+def _policy_or_why_not(name: str) -> Description:
+    """Description of a policy; for a plug-in that can't be loaded the reason."""
+    try:
+        return _policy(name)
+    except InputError as error:
+        data = {"name": name, "description": str(error), "parameters": {}}
+        return Description(POLICY, name, str(error), (), (), data)
+
+
 def _policy(name: str) -> Description:
     maker = maker_of(name)
     texts = [inspect.getdoc(maker) or ""]
@@ -104,8 +114,16 @@ def _policy(name: str) -> Description:
         for key, each in parameters_of(maker).items()
     }
     rows = [(key, repr(value)) for key, value in defaults.items()]
-    data = {"name": name, "description": text, "parameters": defaults}
+    plain = {key: value if _fit_for_json(value) else repr(value) for key, value in defaults.items()}
+    data = {"name": name, "description": text, "parameters": plain}
     return Description(POLICY, name, text, ("parameter", "default"), rows, data)
+
+
+def _fit_for_json(value: Any) -> bool:
+    try:
+        return bool(json.dumps(finite(value)))
+    except (TypeError, ValueError, RecursionError):
+        return False
 
 
 def _preset(family: str, name: str) -> Description:

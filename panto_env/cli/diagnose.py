@@ -36,7 +36,7 @@ def diagnose(
         str | None,
         typer.Option(
             help="Pantograph that the estimator assumes: a name of the catalogue or a TOML file. Default: "
-            "the run's, from the catalogue."
+            "the run's, as designed."
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,

@@ -108,11 +108,12 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
     for defect in defects:
         for key, value in defect.condition.items():
             fair[key] = [*fair[key], *value] if isinstance(value, list) else value
-    data = track.data
+    data, pantograph = track.data, load_pantograph(track.pantograph)
     run = simulate(
         track.catenary,
-        with_scatter(load_pantograph(track.pantograph), PANTOGRAPH_SCATTER, random),
+        with_scatter(pantograph, PANTOGRAPH_SCATTER, random),
         track.speed_kmh * (1 + SPEED_SCATTER * random.standard_normal()),
+        known_pantograph=pantograph,
         line_condition=LineCondition(**fair),
         seed=track.seed,
         spans=SPANS,

@@ -79,7 +79,7 @@ def diagnose(
 
     false_alarms: per km of healthy line, by which the threshold is set. classifier: of the kinds, by default
     the one that comes with the project. seed: of the noise of the sensors that forces are estimated from.
-    pantograph: of all passes, as the estimator knows it; by default that of the catalogue which each names.
+    pantograph: of all passes, as the estimator knows it; by default each one's own, as designed.
     Raises InputError where passes are too few or too short, cannot be compared, or cannot be a pantograph's.
     """
     known = None if pantograph is None else load_pantograph(pantograph)

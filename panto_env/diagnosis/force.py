@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from ..base.units import to_kmh
-from ..catalog import load_pantograph
 from ..estimation.estimate import filter_motion, gains_of, model_of
 from ..estimation.motion import Motion, measure
 from ..estimation.plausibility import check_motion
@@ -32,17 +32,17 @@ EVEN = 0.01
 
 
 def known_pantograph(run: Trajectory) -> PantographData:
-    """The pantograph that an estimator takes a run's for: of the catalogue, as designed, not as it is.
+    """The pantograph that an estimator takes a run's for: as known in the run, or as designed, by its values.
 
-    Raises InputError for one that is not there.
+    Raises InputError where the run does not hold them.
     """
-    name = run.settings.get("known_pantograph") or run.pantograph
+    values = run.settings.get("known_pantograph") or run.design.get("pantograph")
     try:
-        return load_pantograph(name)
-    except InputError as error:
+        return PantographData.model_validate(values)
+    except ValidationError as error:
         raise InputError(
-            f"Its pantograph '{name}' is not in the catalogue, and without its masses and springs no force "
-            "can be estimated; give its TOML file with --pantograph."
+            f"The run does not hold the masses and springs of its pantograph '{run.pantograph}', without "
+            "which no force can be estimated; give its name or its TOML file with --pantograph."
         ) from error
 
 

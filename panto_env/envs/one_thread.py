@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from copy import deepcopy
 from functools import wraps
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, Self, TypeVar
 
 from ..base.errors import InputError
 
@@ -52,3 +53,31 @@ def one_at_a_time(method: F) -> F:
             in_use.end()
 
     return alone  # type: ignore[return-value]
+
+
+class CopiedAlone:
+    """Base of an environment with an ``InUse`` in ``_in_use``: no other thread steps it while it is copied.
+
+    A copy, by ``copy`` or ``pickle``, raises InputError while another thread is using the environment.
+    """
+
+    def _state(self) -> dict[str, Any]:
+        """What a copy consists of."""
+        return vars(self)
+
+    @one_at_a_time
+    def __getstate__(self) -> dict[str, Any]:
+        """A state of its own, which no thread changes while it is being pickled."""
+        return deepcopy(self._state(), {id(self): self})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+
+    @one_at_a_time
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        twin = memo[id(self)] = type(self).__new__(type(self))
+        twin.__setstate__(deepcopy(self._state(), memo))
+        return twin
+
+    def __copy__(self) -> Self:
+        return deepcopy(self)  # two environments that share their arrays would be of no use

@@ -20,7 +20,8 @@ from ..metrics.trajectory import Trajectory
 from .description import described
 from .episodes import Episodes, with_longest_episode
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, final_figures, first_info
-from .one_thread import InUse, one_at_a_time, refuse
+from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
+from .reset_arguments import checked_options, checked_seed
 from .settings import EnvironmentSettings, render_metadata
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ SEEN = ("_shape", "_observation", "_values", "_flags")
 """Attributes that ``PantographEnv._watch`` sets from the task."""
 
 
-class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A pantograph under a catenary, with an actuator that reduces variations of the contact force.
 
     ## Description
@@ -108,7 +109,8 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Copies
     `copy.deepcopy` and `pickle` copy the environment with its state, also in the middle of an episode; the
-    copy continues bit for bit as the original, as tree search and worker processes require.
+    copy continues bit for bit as the original, as tree search and worker processes require. While another
+    thread is in one of its methods a copy is refused, as any other use is.
 
     ## Version History
     * v0: first version.
@@ -143,11 +145,13 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._spec = with_longest_episode(spec, self._usual.most_control_steps)
 
     @property
+    @one_at_a_time
     def context(self) -> Context:
         """Information about the present episode that a policy may use."""
         return self.task.context(0)
 
     @property
+    @one_at_a_time
     def trajectory(self) -> Trajectory:
         """Record of the episode so far."""
         return self.task.trajectory(0, policy="environment")
@@ -156,9 +160,13 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; ``options`` are arguments of the class, only for this episode."""
-        episodes = self._usual.with_options(options or {})
-        super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed)
+        """Start an episode; ``options`` are arguments of the class, only for this episode.
+
+        Raises InputError, and changes nothing, where seed or options are not valid.
+        """
+        seed = checked_seed(seed)
+        episodes = self._usual.with_options(checked_options(options))
+        super().reset(seed=seed)
         task = episodes.draw(lambda: self.np_random)
         if task is not self.task:
             self._watch(task)
@@ -178,12 +186,12 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observation, self._values = results.observation[0], results.values[0]
         self._flags = results.flags[0]
 
-    def __getstate__(self) -> dict[str, Any]:
+    def _state(self) -> dict[str, Any]:
         """State without the views of the task's arrays, which a copy makes again, and without the window."""
         return {name: value for name, value in vars(self).items() if name not in SEEN} | {"_viewer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
+        super().__setstate__(state)
         self._watch(self.task)
 
     def step(
@@ -235,6 +243,7 @@ class PantographEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 self._show()
         return self._observation.copy(), reward, terminated, truncated, info
 
+    @one_at_a_time
     def render(self) -> NDArray[np.uint8] | None:
         """The line and the pantograph now, (height, width, 3), with render_mode "rgb_array".
 

@@ -26,7 +26,8 @@ from .episodes import with_longest_episode
 from .groups import lanes_of
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
-from .one_thread import InUse, one_at_a_time
+from .one_thread import CopiedAlone, InUse, one_at_a_time
+from .reset_arguments import checked_options, checked_seeds
 from .settings import VectorSettings, render_metadata
 from .stable_baselines import NamedToStableBaselines
 
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
 
 
 class PantographVectorEnv(
-    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]], metaclass=NamedToStableBaselines
+    CopiedAlone,
+    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]],
+    metaclass=NamedToStableBaselines,
 ):
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
@@ -132,11 +135,11 @@ class PantographVectorEnv(
         seed: of lane 0, and seed + i for lane i; or one per lane. Other options are arguments of the class,
         only for these episodes. Raises InputError, and changes nothing, where one is not valid.
         """
-        options = dict(options or {})
+        seeds, options = checked_seeds(seed, self.num_envs), checked_options(options)
         mask = self._mask(options.pop("reset_mask", None))
         lanes = self._all if mask is None else mask
         episodes = self._lanes.episodes_with(options)
-        self._seed(lanes, seed)
+        self._seed(lanes, seeds)
         self._begin(lanes, episodes, anew=mask is None or seed is not None)
         self._running = True
         answer = self._lanes.answer()
@@ -185,6 +188,7 @@ class PantographVectorEnv(
                 infos |= self._figures()
         return observation, reward, terminated, truncated, infos
 
+    @one_at_a_time
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Frames, (height, width, 3), of the drawn lanes, with render_mode "rgb_array".
 
@@ -203,6 +207,7 @@ class PantographVectorEnv(
             frames.append(self._viewer.frame(task, place, title, float(self._reward_so_far[lane])))
         return tuple(frames)
 
+    @one_at_a_time
     def context(self, lane: int) -> Context:
         """Information about a lane's episode that a policy may use."""
         task, place = self._lanes.task_of(lane)
@@ -249,11 +254,8 @@ class PantographVectorEnv(
         lanes: Flags = mask.copy()
         return lanes
 
-    def _seed(self, lanes: Flags, seed: int | Sequence[int | None] | None) -> None:
+    def _seed(self, lanes: Flags, seeds: Sequence[int | None]) -> None:
         """Seed the marked lanes; a lane without a given seed keeps its generator if it has one."""
-        seeds = self._lane_seeds(seed)
-        for wrong in (each for each in seeds if each is not None and each < 0):
-            seeding.np_random(wrong)  # raises Gymnasium's own error
         for lane in np.flatnonzero(lanes).tolist():
             if seeds[lane] is not None or lane not in self._seeds:
                 self._seeds[lane] = seeds[lane]
@@ -264,12 +266,3 @@ class PantographVectorEnv(
         if lane not in self._random:
             self._random[lane], self._seeds[lane] = seeding.np_random(self._seeds.get(lane))
         return self._random[lane]
-
-    def _lane_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + lane for lane in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise InputError(f"seed must be a number or one per lane, {self.num_envs}, not {len(seed)}.")
-        return [None if each is None else int(each) for each in seed]

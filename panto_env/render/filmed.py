@@ -12,6 +12,7 @@ from ..analysis.simulation import simulate
 from ..base.errors import InputError
 from ..control.settings import run_settings
 from ..metrics.trajectory import Trajectory
+from ..policies import check_named
 
 OF_CONTROL = ("version", "actuator", "sensors", "estimator", "known_pantograph")
 """Settings that may differ between two runs that count as the same line under two controls."""
@@ -39,11 +40,15 @@ class Filmed(NamedTuple):
 
 
 def saved_passes(sources: Sequence[str]) -> dict[str, Filmed]:
-    """Passes of the sources that are files of saved runs. Raises InputError where one cannot be read."""
+    """Passes of the sources that are files of saved runs.
+
+    Raises InputError where one cannot be read, or its policy would run code from a path.
+    """
     found = {}
     for source in sources:
         if is_saved_run(source):
             run, settings = load_with_settings(source)
+            check_named(run.policy, source)
             title = f"{run.policy} ({Path(source).name})"
             found[source] = Filmed(title, run.policy, settings, run.seed, run, source)
     return found

@@ -37,6 +37,8 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS
 
+from ..plugin import install
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
 SMALL = {
@@ -481,10 +483,9 @@ SEEING = {"harmonics": 2, "history": 1, "normalise": 300, "reward": "agent", "ac
 
 
 @pytest.fixture
-def linear(tmp_path):
-    """A policy that is linear in what it sees, as ``find_policy`` takes it."""
-    path = tmp_path / "linear.py"
-    path.write_text(
+def linear(tmp_path, monkeypatch):
+    """An installed policy that is linear in what it sees."""
+    source = (
         "import numpy as np\n"
         "WANTED = 'sine of span position', 'frame velocity'\n"
         "class Linear:\n"
@@ -495,7 +496,11 @@ def linear(tmp_path):
         "        sine, velocity = (seen[names.index(each)] for each in WANTED)\n"
         "        return np.array([0.3 * sine - 0.1 * velocity])\n"
     )
-    return f"{path}:Linear"
+    install(
+        tmp_path / "site", {"panto_env.policies": {"linear": "linear_law:Linear"}}, {"linear_law": source}
+    )
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    return "linear"
 
 
 class TestStart:
@@ -522,10 +527,10 @@ class TestStart:
         run.folder.path.mkdir()
         run.folder.write_settings(training)
         run.begin_with_policy()
-        actor, (name, _, cls) = training.hyperparameters.actor(run.model), linear.rpartition(":")
+        actor = training.hyperparameters.actor(run.model)
         own, theirs = (
             simulate(**training.arguments | {"distance": 500.0}, policy=policy, seed=2)
-            for policy in (actor, f"{name}:{cls}")
+            for policy in (actor, linear)
         )
         difference = own.frame_force - theirs.frame_force
         assert np.sqrt(np.mean(difference**2)) < 0.15 * np.sqrt(np.mean(theirs.frame_force**2))

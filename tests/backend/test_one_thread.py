@@ -3,11 +3,13 @@
 import contextlib
 import copy
 import os
+import pickle
 import subprocess
 import sys
 import threading
 import time
 
+import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
@@ -125,13 +127,96 @@ def test_forked_while_another_thread_steps_it_is_refused_or_steps():
     assert all("or was when this process was forked; give each" in line for line in refused)
 
 
-def test_a_copy_made_in_use_is_not_in_use():
-    env = gymnasium.make("panto_env:PantographStiffness-v0").unwrapped
+COPIES = {
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "cloudpickle": lambda env: pickle.loads(cloudpickle.dumps(env)),
+    "deepcopy": copy.deepcopy,
+    "copy": copy.copy,
+}
+
+
+def made(lanes):
+    settings = {"catenary": "en50318-2002", "sensors": "realistic", "accuracy": "fast", "distance": 600.0}
+    name = "panto_env:Pantograph-v0"
+    if lanes is None:
+        return gymnasium.make(name, disable_env_checker=True, **settings).unwrapped
+    return gymnasium.make_vec(name, num_envs=lanes, **settings)
+
+
+@pytest.mark.parametrize("way", COPIES)
+@pytest.mark.parametrize("lanes", [None, 8])
+def test_a_copy_while_another_thread_steps_is_whole_or_refused(lanes, way):
+    """Half of the copies had been made in the middle of a step, and went on as no environment does."""
+    env = made(lanes)
+    first, _ = env.reset(seed=0)
+    action = np.zeros(env.action_space.shape)
+    seen, twins, refused, stop = [first], [], [], threading.Event()
+
+    def step():
+        while not stop.is_set():
+            with contextlib.suppress(InputError):  # a copy is being made
+                observation, _, *ends, _ = env.step(action)
+                seen.append(observation)
+                if np.any(ends):
+                    return
+            time.sleep(0.003)
+
+    thread = threading.Thread(target=step)
+    thread.start()
+    while thread.is_alive() and len(twins) < 10:
+        try:
+            twins.append(COPIES[way](env))
+        except InputError as error:
+            refused.append(str(error))
+            time.sleep(0.001)
+    stop.set()
+    thread.join()
+    assert len(twins) == 10
+    assert all(map(in_the_way, refused))
+    whole = {each.tobytes(): number for number, each in enumerate(seen)}
+    later = [env.step(action)[0] for _ in range(3)]
+    following = [*seen, *later]
+    for twin in twins:
+        answer = [twin.step(action)[0] for _ in range(3)]
+        number = whole.get(answer[0].tobytes(), len(seen))
+        for one, other in zip(answer, following[number:], strict=False):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("way", COPIES)
+@pytest.mark.parametrize("lanes", [None, 2])
+def test_no_copy_is_made_of_an_environment_in_use(lanes, way):
+    env = made(lanes)
     env.reset(seed=0)
     assert env._in_use.begin(False)
-    copy.deepcopy(env).step(np.zeros(1))
+    with pytest.raises(InputError, match="Another thread is using this environment"):
+        COPIES[way](env)
+    env._in_use.end()
+    twin = COPIES[way](env)
+    assert env._in_use.begin(False)
+    twin.step(np.zeros(twin.action_space.shape))  # it has a lock of its own
     with pytest.raises(InputError, match="Another thread"):
-        env.step(np.zeros(1))
+        env.step(np.zeros(env.action_space.shape))
+
+
+@pytest.mark.parametrize("read", ["render", "trajectory", "context"])
+def test_nothing_is_read_of_an_environment_in_use(read):
+    env = made(None)
+    env.reset(seed=0)
+    assert env._in_use.begin(False)
+    with pytest.raises(InputError, match="Another thread is using this environment"):
+        getattr(env, read)()
+
+
+def test_an_environment_that_holds_itself_is_copied():
+    env = made(None)
+    env.reset(seed=0)
+    env.itself, env.of_it = env, env.step
+    for way in COPIES.values():
+        twin = way(env)
+        assert twin.itself is twin
+        assert twin.of_it.__self__ is twin
+        twin.step(np.zeros(1))
 
 
 @pytest.fixture(params=["en50318-2002", "periodic-stiffness", "ohl-three-span"])

@@ -28,6 +28,8 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
+from ..plugin import install
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 P = "p:gain=0.1"
 LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
@@ -72,13 +74,9 @@ def outcome() -> Benchmark:
 @pytest.fixture
 def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Somebody's installed package with policies of their own."""
-    info = tmp_path / "site" / "plugin-1.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plugin\nVersion: 1\n")
     names = ("Half", "Bad", "Lost", "Nan", "Less")
-    points = "".join(f"{name.lower()} = panto_test_plugin:{name}\n" for name in names)
-    (info / "entry_points.txt").write_text(f"[panto_env.policies]\n{points}")
-    (tmp_path / "site" / "panto_test_plugin.py").write_text(PLUGIN)
+    policies = {name.lower(): f"panto_test_plugin:{name}" for name in names}
+    install(tmp_path / "site", {"panto_env.policies": policies}, {"panto_test_plugin": PLUGIN})
     monkeypatch.syspath_prepend(tmp_path / "site")
 
 

@@ -30,6 +30,7 @@ from panto_env.base.settings import parse
 from panto_env.cluster import parts
 
 from ..deadly import deadly
+from ..plugin import on_path
 
 PANTO = Path(sys.executable).with_name("panto")
 KNOWN = {"catenary": "en50318-2002", "pantograph": "en50318-2002", "speed_kmh": [280, 300]}
@@ -228,12 +229,13 @@ class TestParts:
     @pytest.mark.slow
     def test_killed_in_the_middle_it_goes_on_and_ends_the_same(self, minari, tmp_path, monkeypatch):
         monkeypatch.setattr(make_episodes, "PER_PART", 1)
-        mortal = deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.safetensors")
+        on_path(tmp_path, monkeypatch)
+        deadly(tmp_path, wanted=tmp_path / "out/.parts/pantograph_tiny_deadly-v0/000000.safetensors")
         (tmp_path / "tiny.toml").write_text(
-            f"""
+            """
             title = "tiny"
-            places = [{{ catenary = "en50318-2002", pantograph = "en50318-2002", speed_kmh = [290, 300] }}]
-            sets = [{{ name = "deadly", policies = ['{mortal}'], episodes = 12 }}]
+            places = [{ catenary = "en50318-2002", pantograph = "en50318-2002", speed_kmh = [290, 300] }]
+            sets = [{ name = "deadly", policies = ["deadly"], episodes = 12 }]
             [environment]
             distance = 60
             washout = 0

@@ -21,6 +21,7 @@ from panto_agents.trainings import plan, train_all
 from panto_env import InputError
 
 from ..deadly import deadly
+from ..plugin import on_path
 
 TABLE = {
     "algorithm": "ppo",
@@ -73,10 +74,13 @@ def same_weights(one: Path, other: Path) -> bool:
 
 
 @pytest.mark.slow
-def test_a_training_killed_between_two_checkpoints_loses_only_what_came_after_the_first(tmp_path):
+def test_a_training_killed_between_two_checkpoints_loses_only_what_came_after_the_first(
+    tmp_path, monkeypatch
+):
     folder = tmp_path / "run"
-    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.safetensors")
-    (tmp_path / "tiny.toml").write_text(CONFIG.format(more=f'residual_of = "{policy}"'))
+    deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.safetensors")
+    on_path(tmp_path, monkeypatch)
+    (tmp_path / "tiny.toml").write_text(CONFIG.format(more='residual_of = "deadly"'))
     command = ("train", "tiny.toml", "--output", folder)
     killed = panto(*command, cwd=tmp_path)
     assert killed.returncode == -signal.SIGKILL

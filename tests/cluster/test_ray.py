@@ -31,12 +31,22 @@ from panto_env.cluster import spread, tasks
 from panto_env.control.settings import run_settings
 
 from ..deadly import deadly
+from ..plugin import on_path
 
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
 
 
 @pytest.fixture(scope="module")
-def two_nodes():
+def site(tmp_path_factory):
+    """A folder whose packages this process and all nodes find."""
+    folder = tmp_path_factory.mktemp("site")
+    with pytest.MonkeyPatch.context() as patch:
+        on_path(folder, patch)
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def two_nodes(site):
     """Address of a cluster of two nodes with one CPU each."""
     cluster = Cluster(initialize_head=True, head_node_args=NODE)
     cluster.add_node(**NODE)
@@ -208,11 +218,11 @@ def test_trainings_learn_what_they_learn_in_processes(two_nodes, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, tmp_path):
+def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, site, tmp_path):
     folder = tmp_path / "run"
-    policy = deadly(tmp_path, wanted=folder / "checkpoints" / "step-000000256.safetensors")
-    train_all({folder: training(1, residual_of=policy), tmp_path / "other": training(2)}, ray=two_nodes)
-    assert (tmp_path / "deadly.dead").exists()
+    deadly(site, wanted=folder / "checkpoints" / "step-000000256.safetensors")
+    train_all({folder: training(1, residual_of="deadly"), tmp_path / "other": training(2)}, ray=two_nodes)
+    assert (site / "deadly.dead").exists()
     assert read_model(folder / "model.safetensors")[0].steps == 768
     with (folder / "evaluations.csv").open(newline="") as file:
         assert [row["steps"] for row in csv.DictReader(file)] == [str(128 * k) for k in range(7)]

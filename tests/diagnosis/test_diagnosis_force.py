@@ -11,7 +11,7 @@ from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose, estimated_force
 from panto_env.diagnosis.cases import Track, drive
-from panto_env.diagnosis.force import ESTIMATOR, RATE
+from panto_env.diagnosis.force import ESTIMATOR, RATE, known_pantograph
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
 from panto_env.metrics.low_pass import zero_phase_low_pass
@@ -66,6 +66,21 @@ def test_it_is_the_estimator_s_own(runs):
     assert np.array_equal(estimated_force(runs[0], 5), expected)
 
 
+def unknown(run):
+    """The run with a name alone for its pantograph."""
+    settings = {key: value for key, value in run.settings.items() if key != "known_pantograph"}
+    return replace(run, pantograph="mine", settings=settings, design={})
+
+
+def test_a_run_s_pantograph_is_known_by_its_values_not_by_its_name(runs):
+    """One in a file of the same name as a pantograph of the catalogue had been taken for that."""
+    design = load_pantograph("dsa250")
+    mine = design.model_copy(update={"masses": (1.5 * design.masses[0], *design.masses[1:])})
+    own = replace(unknown(runs[0]), pantograph="dsa250", design={"pantograph": mine.model_dump(mode="json")})
+    assert known_pantograph(own).masses == mine.masses
+    assert np.array_equal(error_of(own), error_of(runs[0], pantograph=mine))
+
+
 def with_value(run, name, place, value):
     values = getattr(run, name).copy()
     values[place] = value
@@ -116,8 +131,8 @@ REFUSED = {
     ),
     "another zero": (lambda r: replace(r, head=r.head + 0.3), "heights seem to count from another zero"),
     "pantograph is not known": (
-        lambda r: replace(r, pantograph="mine"),
-        "pantograph 'mine' is not in the catalogue, .* give its TOML file with --pantograph",
+        lambda r: unknown(r),
+        "not hold the masses and springs of its pantograph 'mine', .* its TOML file with --pantograph",
     ),
 }
 
@@ -147,17 +162,16 @@ def test_a_run_shorter_than_a_span_says_how_far_to_run(runs):
 
 
 def test_the_command_takes_the_pantograph_that_is_known(runs, tmp_path):
-    """One that is not in the catalogue is known by its file, and what it is changes what is estimated."""
+    """One whose values the run does not hold is known by its file; what it is changes what is estimated."""
     files = []
     for k, run in enumerate(runs):
         files.append(str(tmp_path / f"run{k}.parquet"))
-        whole = replace(
-            run, pantograph="mine", dropper_force=np.zeros((len(run.time), len(run.dropper_position)))
-        )
+        none = np.zeros((len(run.time), len(run.dropper_position)))
+        whole = replace(unknown(run), dropper_force=none)
         whole.save(files[-1])
     call = ["diagnose", files[0], "--healthy", *files[1:], "--json"]
     refused = CliRunner().invoke(make_app(), call)
-    assert "give its TOML file with --pantograph" in str(refused.exception)
+    assert "its TOML file with --pantograph" in str(refused.exception)
     told = CliRunner().invoke(make_app(), [*call, "--pantograph", "dsa250"])
     assert told.exit_code == 0, told.output
     other = CliRunner().invoke(make_app(), [*call, "--pantograph", "three-mass"])

@@ -14,6 +14,8 @@ LONG = "x" * 5000
 QUICK = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass")
 """A line and a pantograph that are computed in no time."""
 SHORT = (*QUICK, "--distance", "100", "--spans", "1-2")
+MARKUP = ("--catenary", "markup.toml", "--pantograph", "three-mass")
+MARKED = ("--catenary", "markup.toml", "--pantograph", "marked.toml")
 
 USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("list",): ("pd",),
@@ -155,14 +157,14 @@ BY_HAND: tuple[tuple[str, ...], ...] = (
     ("simulate", *SHORT, "--plot", "\0.png"),
     ("simulate", *SHORT, "--output", ".parquet"),
     ("simulate", *SHORT, "--output", "[bold].parquet"),
-    ("simulate", *SHORT, "--catenary", "markup.toml"),
-    ("simulate", *SHORT, "--catenary", "markup.toml", "--pantograph", "marked.toml"),
-    ("sweep", "catenary.mean_stiffness=3000,4000", *SHORT, "--catenary", "markup.toml"),
+    ("simulate", *MARKUP, *SHORT[4:]),
+    ("simulate", *MARKED, *SHORT[4:]),
+    ("sweep", "catenary.mean_stiffness=3000,4000", *MARKUP, *SHORT[4:]),
     ("sweep", "catenary.mean_stiffness=3000,4000", *SHORT, "--policy", "p:gain=[bold]"),
-    ("benchmark", "p", *QUICK, "--catenary", "markup.toml", "--seeds", "1", "--workers", "1"),
-    ("evaluate", "p", *QUICK, "--catenary", "markup.toml", "--speed", "300"),
+    ("benchmark", "p", *MARKUP, "--seeds", "1", "--workers", "1"),
+    ("evaluate", "p", *MARKUP, "--speed", "300"),
     ("rig", "rig", "--reference", "markup.toml", "--spans", "1-2", "--pantograph", "three-mass"),
-    ("film", "p", *SHORT[:-2], "--catenary", "markup.toml", "--output", "f.gif", "--first-span", "1"),
+    ("film", "p", *MARKUP, *SHORT[4:-2], "--output", "f.gif", "--first-span", "1"),
     ("list", "markup.toml"),
     ("list", "marked.toml"),
     ("list", "heavy.toml"),
@@ -237,8 +239,17 @@ def command_lines() -> list[tuple[str, ...]]:
     return list(dict.fromkeys([*BY_HAND, *(line for line in mixed if line is not None)]))
 
 
+def _without(words: tuple[str, ...], flag: str) -> tuple[str, ...]:
+    """Words of a command line without an option and its values."""
+    if flag not in words:
+        return words
+    first = words.index(flag)
+    after = [k for k in range(first + 1, len(words)) if words[k].startswith("--")]
+    return (*words[:first], *words[after[0] if after else len(words) :])
+
+
 def _of(parameter: Parameter) -> Iterator[tuple[str, ...]]:
-    usual = USUAL[parameter.command]
+    usual = _without(USUAL[parameter.command], parameter.flag)  # an option is given once
     kind = Enum if issubclass(parameter.kind, Enum) else parameter.kind
     for value in BAD[kind]:
         if not parameter.flag:  # the first argument; what follows it is a usual option

@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 import typer
 from typer.models import ArgumentInfo, ParameterInfo
 
+from panto_env.base import plugins
 from panto_env.cli import make_app
 
 
@@ -25,7 +26,11 @@ class Parameter(NamedTuple):
 
 def parameters() -> list[Parameter]:
     """All of them, in the order in which the help shows them."""
-    return list(_of_app(make_app(), ()))
+    app = make_app()
+    for name, point in plugins.installed(plugins.COMMANDS).items():
+        command = plugins.load(point)
+        app.add_typer(command, name=name) if isinstance(command, typer.Typer) else app.command(name)(command)
+    return list(_of_app(app, ()))
 
 
 def _of_app(app: typer.Typer, before: tuple[str, ...]) -> Iterator[Parameter]:

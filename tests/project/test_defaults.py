@@ -9,16 +9,16 @@ import pkgutil
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
 from panto_env.base.settings import Settings
-from panto_env.cli import make_app
 from panto_env.control.reward import REWARDS
 from panto_env.envs import IDS
 from panto_env.estimation.settings import ESTIMATORS
 from panto_env.plant.actuators import ACTUATOR_PRESETS
 from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SENSOR_PRESETS
+
+from ..command import whole
 
 STORED = Path(__file__).with_name("defaults.txt")
 PACKAGES = ("panto_env", "panto_baselines", "panto_agents")
@@ -56,7 +56,7 @@ def options(command, name="panto"):
 
 def defaults():
     """One line per class of settings, preset, id, function and command: its name, and what it sets."""
-    told = dict(options(get_command(make_app())))
+    told = dict(options(whole()))
     for package in map(importlib.import_module, PACKAGES):
         told |= functions(package)
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):

@@ -1,0 +1,101 @@
+"""The command and those of plug-ins below it: each is loaded when it is called, each option given once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
+
+from ..base import plugins
+from ..base.errors import InputError
+from .panels import OTHERS, PanelGroup
+
+
+class _GivenOnce:
+    """Command that refuses an option of one value that is given twice, instead of taking the last."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        command: Any = super()
+        if args and not ctx.resilient_parsing:
+            _, _, given = command.make_parser(ctx).parse_args(args=list(args))
+            for option, times in Counter(given).items():
+                single = option.param_type_name == "option" and not (option.multiple or option.count)
+                if single and times > 1 and not option.is_eager:
+                    flag = max(option.opts, key=len)
+                    raise InputError(
+                        f"{flag} is given {'twice' if times == 2 else f'{times} times'}; give it once."
+                    )
+        parsed: list[str] = command.parse_args(ctx, args)
+        return parsed
+
+
+class _Command(_GivenOnce, TyperCommand):
+    pass
+
+
+class _Group(_GivenOnce, TyperGroup):
+    pass
+
+
+def give_options_once(app: typer.Typer) -> None:
+    """Let every command of an app, and of those below it, refuse an option that is given twice."""
+    for command in app.registered_commands:
+        if command.cls in (None, TyperCommand):
+            command.cls = _Command
+    for group in app.registered_groups:
+        if not (isinstance(group.cls, type) and issubclass(group.cls, _Group)):
+            group.cls = _Group
+        if group.typer_instance is not None:
+            give_options_once(group.typer_instance)
+
+
+class PlugInGroup(PanelGroup, _Group):
+    """Our commands and those of plug-ins: one of these is loaded when it, or its help, is asked for.
+
+    The list of commands describes our own; of others it has the name and the package.
+    """
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self._listing = False
+        self._points = plugins.installed(plugins.COMMANDS, taken=tuple(self.commands))
+        for name in self._points:
+            self.add_command(TyperCommand(name))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name, or None."""
+        point = self._points.get(cmd_name)
+        if point is not None:
+            if self._listing and not plugins.is_own(point):
+                words = f"A plug-in of {plugins.package(point)}."
+                return TyperCommand(cmd_name, help=words, rich_help_panel=OTHERS)
+            self.add_command(_loaded(point), cmd_name)
+            del self._points[cmd_name]
+        return super().get_command(ctx, cmd_name)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        self._listing = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._listing = False
+
+
+def _loaded(point: EntryPoint) -> Any:
+    """The command of a plug-in. Raises InputError, which names its package, where that is not possible."""
+    command = plugins.load(point)
+    app = typer.Typer(add_completion=False)
+    app.callback()(lambda: None)  # so that it is a group even of one command
+    with plugins.blamed(point):
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=point.name)
+        else:
+            app.command(point.name)(command)
+        give_options_once(app)
+        group: Any = get_command(app)
+        return group.commands[point.name]
