@@ -147,7 +147,7 @@ class RunSettings(Numerics):
     speed_drift: SpeedDrift = Field(
         0.0,
         description="rms of a slow drift of the speed about its mean, with periods of 7 to 29 s, drawn per "
-        "run (km/h)",
+        "run (km/h); the aerodynamic force and a required mean force that depends on the speed follow it",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
