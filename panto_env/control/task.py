@@ -241,4 +241,5 @@ def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice) ->
     if required is None or not run.drifts:
         return 0.0
     speeds = run.speeds[run.inside(spans)].tolist()
-    return float(np.mean([target_mean(settings, speed) for speed in speeds])) - required
+    at_each = np.array([target_mean(settings, speed) for speed in speeds], dtype=float)
+    return float(np.mean(at_each - required))  # exactly 0 where the required mean is a number
