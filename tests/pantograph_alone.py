@@ -48,7 +48,7 @@ def replay(run, data, start):
     whole = np.zeros((size + 3, size + 3))
     whole[:size] = np.hstack([rates, forces]) * run.time_step
     step = expm(whole)[:size]
-    pushes = np.column_stack([-run.contact_force, run.nominal_force + run.frame_force, run.head_force])
+    pushes = np.column_stack([-run.contact_force, run.lift + run.frame_force, run.head_force])
     states = [start]
     for push in pushes:
         states.append(step @ np.concatenate([states[-1], push]))

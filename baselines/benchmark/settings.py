@@ -118,7 +118,7 @@ class BenchmarkSettings(Settings):
     )
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
     line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
-        LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
+        LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     pantograph_scatter: PantographScatter = Field(
         default("pantograph_scatter"), description=description("pantograph_scatter")

@@ -59,7 +59,7 @@ class OracleSettings(Settings):
         description="further searches, each from the best result plus noise; more find steadier forces",
     )
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
-        LINE_CONDITIONS["fair"], description="on a new line every seed gives the same run"
+        LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     control_interval: ControlInterval = Field(
         default("control_interval"), description=description("control_interval")

@@ -49,7 +49,7 @@ def tune(
 
     The fit minimises the variance of the contact force on training seeds, near the passive mean force;
     the table shows the result on selection seeds. By default actuator and sensors are "realistic" and
-    the line is "fair". Gains for the same line, pantograph and place in the file are replaced only with
+    the line is "smooth". Gains for the same line, pantograph and place in the file are replaced only with
     --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
     """
     from panto_env.cluster.parts import remove_parts
@@ -64,7 +64,7 @@ def tune(
     from .tune import PASSES, SEEDS, SPEEDS_KMH, tunable
 
     settings = run_settings(
-        {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"} | given
+        {"actuator": "realistic", "sensors": "realistic", "line_condition": "smooth"} | given
     )
     kind, path = tunable(policy), output or gain_file(policy)
     check_gain_file(path, policy, settings, force)

@@ -20,7 +20,7 @@ from .shown import shown
 def _number(value: Any, kind: str) -> Any:
     """The value, unless it is text or a truth value, which pydantic would accept as a number."""
     if isinstance(value, str | bytes | bool):
-        raise PydanticCustomError(f"{kind}_type", "must be a number")  # type: ignore[misc]
+        raise PydanticCustomError(f"{kind}_type", "must be a number")
     return value
 
 

@@ -100,9 +100,10 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
     console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
     if not math.isnan(trajectory.target_mean):
+        at = ", both at the mean speed" if trajectory.drifts else ""
         console.print(
             f"Applied force {trajectory.nominal_force:.1f} N, trimmed for a passive mean of "
-            f"{trajectory.target_mean:.1f} N."
+            f"{trajectory.target_mean:.1f} N{at}."
         )
     console.print(table)
     print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")

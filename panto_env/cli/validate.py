@@ -21,6 +21,12 @@ def validate(
     wear: Annotated[
         bool, typer.Option("--wear", help="Print the effect of the time step on figures of a worn line.")
     ] = False,
+    conditions: Annotated[
+        bool,
+        typer.Option(
+            "--conditions", help="Print figures in each named condition of a line, on several lines."
+        ),
+    ] = False,
     lines: Annotated[
         bool,
         typer.Option(
@@ -43,6 +49,7 @@ def validate(
             with_convergence=convergence,
             with_windows=window,
             with_wear=wear,
+            with_conditions=conditions,
             with_lines=lines,
             with_start=start,
         )

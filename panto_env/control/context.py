@@ -20,8 +20,8 @@ class Context:
     force_limit: float  # force of an action of 1 (N)
     control_interval: float  # s
     washout: float  # time constant (s) of what is subtracted from the actions, 0 for nothing
-    speed: float  # of the train (m/s)
+    speed: float  # of the train, its mean where it drifts (m/s)
     alignment: Alignment  # of the line
-    nominal_force: float  # static and aerodynamic uplift (N)
+    nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
     catenary: CatenaryData
     pantograph: PantographData

@@ -178,12 +178,12 @@ def _line_value(episode, own, task, now, number):
 
 @entry(CENTRED, "force deviation", FORCE_DEVIATION, OF_NOMINAL)
 def _force_deviation(episode, own, task, now, number):
-    return now[NOW.READING + READING.CONTACT_FORCE] / own[ROW.NOMINAL_FORCE] - 1.0
+    return now[NOW.READING + READING.CONTACT_FORCE] / own[ROW.LIFT] - 1.0
 
 
 @entry(CENTRED, "nominal force", 30.0, "N")
 def _nominal_force(episode, own, task, now, number):
-    return own[ROW.NOMINAL_FORCE]
+    return own[ROW.LIFT]
 
 
 def _actions(options: EntryOptions) -> list[tuple[str, float, str, int]]:
@@ -257,4 +257,4 @@ def _remembered_deviations(options: EntryOptions) -> list[tuple[str, float, str,
 
 @entries(CENTRED, _remembered_deviations)
 def _earlier_deviation(episode, own, task, now, number):
-    return task[TASK_ROW.ACTION + number] / own[ROW.NOMINAL_FORCE] - 1.0
+    return task[TASK_ROW.ACTION + number] / own[ROW.LIFT] - 1.0

@@ -132,7 +132,8 @@ def prepare_entries(episode, sensors, run, own, now, lane):
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], lane)
     now[NOW.SPANS] = in_spans(episode.alignment, position(run, CONTROLLED, lane, own[ROW.STEP]))
-    now[NOW.SPEED] = stride(run, CONTROLLED, lane, own[ROW.STEP]) * (1.0 / episode.time_step)
+    now[NOW.STRIDE] = stride(run, CONTROLLED, lane, own[ROW.STEP])
+    now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)
     if episode.odometer.table.shape[1] > 0:
         spans, speed = read_odometer(
             episode.odometer, episode.alignment, now[NOW.SPANS], now[NOW.SPEED], lane
@@ -172,5 +173,5 @@ def begin_history(episode, task, now):
 def entry_of(episode, own, task, now, k):
     """Entry k of a lane's observation, within its bounds."""
     value = _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1])
-    centre = episode.centre[k] + episode.slope[k] * own[ROW.STRIDE]
+    centre = episode.centre[k] + episode.slope[k] * now[NOW.STRIDE]
     return min(BOUND, max(-BOUND, (value - centre) * episode.per_unit[k]))

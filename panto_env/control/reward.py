@@ -87,7 +87,7 @@ def begin_terms(task, now):
 @inlined
 def add_sample_to_terms(own, task, now, force_before):
     """Add a plant step to the sums of its control step; force_before: previous contact force (N)."""
-    force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.NOMINAL_FORCE]
+    force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.LIFT]  # nominal at the present speed
     # An interval lies between two samples: before the first one there is none.
     between = 1.0 if own[ROW.STEP] > 1.5 else 0.0
     now[NOW.COST] += between * (abs(force_before - nominal_force) + abs(force - nominal_force))
@@ -113,7 +113,9 @@ def compute_reward(episode, own, task, now, values):
     task[TASK_ROW.MEAN_DEVIATION] += episode.mean_share * change
     shift, per_spread = task[TASK_ROW.TARGET_SHIFT], task[TASK_ROW.PER_SPREAD]
     mean_deviation = (task[TASK_ROW.MEAN_DEVIATION] - shift) * per_nominal_force
-    # The running figures have sums of deviations from the nominal force; those from the target follow.
+    # The running figures have sums of deviations from the nominal force of the mean speed; those from the
+    # target, which follows the speed as the lift does, come from them.
+    shift += own[ROW.LIFT] - own[ROW.NOMINAL_FORCE]
     deviation = task[TASK_ROW.DEVIATION] - now[NOW.DEVIATION_BEFORE]
     squared = task[TASK_ROW.SQUARED_DEVIATION] - now[NOW.SQUARED_BEFORE]
     about_target = (squared - 2.0 * shift * deviation) * per_step + shift * shift

@@ -147,7 +147,7 @@ class RunSettings(Numerics):
     speed_drift: SpeedDrift = Field(
         0.0,
         description="rms of a slow drift of the speed about its mean, with periods of 7 to 29 s, drawn per "
-        "run (km/h)",
+        "run (km/h); the aerodynamic force and a required mean force that depends on the speed follow it",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
@@ -164,8 +164,9 @@ class RunSettings(Numerics):
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "fair", "worn", one with values and defects such as '
-        '"worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; from a list one is drawn per run',
+        description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values and '
+        'defects such as "worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; from a list one is '
+        "drawn per run",
     )
     mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
         None,

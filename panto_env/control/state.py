@@ -30,7 +30,7 @@ class TaskRow(IntEnum):
     END = 1  # number of plant steps of the episode
     ENDING = 2  # why it ended early, an ``Ending``
     LOSS_STEPS_IN_A_ROW = 3  # plant steps since contact was lost
-    MEAN_DEVIATION = 4  # running mean of contact force minus nominal force (N)
+    MEAN_DEVIATION = 4  # running mean of contact force minus nominal force, at the speed of each step (N)
     TARGET_SHIFT = 5  # target force of the reward minus nominal force (N)
     PER_SPREAD = 6  # 1 / deviation from the target that counts as 1 (1/N)
     COUNTED_FROM = 7  # plant step after which reward and figures count
@@ -56,14 +56,14 @@ class TaskRow(IntEnum):
 class Now(IntEnum):
     """Rows of a lane's values within a control step."""
 
-    COST = 0  # sum of deviations from the nominal force at both ends of each interval (N)
+    COST = 0  # sum of deviations from the nominal force, at the speed of each step, at both its ends (N)
     LOSS_STEPS = 1  # plant steps without contact
-    SIGNED_DEVIATION = 2  # sum of contact force minus nominal force (N)
+    SIGNED_DEVIATION = 2  # sum of contact force minus nominal force, at the speed of each step (N)
     EFFORT = 3  # term of the reward
     RATE = 4  # term of the reward
     SPANS = 5  # travelled since the line's start, as read (-)
     SPEED = 6  # of the train, as read (m/s)
-    STRIDE = 7  # mean distance covered in a plant step (m)
+    STRIDE = 7  # distance covered in a plant step (m): the mean of a control step, then that at its end
     DEVIATION_BEFORE = 8  # ``TaskRow.DEVIATION`` at the start of the control step (N)
     SQUARED_BEFORE = 9  # ``TaskRow.SQUARED_DEVIATION`` at the start of the control step (N^2)
     TARGET_COST = 10  # as COST, of deviations from the reward's target (N)

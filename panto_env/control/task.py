@@ -212,7 +212,11 @@ def passive_pass(settings: RunSettings) -> Trajectory:
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
-    """Mean force of a pass without a policy, over the spans, as a function of the static force."""
+    """Mean force of a pass without a policy, over the spans, as a function of the static force.
+
+    Where the speed drifts, what the required mean is higher over these spans than at the mean speed is taken
+    off: the required mean follows the speed, and the static force has no part in that.
+    """
     task = Task(settings)
 
     def mean(force: float) -> float:
@@ -226,6 +230,16 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
                 f"'{run.catenary}' at {run.speed_kmh:g} km/h. With {force:.1f} N of static force: "
                 f"{run.ending}"
             )
-        return run.summary(spans).mean
+        return run.summary(spans).mean - _required_more(settings, run, spans)
 
     return mean
+
+
+def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice) -> float:
+    """By how much the mean force required over the spans exceeds that at the run's mean speed (N)."""
+    required = target_mean(settings, run.speed)
+    if required is None or not run.drifts:
+        return 0.0
+    speeds = run.speeds[run.inside(spans)].tolist()
+    at_each = np.array([target_mean(settings, speed) for speed in speeds], dtype=float)
+    return float(np.mean(at_each - required))  # exactly 0 where the required mean is a number

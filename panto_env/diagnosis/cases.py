@@ -104,17 +104,17 @@ def every_defect(track: Track, random: np.random.Generator, broken: int = 1) -> 
 def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajectory:
     """One pass over a track, its number-th, of which speed and pantograph are drawn."""
     random = np.random.default_rng([track.seed, number])
-    fair = LINE_CONDITIONS["fair"].model_dump() | {"dropper_scatter": track.scatter}
+    smooth = LINE_CONDITIONS["smooth"].model_dump() | {"dropper_scatter": track.scatter}
     for defect in defects:
         for key, value in defect.condition.items():
-            fair[key] = [*fair[key], *value] if isinstance(value, list) else value
+            smooth[key] = [*smooth[key], *value] if isinstance(value, list) else value
     data, pantograph = track.data, load_pantograph(track.pantograph)
     run = simulate(
         track.catenary,
         with_scatter(pantograph, PANTOGRAPH_SCATTER, random),
         track.speed_kmh * (1 + SPEED_SCATTER * random.standard_normal()),
         known_pantograph=pantograph,
-        line_condition=LineCondition(**fair),
+        line_condition=LineCondition(**smooth),
         seed=track.seed,
         spans=SPANS,
         distance=data.alignment().support(SPANS - 2),

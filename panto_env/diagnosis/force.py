@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from ..base.units import to_kmh
 from ..estimation.estimate import filter_motion, gains_of, model_of
-from ..estimation.motion import Motion, measure
+from ..estimation.motion import Motion, measure, on_frame
 from ..estimation.plausibility import check_motion
 from ..estimation.settings import EstimatorSettings
 from ..estimation.smoother import smooth_force
@@ -89,7 +89,7 @@ def _as_recorded(run: Trajectory) -> Motion:
         frame=run.frame,
         head_velocity=None,
         frame_velocity=None,
-        frame_force=run.frame_force,
+        frame_force=on_frame(run),
         head_force=run.head_force,
         lift=run.nominal_force,
         speed=run.speed,

@@ -24,9 +24,11 @@ class Motion:
     frame: Array  # (n,): height of the articulated frame, the lowest mass (m)
     head_velocity: Array | None  # (n,): m/s; None: not measured
     frame_velocity: Array | None  # (n,): m/s; None: not measured
-    frame_force: Array  # (n,): of an actuator on the frame, from this sample to the next (N)
+    # (n,): of an actuator on the frame, from this sample to the next (N); and how much more than ``lift`` a
+    # train's aerodynamic uplift is at its present speed, which it knows
+    frame_force: Array
     head_force: Array  # (n,): of an actuator between head and the mass below it, as above (N)
-    lift: float  # static force and aerodynamic uplift on the lowest mass (N)
+    lift: float  # static force and aerodynamic uplift on the lowest mass (N), at the mean speed
     speed: float | None = None  # of the train (m/s); None: not known
     span: float | None = None  # m; None: not known
     start: float = 0.0  # time of the first sample (s)
@@ -46,6 +48,11 @@ class Motion:
     def inputs(self) -> Array:
         """Known forces on the frame and between head and the mass below, (n, 2) (N)."""
         return np.column_stack([self.lift + self.frame_force, self.head_force])
+
+
+def on_frame(run: Trajectory) -> Array:
+    """Known force on the frame of a run, (n,) (N), beyond its nominal force; see ``Motion``."""
+    return run.frame_force + (run.lift - run.nominal_force)
 
 
 def measure(
@@ -85,7 +92,7 @@ def measure(
         frame=seen(run.frame, displacement_noise),
         head_velocity=seen(run.head_velocity, velocity_noise),
         frame_velocity=seen(run.frame_velocity, velocity_noise),
-        frame_force=mean(run.frame_force, time, time + step),
+        frame_force=mean(on_frame(run), time, time + step),
         head_force=mean(run.head_force, time, time + step),
         lift=run.nominal_force,
         speed=run.speed,

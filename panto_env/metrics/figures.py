@@ -41,11 +41,11 @@ class Figures:
         return dict(vars(self))
 
 
-def cost_function(force: Array, nominal_force: float, stride: float | Array) -> float:
+def cost_function(force: Array, nominal_force: float | Array, stride: float | Array) -> float:
     """CF (N m), Eq. 14 of paper 1: |F - F_N| over the distance, by trapezoids.
 
-    stride: distance between samples (m), the speed times the time step, or (n - 1,) where the speed
-    drifts.
+    nominal_force: F_N (N), or (n,) where it follows a speed that drifts. stride: distance between samples
+    (m), the speed times the time step, or (n - 1,) where the speed drifts.
     """
     deviation = np.abs(force - nominal_force)
     pairs, half = deviation[:-1] + deviation[1:], stride / 2

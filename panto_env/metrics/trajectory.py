@@ -29,6 +29,8 @@ from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
 
 FORMAT = 3
+FEWEST = 3
+"""Samples that a speed is found from, by differences of second order."""
 KEY = b"panto_env"
 """Key of the file's metadata that holds the facts as JSON, with a checksum of them and of all columns."""
 LARGEST = 0.5
@@ -85,8 +87,9 @@ class Trajectory:
     speed: float  # of the train, its mean where it drifts (m/s)
     alignment: Alignment  # of the line
     time_step: float  # s
-    nominal_force: float  # static force and aerodynamic uplift, as applied (N)
-    target_mean: float = math.nan  # mean force (N) for which the static force was trimmed; nan: it was not
+    nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
+    # Mean force (N) for which the static force was trimmed, at the mean speed; nan: it was not
+    target_mean: float = math.nan
     settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # identity of the run, plain data
     policy: str = "passive"
     seed: int = 0
@@ -112,7 +115,7 @@ class Trajectory:
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
         frame, head = self.frame_force[inside], self.head_force[inside]
         frame_change, head_change = np.diff(frame), np.diff(head)
-        ways = np.diff(self.position[inside]) if self.settings.get("speed_drift") else self.stride
+        ways = np.diff(self.position[inside]) if self.drifts else self.stride
         changes = frame_change @ frame_change + head_change @ head_change
         return Figures(
             mean=mean,
@@ -123,7 +126,7 @@ class Trajectory:
             min=float(filtered.min()),
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
             contact_loss=contact_loss(force),
-            cost_function=cost_function(force, self.nominal_force, ways),
+            cost_function=cost_function(force, self.lift[inside], ways),
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
             effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
             distance=float(inside.sum() * np.mean(ways)),
@@ -132,14 +135,15 @@ class Trajectory:
     def compliance(self, spans: SpanChoice = None) -> list[Criterion]:
         """Criteria of EN 50367 and EN 50119 for the run over the spans, and values without limits.
 
-        Values of droppers need their record. Raises InputError as ``summary`` does.
+        Limits are those of the mean speed over the spans. Values of droppers need their record. Raises
+        InputError as ``summary`` does.
         """
         tension, _ = evaluated(self, spans)
         return compliance(
             self.summary(spans),
             arcing(self.contact_force[self.inside(spans)], self.time_step),
             self.line,
-            self.speed,
+            float(self.speeds[inside].mean()) if self.drifts else self.speed,
             self.alignment.mean_length,
             tension,
             tension[near_train(self, spans)] if tension.size else tension,
@@ -160,6 +164,25 @@ class Trajectory:
     def speed_kmh(self) -> float:
         """Speed of the train, its mean where it drifts (km/h)."""
         return to_kmh(self.speed)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the train's speed drifts."""
+        return bool(self.settings.get("speed_drift"))
+
+    @property
+    def speeds(self) -> Array:
+        """Speed of the train at each sample, (n,) (m/s)."""
+        if not self.drifts or len(self.time) < FEWEST:
+            return np.full(len(self.time), self.speed)
+        return np.asarray(np.gradient(self.position, self.time_step, edge_order=2))
+
+    @property
+    def lift(self) -> Array:
+        """Static force and aerodynamic uplift as applied in each step, (n,) (N)."""
+        coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
+        more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.drifts else 0.0
+        return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)
 
     @property
     def stride(self) -> float:

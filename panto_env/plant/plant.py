@@ -13,7 +13,7 @@ from ..base.errors import InputError
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
-from .drift import DRIFT_ROWS, ahead
+from .drift import DRIFT_ROWS, ahead, gain
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import pantographs, rest_state
@@ -72,6 +72,9 @@ class Plant:
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * size)),
             distance=tuple(collector.distance for collector in train.collectors),
+            aerodynamic=tuple(
+                collector.pantograph.aerodynamic_uplift(1 / self.time_step) for collector in train.collectors
+            ),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
             lowest_force=-np.inf if bilateral else 0.0,
@@ -129,7 +132,7 @@ class Plant:
         static_forces: Array | None = None,
         drift: Array | None = None,
     ) -> None:
-        """Put lanes at the start of the line, at rest under the nominal force.
+        """Put lanes at the start of the line, at rest under the nominal force at their present speed.
 
         lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of the
         wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition gives
@@ -155,14 +158,18 @@ class Plant:
         nominal_forces = self.pantograph.nominal_force(speeds)
         if static_forces is not None:
             nominal_forces = nominal_forces + (static_forces - self.pantograph.static_force)
-        state = rest_state(pantographs or self.pantograph, nominal_forces, heights, compliance)
+        strides = speeds * self.time_step
+        now = strides + gain(run.drift[lanes], 0.0)
+        lifts = nominal_forces + run.aerodynamic[0] * (now**2 - strides**2)
+        state = rest_state(pantographs or self.pantograph, lifts, heights, compliance)
         forces = (state[:, 0] - heights) / compliance
         if not self.model.massless:
             for lane, line, force in zip(lanes.tolist(), drawn, forces.tolist(), strict=True):
                 self.model.settle(lane, line, force)
         table = np.zeros((len(lanes), run.table.shape[2]))
-        table[:, Row.STRIDE] = speeds * self.time_step
+        table[:, Row.STRIDE] = strides
         table[:, Row.NOMINAL_FORCE] = nominal_forces
+        table[:, Row.LIFT] = lifts
         table[:, Row.CONTACT_FORCE] = forces
         table[:, Row.STATE : Row.STATE + state.shape[1]] = state
         table[:, Row.HEAD_HEIGHT] = state[:, 0]

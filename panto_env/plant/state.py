@@ -33,12 +33,14 @@ class Row(IntEnum):
     HEAD_FORCE = 7  # of the actuator on the head (N)
     STEP = 8  # steps since the start
     STRIDE = 9  # distance covered in one step (m), the mean where the speed drifts
-    NOMINAL_FORCE = 10  # static and aerodynamic uplift on the lowest mass (N)
+    NOMINAL_FORCE = 10  # static force and aerodynamic uplift on the lowest mass (N), at the mean speed
     COMMAND = 11  # of the actuators (N), a row per ``Place``
     IRREGULARITY = 13  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 14  # height of the wire where it is touched, at the step's start (m)
     WIRE_MIDDLE = 15  # its height at mid-step, without the forces of this step (m)
-    STATE = 16  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
+    LIFT = 16  # static force and aerodynamic uplift on the lowest mass (N), at the speed of this step
+    # An even number, for processors compute states in pairs.
+    STATE = 18  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
     # same at the step's end, without the contact force
 
 
@@ -52,6 +54,7 @@ class Run(NamedTuple):
 
     table: Array  # (collectors, lanes, STATE + 4n): the rows above
     distance: tuple[float, ...]  # of each collector behind the first (m); kernels know a tuple's length
+    aerodynamic: tuple[float, ...]  # uplift of each collector per squared distance covered in a step (N/m^2)
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     lowest_force: float  # 0, or -inf for a contact that may pull (N)

@@ -16,7 +16,7 @@ from .catenary.protocol import (
 from .contact import contact_force
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
-from .train import mean_stride, position
+from .train import lift, mean_stride, position
 from .trigonometry import cosine_of_turns
 
 
@@ -33,6 +33,8 @@ def irregularity(run, x, lane):
 def approach(line, wire, pantographs, actuators, run, contact, lane):
     """Begin the step of one collector: everything except the contact force."""
     own = run.table[contact, lane]
+    if run.drift.shape[1] > 0:
+        own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
     drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
     move_freely(pantographs, contact, own, lane)
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)

@@ -74,6 +74,14 @@ def stride(run, collector, lane, steps):
 
 
 @inlined
+def lift(run, collector, lane, steps):
+    """Static force and aerodynamic uplift on a lane's collector (N), at its speed after a number of steps."""
+    own = run.table[collector, lane]
+    mean, now = own[ROW.STRIDE], stride(run, collector, lane, steps)
+    return own[ROW.NOMINAL_FORCE] + run.aerodynamic[collector] * (now * now - mean * mean)
+
+
+@inlined
 def mean_stride(run, collector, lane, steps):
     """Mean distance that a lane's collector covers in each of the next steps (m)."""
     if run.drift.shape[1] > 0:

@@ -150,7 +150,7 @@ def test_gains_are_named_in_order() -> None:
 
 def test_without_a_place_it_takes_more_off_sigma_than_learning_alone() -> None:
     settings = run_settings(
-        {"speed_kmh": 325.0, "actuator": "realistic", "sensors": "blind", "line_condition": "fair"}
+        {"speed_kmh": 325.0, "actuator": "realistic", "sensors": "blind", "line_condition": "smooth"}
         | {"accuracy": "fast"}
     )
     laws = [Still(), Repetitive(place="counted"), Adaptive(place="counted")]

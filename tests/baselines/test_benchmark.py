@@ -97,7 +97,7 @@ def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Bench
         *((P, 0), (P, 1)),
     ]
     assert outcome.spans == ((3, 5),)
-    run = simulate(policy=P, seed=1, distance=310.0, line_condition="fair", record_droppers=False)
+    run = simulate(policy=P, seed=1, distance=310.0, line_condition="smooth", record_droppers=False)
     assert outcome.rows[3].figures == run.summary((3, 5))
     interval = round(0.01 / run.time_step)
     steps = np.diff(run.frame_force[run.position > 120][4::interval])

@@ -24,7 +24,7 @@ def test_a_family_is_a_line_of_a_benchmark():
             speed_kmh=row.speed_kmh,
             seed=3,
             policy=policy,
-            line_condition="fair",
+            line_condition="smooth",
             record_droppers=False,
         )
         assert row.figures.std == alone.summary((10, 19)).std

@@ -35,7 +35,7 @@ from panto_env.plant.actuators import actuator_settings
 
 from ..pages import check_page, tables_of
 
-SHORT: dict[str, Any] = {"line_condition": "fair", "actuator": "realistic", "speed_kmh": 300.0}
+SHORT: dict[str, Any] = {"line_condition": "smooth", "actuator": "realistic", "speed_kmh": 300.0}
 SPANS = (2, 2)
 LINEAR: dict[str, Any] = {
     "catenary": "periodic-stiffness",
@@ -270,7 +270,7 @@ def test_stored_oracles_are_what_simulate_says_today():
 
 
 def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
-    given, spans = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "fair"}, (10, 19)
+    given, spans = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "smooth"}, (10, 19)
     ratio = stored.stored_ratio(given, spans)
     assert ratio is not None
     assert 0.2 < ratio < 0.75
@@ -338,7 +338,7 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     cell = json.loads(file.read_text())["cells"][0]
     assert [each["seed"] for each in cell["passes"]] == [0, 1]
     assert [each["start"] for each in cell["passes"][1]["searches"]] == ["seed 0", "hop 1"]
-    given = {"speed_kmh": 300, "line_condition": "fair"}
+    given = {"speed_kmh": 300, "line_condition": "smooth"}
     assert stored.stored_ratio(given, SPANS, file) == cell["ratio"]
     again = simulate(**given, seed=1, distance=None).summary((2, 2))
     assert cell["passes"][1]["passive"]["std"] == again.std

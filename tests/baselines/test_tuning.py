@@ -26,7 +26,7 @@ from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
 
 Array = NDArray[np.float64]
-REAL: dict[str, Any] = {"actuator": "realistic", "sensors": "realistic", "line_condition": "fair"}
+REAL: dict[str, Any] = {"actuator": "realistic", "sensors": "realistic", "line_condition": "smooth"}
 
 
 def a_context(**settings: Any) -> Context:

@@ -49,7 +49,13 @@ def test_every_entry_is_shown_with_its_whole_description(panto):
         ("passive", ["policy passive", "Actuators that stay at zero"]),
         (
             "worn",
-            ["line_condition worn", "presets are new, fair, as-built, worn", "wear_depth", "0.0003", "0.8"],
+            [
+                "line_condition worn",
+                "presets are new, smooth, as-built, fair, worn",
+                "wear_depth",
+                "0.0005",
+                "0.8",
+            ],
         ),
         (
             "realistic",
@@ -77,7 +83,7 @@ def test_a_preset_of_another_kind_says_so(panto):
 def test_the_same_for_machines(panto):
     everything = json.loads(panto("list", "--json"))
     assert everything["policy"]["pd"]["parameters"] == {"gain": 1.0, "derivative": 0.005, "damping": 150.0}
-    assert everything["line_condition"]["worn"]["wear_depth"] == 0.3e-3
+    assert everything["line_condition"]["worn"]["wear_depth"] == 0.5e-3
     found = json.loads(panto("list", "realistic", "--json"))
     assert found["actuator"]["rate_limit"] == 2500.0
     assert found["sensors"]["force_noise"] == 2.0
@@ -110,7 +116,8 @@ def test_a_preset_takes_values_and_defects():
         ("worn:wear_depth", "'wear_depth' must read name=value"),
         (
             "worm:wear_depth=1e-3",
-            r"'new' or 'fair' or 'as-built' or 'worn' \(with values, such as 'new:irregularity=...'\)",
+            r"'new' or 'smooth' or 'as-built' or 'fair' or 'worn' \(with values, such as "
+            r"'new:irregularity=...'\)",
         ),
     ],
 )

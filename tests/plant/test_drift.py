@@ -88,8 +88,8 @@ def test_figures_kept_as_it_runs_are_those_of_the_record(line, tmp_path):
             assert kept[name] == pytest.approx(value, rel=1e-4, abs=1e-9), name
     assert kept["distance"] == pytest.approx(run.distance, abs=0.01)  # a tenth of a step
     assert run.distance != pytest.approx(run.speed_kmh / 3.6 * len(run.time) * run.time_step, abs=1.0)
-    steady = np.trapezoid(np.abs(run.contact_force - run.nominal_force), run.position)
-    assert recorded["cost_function"] == pytest.approx(steady, rel=1e-9)
+    deviation = np.abs(run.contact_force - run.lift)
+    assert recorded["cost_function"] == pytest.approx(np.trapezoid(deviation, run.position), rel=1e-9)
     run.save(tmp_path / "run.parquet")
     loaded = Trajectory.load(tmp_path / "run.parquet").summary("all").as_dict()
     assert loaded == pytest.approx(recorded, rel=0, abs=0, nan_ok=True)

@@ -95,10 +95,10 @@ def test_contact_is_its_spring_at_the_mean_gap_and_its_damper(condition):
     height = np.zeros(len(position))
     if condition == "worn":  # cosines of random phase, and waves of wear from their deepest on
         turns = np.random.default_rng(3).uniform(0, 1, 3)
-        waves = ((12, 0.15e-3), (5, 0.08e-3), (1.5, 0.03e-3))  # m
+        waves = ((12, 1.5e-3), (5, 0.8e-3), (1.5, 0.3e-3))  # m
         for (length, amplitude), phase in zip(waves, turns, strict=True):
             height += amplitude * np.cos(2 * np.pi * (position / length + phase))
-        height -= 0.15e-3 * np.cos(2 * np.pi * position / 0.8)
+        height -= 0.25e-3 * np.cos(2 * np.pi * position / 0.8)
     springs = 1 / (1 / strip + 1 / stiffness(position))
     states = replay(run, data, rest(data, run.nominal_force, springs[0], height[0]))
     gap = means(states[:, 0]) - height[1::2]

@@ -197,7 +197,7 @@ def test_notebook_shows_what_it_prints_now():
     stored = nbformat.read(NOTEBOOK, as_version=4)
     again = told(executed(before="## Learning"))
     assert told(stored).startswith(again)
-    assert again == "mean force 115.6 N, sigma 35.28 N\nsigma 35.28 N\nDamper: sigma -8.8 %\n"
+    assert again == "mean force 115.6 N, sigma 35.28 N\nsigma 35.28 N\nDamper: sigma -8.9 %\n"
     assert [cell for cell in stored.cells if cell.cell_type == "code" and not cell.execution_count] == []
     assert NOTEBOOK.stat().st_size < 300_000
     assert changes(stored)["SAC"] < changes(stored)["Damper"]

@@ -83,4 +83,8 @@ class PantographData(Settings):
 
     def nominal_force(self, speed: Any) -> Any:
         """Force that lifts the pantograph (N) at a train speed (m/s), or at each of an array."""
-        return self.static_force + self.aerodynamic_coefficient * to_kmh(speed) ** 2
+        return self.static_force + self.aerodynamic_uplift(speed)
+
+    def aerodynamic_uplift(self, speed: Any) -> Any:
+        """Aerodynamic uplift on the lowest mass (N) at a train speed (m/s), or at each of an array."""
+        return self.aerodynamic_coefficient * to_kmh(speed) ** 2

@@ -9,7 +9,8 @@ from typing import Any
 from ...base.table import Table
 from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
-from . import convergence, lines, reference, start, tables, wear, window
+from . import conditions, convergence, lines, reference, start, tables, wear, window
+from .conditions import ConditionCheck
 from .lines import LineCheck
 from .reference import Check
 from .start import StartCheck
@@ -22,7 +23,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What was found; the last five are empty where they were not requested."""
+    """What was found; the last six are empty where they were not requested."""
 
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
@@ -30,6 +31,7 @@ class Validation:
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
+    conditions: list[ConditionCheck]
     lines: list[LineCheck]
     start: list[StartCheck]
 
@@ -46,6 +48,7 @@ class Validation:
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
+            *([tables.conditions_table(self.conditions)] if self.conditions else []),
             *([tables.lines_table(self.lines)] if self.lines else []),
             *([tables.start_table(self.start)] if self.start else []),
         ]
@@ -62,6 +65,7 @@ class Validation:
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
+            "conditions": [vars(check) for check in self.conditions],
             "lines": [vars(check) for check in self.lines],
             "start": [vars(check) for check in self.start],
         }
@@ -73,6 +77,7 @@ def run(
     with_convergence: bool = False,
     with_windows: bool = False,
     with_wear: bool = False,
+    with_conditions: bool = False,
     with_lines: bool = False,
     with_start: bool = False,
 ) -> Validation:
@@ -93,6 +98,11 @@ def run(
         for numerics in wear.DISCRETISATIONS:
             report(f"{condition}, {numerics}")
             worn.append(wear.check_wear(condition, numerics))
+    levels: list[ConditionCheck] = []
+    for catenary, pantograph, speeds in conditions.CASES if with_conditions else ():
+        for speed in speeds:
+            report(f"conditions of {catenary} at {speed:g} km/h")
+            levels += conditions.check_conditions(catenary, pantograph, speed)
     every: list[LineCheck] = []
     for name, speed in lines.cases() if with_lines else ():
         report(f"{name} at {speed:g} km/h")
@@ -102,4 +112,4 @@ def run(
         report(f"the start of runs at {speed:g} km/h")
         starts += start.check_start(speed)
     compliance = [run.compliance(reference.SPANS) for run in runs]
-    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, every, starts)
+    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, levels, every, starts)

@@ -8,7 +8,7 @@ from typing import Any
 from ...base.table import Alarm, Table
 from ...metrics.labels import LABELS
 from ...terminal import number
-from . import convergence, lines, reference, start, wear, window
+from . import conditions, convergence, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
 
@@ -108,6 +108,35 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
         ),
         rows,
         text_columns=0,
+    )
+
+
+def conditions_table(checks: Sequence[conditions.ConditionCheck]) -> Table:
+    """Figures on lines in each named condition."""
+    rows = []
+    for check in checks:
+        forces = (_spread(values, 1) for values in (check.std, check.max, check.min, check.raw_max))
+        case = (check.catenary, check.pantograph, f"{check.speed_kmh:g}", check.condition)
+        std, *others = forces
+        changes = f"{check.change:+.1f}", f"{check.worse} of {check.seeds}"
+        rows.append((*case, std, *changes, *others, _spread(check.contact_loss, 2)))
+    ends = (
+        k
+        for k in range(len(checks))
+        if k + 1 == len(checks) or checks[k + 1].speed_kmh != checks[k].speed_kmh
+    )
+    return Table(
+        f"Passive runs in each condition; mean ± standard deviation over {conditions.SEEDS} seeds",
+        (
+            *("line", "pantograph", "km/h", "condition"),
+            *(LABELS["std"].column, "σ from\nnew (%)", "worse\nthan new"),
+            *(LABELS[name].column for name in ("max", "min")),
+            f"raw {LABELS['max'].column}",
+            LABELS["contact_loss"].column,
+        ),
+        rows,
+        text_columns=4,
+        section_ends=tuple(ends),
     )
 
 
