@@ -1,4 +1,4 @@
-"""The error for invalid input of any kind, and the warning about accuracy."""
+"""The error for invalid input of any kind, and the warnings about accuracy and unusual values."""
 
 from .shown import one_line
 
@@ -13,3 +13,7 @@ class InputError(ValueError):
 
 class AccuracyWarning(UserWarning):
     """Figures are less accurate than usual: one sentence that says why and by how much."""
+
+
+class UnusualWarning(UserWarning):
+    """A value is valid but far from any usual one, as a wrong unit or sign makes it: one sentence."""

@@ -12,7 +12,7 @@ import typer
 from typer import Abort
 
 from ..base import plugins
-from ..base.errors import AccuracyWarning, InputError
+from ..base.errors import AccuracyWarning, InputError, UnusualWarning
 from ..base.plain_characters import show_always
 from ..base.shown import one_line
 from ..base.standard_streams import guarded_streams, say
@@ -84,7 +84,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
-    if issubclass(category, AccuracyWarning):
+    if issubclass(category, AccuracyWarning | UnusualWarning):
         say(f"warning: {message}")
     elif sys.stderr is not None:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

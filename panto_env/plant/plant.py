@@ -16,7 +16,7 @@ from .catenary.schema import check_span_count
 from .drift import DRIFT_ROWS, ahead
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
-from .pantograph.build import pantographs, rest_state
+from .pantograph.build import check_compression, pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples
@@ -134,7 +134,8 @@ class Plant:
         lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of the
         wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition gives
         them. pantographs: the lanes' own, where they are varied. static_forces: instead of the pantograph's,
-        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed.
+        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed,
+        and for springs of a pantograph that give way.
         """
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
@@ -156,6 +157,7 @@ class Plant:
         if static_forces is not None:
             nominal_forces = nominal_forces + (static_forces - self.pantograph.static_force)
         state = rest_state(pantographs or self.pantograph, nominal_forces, heights, compliance)
+        check_compression(self.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         if not self.model.massless:
             for lane, line, force in zip(lanes.tolist(), drawn, forces.tolist(), strict=True):

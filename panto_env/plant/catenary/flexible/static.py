@@ -22,6 +22,10 @@ HEIGHT_RANGE = 0.5
 """Maximum difference of the contact wire's heights along a span (m); pantographs follow 0.3 m."""
 STEEPEST = 0.2
 """Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+MOST_STRETCH = 0.1
+"""Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
+MOST_YIELD = 0.3
+"""Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
 SETTLED, USABLE = 1e-12, 1e-9
 """Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
 POINTS = 401
@@ -58,9 +62,16 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
 def hang(line: FlexibleCatenaryData) -> StaticShape:
     """Static shape of a line that can exist: every dropper pulls, wires do not cross and are level.
 
-    Raises InputError, naming the dropper or the wire, where it can't.
+    Nothing in it gives way under the wires' weight either. Raises InputError, naming the dropper, the wire or
+    the support, where it can't.
     """
     shape = solve(line)
+    yielded = line.encumbrance - float(shape.messenger.height(np.zeros(1))[0])
+    if yielded > MOST_YIELD:
+        raise InputError(
+            f"At rest the messenger's supports of line '{line.name}' would yield by {yielded:.2g} m, more "
+            f"than {MOST_YIELD} m; give support.stiffness in N/m (500 N/mm are 500e3)."
+        )
     _check_droppers(line, shape)
     x = np.linspace(0.0, line.span_length, POINTS)
     contact, messenger = shape.contact.height(x), shape.messenger.height(x)
@@ -96,7 +107,14 @@ def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
                 f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
                 "position, or the sags."
             )
-    for place, length in zip(places, shape.dropper_length, strict=True):
+    stretch = shape.dropper_tension / shape.dropper_stiffness
+    for place, length, longer in zip(places, shape.dropper_length, stretch, strict=True):
+        if 0 < MOST_STRETCH * (length + longer) < longer:
+            raise InputError(
+                f"At rest {place} would be stretched by {longer:.2g} m, more than a tenth of its "
+                f"{length + longer:.2g} m; give stiffer droppers: stiffness in N/m (100 N/mm are 100e3), "
+                "axial_stiffness in N."
+            )
         if length <= 0:
             raise InputError(
                 f"Unloaded, {place} would be {length:.4g} m long; give a larger encumbrance, more tension "
