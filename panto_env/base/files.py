@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import stat
 import tempfile
 import tomllib
@@ -161,10 +162,12 @@ def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The table of a TOML file. Raises InputError, naming the file, where it cannot be read."""
+    """The table of a TOML file in UTF-8. Raises InputError, naming the file, where it cannot be read."""
     check_path(path)
+    text = ""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8-sig")  # editors of Windows begin a file with U+FEFF
+        return tomllib.loads(text)
     except FileNotFoundError as error:
         raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
     except OSError as error:
@@ -174,7 +177,15 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except RecursionError as error:
         raise InputError(f"{path} is not valid TOML: it is nested too deeply; correct the file.") from error
     except ValueError as error:  # TOML's own, and for whole numbers with thousands of digits
-        raise InputError(f"{path} is not valid TOML: {error}; correct the file.") from error
+        comma = _decimal_comma(text, str(error))
+        raise InputError(f"{path} is not valid TOML: {error}; {comma or 'correct the file'}.") from error
+
+
+def _decimal_comma(text: str, error: str) -> str:
+    """Advice where the line that an error names holds a number with a decimal comma, else nothing."""
+    line = re.search(r"at line (\d+)", error)
+    number = re.search(r"\d+,\d+", text.split("\n")[int(line[1]) - 1].partition("#")[0]) if line else None
+    return f"decimals need a point, not a comma, as in {number[0].replace(',', '.')}" if number else ""
 
 
 def finite(value: Any) -> Any:

@@ -193,7 +193,7 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"trainings": {P: ["p", "pd"]}}, f"'{P}' is given twice"),
         ({"seeds": 0}, "key 'seeds'"),
         ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
-        ({"seeds": [-1]}, "key 'seeds.0'"),
+        ({"seeds": [-1]}, "key 'seeds.1'"),
         ({"lines": []}, "key 'lines'"),
         ({"lines": [LINE, LINE]}, "is given twice"),
         ({"lines": [{"speeds_kmh": [300, 300]}]}, "300.0 is given twice"),
@@ -201,7 +201,7 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"lines": [{"catenary": "nowhere"}]}, "Unknown catenary 'nowhere'"),
         ({"lines": [{"distance": 200.0}]}, "no spans 10 to 3 to evaluate"),
         ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
-        ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
+        ({"lines": [{"speed": 300}]}, "key 'lines.1.speed'"),
         ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
         ({"control_interval": 0.0}, "must be a number from 0.0001 to 10 s"),
@@ -257,7 +257,7 @@ def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
     [
         ("seeds = ", "is not valid TOML"),
         ("seed = 3", "key 'seed'"),
-        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.0.speeds_kmh.0'"),
+        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.1.speeds_kmh.1'"),
         (None, "does not exist"),
     ],
 )

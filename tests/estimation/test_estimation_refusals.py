@@ -108,7 +108,7 @@ def test_a_free_zero_leaves_the_mean_to_the_lift(motion):
     assert suspension_offset(back, TRUE) == pytest.approx(0.0, abs=1e-9)
     assert np.abs(back.head - motion.head).max() < 1e-4
     with pytest.raises(InputError, match="No spring holds the head"):
-        rezeroed(motion, changed(TRUE, {"stiffnesses.0": 0.0}))
+        rezeroed(motion, changed(TRUE, {"stiffnesses.1": 0.0}))
 
 
 def scaled(motion):
@@ -125,7 +125,7 @@ def as_it_is(motion):
     return motion
 
 
-NEAR = {"masses.0": 8.4, "masses.1": 13.65, "stiffnesses.0": 6650.0, "dampings.1": 105.0}
+NEAR = {"masses.1": 8.4, "masses.2": 13.65, "stiffnesses.1": 6650.0, "dampings.2": 105.0}
 FAULTS = {
     "healthy": (as_it_is, TRUE, None),
     "parameters 5 % wrong": (as_it_is, changed(TRUE, NEAR), None),
@@ -141,7 +141,7 @@ FAULTS = {
         TRUE,
         r"about [78]\.\d+ s they are",
     ),
-    "a wrong suspension": (as_it_is, changed(TRUE, {"stiffnesses.0": 9100.0}), r"carries \+3\d N more"),
+    "a wrong suspension": (as_it_is, changed(TRUE, {"stiffnesses.1": 9100.0}), r"carries \+3\d N more"),
     "another pantograph": (as_it_is, load_pantograph("en50318-2002"), "carries -"),
 }
 
@@ -155,7 +155,7 @@ def test_what_not_to_believe_is_said(change, pantograph, reason, motion):
 
 def test_a_wrong_head_mass_and_a_wrong_lift_cannot_be_seen(motion):
     """The limits of all tests, which documents and the command's help tell."""
-    heavy = estimate(motion, changed(TRUE, {"masses.0": 10.0}))
+    heavy = estimate(motion, changed(TRUE, {"masses.1": 10.0}))
     assert heavy.verdict.believe
     assert (heavy.force - motion.contact_force)[2000:].std() > 1.05 * (
         (estimate(motion, TRUE).force - motion.contact_force)[2000:].std()
