@@ -10,6 +10,7 @@ import numpy as np
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
+from ..base.shown import beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
@@ -210,8 +211,9 @@ class Plant:
         drifted = self.ahead(np.arange(self.lanes), end[:, None])[:, 0]
         position = end * self.row(Row.STRIDE) + drifted
         if not self.model.massless and position.max() > self.model.length + 1e-6:
+            farthest = beside(position.max(), self.model.length, ".1f")
             raise InputError(
-                f"Lane {position.argmax()} would run to {position.max():.1f} m, beyond the line's end at "
+                f"Lane {position.argmax()} would run to {farthest} m, beyond the line's end at "
                 f"{self.model.length:g} m; take fewer steps, or more spans."
             )
 

@@ -10,7 +10,15 @@ from panto_env import Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics import en50367
-from panto_env.metrics.criterion import Criterion, criteria_table, limits_in_words, remarks, worst
+from panto_env.metrics.criterion import (
+    Criterion,
+    criteria_table,
+    limits_in_words,
+    margin_in_words,
+    remarks,
+    value_in_words,
+    worst,
+)
 from panto_env.metrics.figures import Figures, arcing, contact_loss
 
 from ..command import panto
@@ -266,3 +274,24 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     ]
     assert [criterion["key"] for criterion in entry["policy_compliance"]] == ["mean", "std", "max", "arcing"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
+
+
+@pytest.mark.parametrize(
+    ("value", "highest", "texts"),
+    [
+        (157.34, 157.32, ("157.34", "at most 157.32", "-0.020")),
+        (157.32, 157.34, ("157.3", "at most 157.3", "0.020")),
+        (157.3, 157.3, ("157.3", "at most 157.3", "0.000")),
+        (10.0004, 9.9999, ("10.00", "at most 9.9999", "-0.001")),
+        (0.1000001, 0.1, ("0.1000001", "at most 0.1000000", "-0.0000001")),
+        (math.nan, 0.1, ("–", "at most 0.100", "–")),
+    ],
+)
+def test_text_says_whether_a_limit_is_kept(value, highest, texts):
+    found = Criterion("a", "a", "N", value, highest=highest)
+    assert (value_in_words(found), limits_in_words(found), margin_in_words(found)) == texts
+    lowest = Criterion("a", "a", "N", -value, lowest=-highest)
+    assert lowest.kept == found.kept
+    shown = [float(text.removeprefix("at least ")) for text in (limits_in_words(lowest),)]
+    if found.kept is not None:
+        assert (float(value_in_words(lowest)) >= shown[0]) == found.kept

@@ -12,6 +12,7 @@ import numpy as np
 from ...backend import aligned_zeros
 from ...base.arrays import Array, Lanes
 from ...base.errors import InputError
+from ...base.shown import beside
 from ..catenary.protocol import CatenaryModel
 from .schema import PantographData
 from .step import Part
@@ -181,9 +182,10 @@ def check_compression(name: str, states: Array) -> None:
     pressed = np.abs(np.diff(states[:, :size], axis=1))
     if pressed.size and pressed.max() > MOST_COMPRESSED:
         spring = int(pressed.max(axis=0).argmax())
+        most = beside(float(pressed.max()), MOST_COMPRESSED, ".3g")
         raise InputError(
             f"At rest spring {spring + 1} of pantograph '{name}' would be compressed by "
-            f"{pressed.max():.3g} m, more than {MOST_COMPRESSED:g} m, and no pantograph has that room: give "
+            f"{most} m, more than {MOST_COMPRESSED:g} m, and no pantograph has that room: give "
             f"number {spring + 1} of its stiffnesses in N/m (10 N/mm are 10e3), and forces in N."
         )
 

@@ -13,6 +13,7 @@ import numpy as np
 from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
+from ....base.shown import beside
 from .beams import GRAVITY, PeriodicWire, Profile
 from .schema import FlexibleCatenaryData
 
@@ -69,8 +70,9 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
     yielded = line.encumbrance - float(shape.messenger.height(np.zeros(1))[0])
     if yielded > MOST_YIELD:
         raise InputError(
-            f"At rest the messenger's supports of line '{line.name}' would yield by {yielded:.2g} m, more "
-            f"than {MOST_YIELD} m; give support.stiffness in N/m (500 N/mm are 500e3)."
+            f"At rest the messenger's supports of line '{line.name}' would yield by "
+            f"{beside(yielded, MOST_YIELD, '.2g')} m, more than {MOST_YIELD} m; give support.stiffness in "
+            "N/m (500 N/mm are 500e3)."
         )
     _check_droppers(line, shape)
     x = np.linspace(0.0, line.span_length, POINTS)
@@ -83,15 +85,17 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
         )
     if np.ptp(contact) > HEIGHT_RANGE:
         raise InputError(
-            f"At rest the contact wire of line '{line.name}' would differ by {np.ptp(contact):.2g} m in "
-            f"height along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+            f"At rest the contact wire of line '{line.name}' would differ by "
+            f"{beside(float(np.ptp(contact)), HEIGHT_RANGE, '.2g')} m in height along a span, more than "
+            f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
         )
     for name, height in (("contact", contact), ("messenger", messenger)):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
             raise InputError(
-                f"At rest the {name} wire of line '{line.name}' would have a slope of {slope:.2g}, more than "
-                f"{STEEPEST}, and the model is of nearly level wires; give it more tension, or shorter spans."
+                f"At rest the {name} wire of line '{line.name}' would have a slope of "
+                f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
+                "level wires; give it more tension, or shorter spans."
             )
     return shape
 
@@ -110,10 +114,11 @@ def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
     stretch = shape.dropper_tension / shape.dropper_stiffness
     for place, length, longer in zip(places, shape.dropper_length, stretch, strict=True):
         if 0 < MOST_STRETCH * (length + longer) < longer:
+            share = beside(100 * longer / (length + longer), 100 * MOST_STRETCH, ".2g")
             raise InputError(
-                f"At rest {place} would be stretched by {longer:.2g} m, more than a tenth of its "
-                f"{length + longer:.2g} m; give stiffer droppers: stiffness in N/m (100 N/mm are 100e3), "
-                "axial_stiffness in N."
+                f"At rest {place} would be stretched by {longer:.2g} m, {share} % of its length, more "
+                f"than {100 * MOST_STRETCH:g} %; give stiffer droppers: stiffness in N/m (100 N/mm are "
+                "100e3), axial_stiffness in N."
             )
         if length <= 0:
             raise InputError(
