@@ -159,7 +159,7 @@ PUBLISHED: dict[tuple[str, str], dict[str, Any]] = {
         "support.stiffness": 500e3,
         "support.damping": 1000.0,
         "steady_arm.mass": 0.5,
-        "steady_arm.stiffness": 267.0,
+        "steady_arm.stiffness": 2673.58,
         "damping.alpha": 0.0125,
         "damping.beta": 1e-4,
     },
