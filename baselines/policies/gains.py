@@ -100,7 +100,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
             return _at_speed(tuning, names, to_kmh(context.speed), path)
     raise InputError(
         f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
-        f"at {place}: make them with `panto tune`, or take a policy that needs none."
+        f"at {place}: make them with `panto tune`, give them ({', '.join(names[:4])}"
+        f"{', ...' if len(names) > 4 else ''}) as the parameter gains, or take a policy that needs none."
     )
 
 
