@@ -56,7 +56,8 @@ class EpisodeLog(BaseCallback):  # type: ignore[misc]
         for info in self.locals["infos"]:
             if "figures" in info:
                 for name in self._figure_names:
-                    self.logger.record_mean(f"episode/{name}", info["figures"][name])
+                    if name in info["figures"]:  # of an episode that ended early some may be missing
+                        self.logger.record_mean(f"episode/{name}", info["figures"][name])
         return True
 
 

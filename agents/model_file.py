@@ -172,7 +172,7 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
     weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))
-    for k, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+    for k, (weight, bias) in enumerate(zip(weights, biases, strict=True), start=1):
         if not all(each.dtype.kind == "f" and np.isfinite(each).all() for each in (weight, bias)):
             raise ValueError(f"layer {k} of its network holds values that are not finite numbers")
         if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:

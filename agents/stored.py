@@ -30,6 +30,7 @@ def head() -> TrainedPolicy:
 def high_speed() -> TrainedPolicy:
     """Agent for identified-2dof on shinkansen-simple, 250 to 400 km/h, for lines as built.
 
-    It was trained by PPO from rewards only, with a realistic actuator on the frame and realistic sensors.
+    It was trained by PPO from rewards only, with a realistic actuator on the frame and realistic sensors. Its
+    observation is normalised by passive runs at these speeds, which a slower line refuses.
     """
     return load(FOLDER / "high-speed.safetensors")

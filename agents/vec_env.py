@@ -67,7 +67,9 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
                 infos[lane] = {
                     "terminal_observation": last[lane],
                     "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
-                    "figures": {name: float(figures[name][lane]) for name in names},
+                    "figures": {
+                        name: float(figures[name][lane]) for name in names if figures[f"_{name}"][lane]
+                    },
                 }
         self.seconds += time.perf_counter() - start
         return observation, reward.astype(np.float32), done, infos

@@ -4,7 +4,7 @@ r"""A sweep over two parameters of a design: the collector head's mass and the c
 
 printed twelve designs, and at last "minimum sigma: 23.0 N, head 4 kg, tension 24 kN". The same as a command:
 
-    panto sweep pantograph.masses.0=4:10:4 catenary.contact_wire.tension=16e3:24e3:3 \
+    panto sweep pantograph.masses.1=4:10:4 catenary.contact_wire.tension=16e3:24e3:3 \
       --speed 275 --mean-force 130 --plot design.png
 """
 
@@ -16,7 +16,7 @@ from panto_env.analysis.plots import save
 from panto_env.analysis.sweep import Row, sweep
 from panto_env.analysis.sweep_plots import plot_sweep
 
-HEAD, TENSION = "pantograph.masses.0", "catenary.contact_wire.tension"
+HEAD, TENSION = "pantograph.masses.1", "catenary.contact_wire.tension"
 MASSES, TENSIONS = (4.0, 6.0, 8.0, 10.0), (16e3, 20e3, 24e3)  # kg, N
 SPEED_KMH = 275.0
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+
+from panto_env.base.shown import beside
 
 from .intervals import Array, Clusters, Interval, interquartile_mean, interval_of_mean
 from .settings import REFERENCE
@@ -146,6 +149,11 @@ def _relative(values: Sequence[float], to: Sequence[float]) -> Array:
     return changes
 
 
+def _beyond(change: float, most: float) -> str:
+    """A relative change that is larger in size than ``most``."""
+    return f"{beside(100 * change, math.copysign(100 * most, change), '+.1f')} %"
+
+
 def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) -> str:
     """Reason why a policy is not ranked; empty if it is.
 
@@ -158,11 +166,10 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) ->
         return "the passive pantograph's runs ended early: there is nothing to compare with"
     typical, most = interquartile_mean(means), means[np.argmax(np.abs(means))]
     if abs(typical) > MOVED:
-        return f"it moves the mean force by {100 * typical:+.1f} %, more than {100 * MOVED:g} %"
+        return f"it moves the mean force by {_beyond(typical, MOVED)}, more than {100 * MOVED:g} %"
     if abs(most) > MOVED_AT_MOST:
-        return (
-            f"it moves the mean force by {100 * most:+.1f} % in one pass, more than {100 * MOVED_AT_MOST:g} %"
-        )
+        moved = _beyond(most, MOVED_AT_MOST)
+        return f"it moves the mean force by {moved} in one pass, more than {100 * MOVED_AT_MOST:g} %"
     if any(np.isnan(row.pressed_std) for row in rows):
         return "no passive pantograph can reach its mean force"
     return ""

@@ -94,5 +94,5 @@ def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Setti
         data = entries["catenary"]
         positions = getattr(getattr(data, "droppers", None), "positions", ())
         ratio = line[SPAN_LENGTH] / data.alignment().mean_length
-        line |= {f"{DROPPERS}.{k}": ratio * place for k, place in enumerate(positions)}
+        line |= {f"{DROPPERS}.{k}": ratio * place for k, place in enumerate(positions, start=1)}
     return change_together(entries["catenary"], line), change_together(entries["pantograph"], pantograph)

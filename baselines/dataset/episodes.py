@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
+from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
 from ..benchmark.seeds import DATA
@@ -19,6 +21,8 @@ from .settings import ENVIRONMENT, EpisodesSettings, Plan
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
 """Entries of the environment's info that are recorded, in addition to the terms of the reward."""
+FIGURES = tuple(field.name for field in fields(Figures))
+"""Figures of an episode; one that it does not have is recorded as infinite."""
 NOISE_STREAM = 1
 """Second seed of the noise on actions, after the episode's: other numbers than those of its line."""
 
@@ -144,7 +148,7 @@ class Stage:
             terminations,
             truncations,
             {key: np.array([each[key] for each in infos], dtype=np.float64) for key in infos[0]},
-            info["figures"],
+            dict.fromkeys(FIGURES, np.inf) | info["figures"],
         )
 
     def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:

@@ -86,7 +86,7 @@ def write_minari(
 
 
 def _facts(settings: EpisodesSettings, plan: Plan, episode: Episode) -> dict[str, Any]:
-    """Metadata of an episode; figures that it does not have are infinite, as in infos."""
+    """Metadata of an episode; figures that it does not have are infinite."""
     place = settings.places[plan.place]
     facts = {
         "policy": plan.policy,

@@ -116,7 +116,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
     raise InputError(
         f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
         f"at {place}{', only for others of these names with other values' if named else ''}: make them with "
-        "`panto tune`, or take a policy that needs none."
+        f"`panto tune`, give them ({', '.join(names[:4])}{', ...' if len(names) > 4 else ''}) as the "
+        "parameter gains, or take a policy that needs none."
     )
 
 

@@ -16,7 +16,8 @@ class Skyhook(TunableLaw):
     the frame that opposes the frame's velocity only takes energy out; one that follows the head's may put
     some in, so that its gain may have either sign. It does not change the mean force.
 
-    It needs no knowledge of the line except its gains, and reads two velocities.
+    It has no model of the line and reads two velocities. Its gains are fitted to a line and a pantograph by
+    `panto tune`: where none are stored, give them, such as ``skyhook:gains=[100, 0]``.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {"frame": Gain(20.0), "head": Gain(20.0)}

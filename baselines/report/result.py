@@ -19,6 +19,7 @@ from pydantic import (
 
 from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
+from panto_env.base.explanation import dotted
 
 from ..benchmark.intervals import Share
 from ..benchmark.overall import with_feedback
@@ -181,7 +182,7 @@ def parse_result(table: Any, name: str) -> Result:
     try:
         return Result.model_validate(table)
     except ValidationError as error:
-        place = ".".join(map(str, error.errors()[0]["loc"]))
+        place = dotted(error.errors()[0]["loc"])
         where = f"'{place}' is missing or wrong" if place else "its parts do not fit together"
         raise InputError(
             f"{name} is no result of `panto benchmark --output RESULT.json`: {where}; run the benchmark anew."

@@ -1,4 +1,4 @@
-"""Parameters by dotted names, as in the TOML files, for example ``pantograph.masses.0``."""
+"""Parameters by dotted names, as in the TOML files, for example ``pantograph.masses.1``, the first mass."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def check_name(name: str, entry: Settings) -> None:
         return
     owner = getattr(entry, "name", None)
     # Only the first place of each list is shown: droppers alone would fill the line.
-    shown = [name for name in known if not name[-1].isdigit() or name.endswith(".0")]
+    shown = [name for name in known if not name[-1].isdigit() or name.endswith(".1")]
     raise InputError(
         f"Unknown parameter '{name}'{f' of {owner}' if owner else ''}: {hint(name, known)}"
         f"known are {', '.join(shown)}"
-        f"{' (lists count from 0)' if shown != known else ''}."
+        f"{' (lists count from 1)' if shown != known else ''}."
     )
 
 
@@ -60,7 +60,7 @@ def parameter_label(name: str, entry: Settings) -> str:
         else:
             break
     unit = text[text.rfind(" (") :] if text.endswith(")") else ""
-    places = [_ordinal(int(place) + 1) for place in path]
+    places = [_ordinal(int(place)) for place in path]
     return ": ".join((*words, ", ".join((text.removesuffix(unit), *places)))) + unit
 
 
@@ -108,7 +108,7 @@ def _checked(entry: S, table: Mapping[str, Any]) -> S:
 
 def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
     names = []
-    for k, value in enumerate(values):
+    for k, value in enumerate(values, start=1):
         if isinstance(value, tuple):
             names += _places(value, f"{prefix}.{k}")
         elif _is_number(value):
@@ -131,5 +131,6 @@ def _put(data: Any, path: list[str], value: float) -> Any:
     if isinstance(data, dict):
         return data | {key: _put(data[key], rest, value) if rest else value}
     items = list(data)
-    items[int(key)] = _put(items[int(key)], rest, value) if rest else value
+    place = int(key) - 1
+    items[place] = _put(items[place], rest, value) if rest else value
     return tuple(items)

@@ -39,7 +39,7 @@ DISCRETISATION = ("time_step", "spacing", "window")
 SEEN_BY_POLICIES = ("actuator", "sensors")
 """Families without effect on the passive pantograph."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
-"""Settings whose own values can be swept, for example ``pantograph.masses.0``."""
+"""Settings whose own values can be swept, for example ``pantograph.masses.1``."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def sweep(
 ) -> list[Row]:
     """Run every policy at every value of one parameter, or at every pair of values of two.
 
-    parameters: values by dotted name as in the TOML (``pantograph.masses.0``,
+    parameters: values by dotted name as in the TOML (``pantograph.masses.1``,
     ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
     of every policy. policies: names, model files, or None for the passive pantograph. spans: spans of the
     figures, first and last from 1, or "all"; by default those after the start. line_spans: ``spans`` of
@@ -197,7 +197,7 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     families = ", ".join(f"'{owner}.'" for owner in (*entries, POLICY))
     raise InputError(
         f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
-        "(e.g. pantograph.masses.0)."
+        "(e.g. pantograph.masses.1)."
     )
 
 

@@ -1,4 +1,4 @@
-"""The error for invalid input of any kind, and the warnings about accuracy and plug-ins."""
+"""The error for invalid input of any kind, and warnings about accuracy, unusual values and plug-ins."""
 
 from .shown import one_line
 
@@ -17,3 +17,7 @@ class AccuracyWarning(UserWarning):
 
 class PlugInWarning(UserWarning):
     """A plug-in of another package is left out: one sentence that says which one and why."""
+
+
+class UnusualWarning(UserWarning):
+    """A value is valid but far from any usual one, as a wrong unit or sign makes it: one sentence."""

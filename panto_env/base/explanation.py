@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -34,7 +34,7 @@ MOST = 8
 class Complaint(NamedTuple):
     """An error at one key."""
 
-    key: str  # dotted, "" for the table as a whole
+    key: str  # dotted, lists counted from 1; "" for the table as a whole
     words: str  # "must be ...", or a clause of its own
     given: str  # the given value, "" where it does not help
     clause: bool  # whether the words stand alone
@@ -80,9 +80,20 @@ def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint 
     return list(found.values())
 
 
+def comma_hint(ours: int, theirs: int) -> str:
+    """Advice where one of two lists that go together is twice as long as the other, else nothing."""
+    double = max(ours, theirs) == 2 * min(ours, theirs) > 0
+    return " (decimals need a point: a comma begins a new value)" if double else ""
+
+
+def dotted(place: Iterable[int | str]) -> str:
+    """Keys and places in lists as one name, such as "masses.1" for the first of the masses."""
+    return ".".join(str(part + 1 if isinstance(part, int) else part) for part in place)
+
+
 def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
     place, fields = _place(problem, kind)
-    key, given = ".".join(map(str, place)), shortly(problem["input"])
+    key, given = dotted(place), shortly(problem["input"])
     match problem["type"]:
         case "missing":
             field = fields.get(str(place[-1]))  # None where a list is too short

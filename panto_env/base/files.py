@@ -167,12 +167,13 @@ _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEEPEST}}}", re.ASCII)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The table of a TOML file. Raises InputError, naming the file, where it cannot be read."""
+    """The table of a TOML file in UTF-8. Raises InputError, naming the file, where it cannot be read."""
     check_regular(path)
+    text = ""
     try:
         if os.stat(path).st_size > LARGEST:
             raise ValueError(f"it has more than {LARGEST / 1e6:g} MB")
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")  # editors of Windows begin a file with U+FEFF
         if _DEEP_KEY.search(text):
             raise RecursionError
         table = tomllib.loads(text)
@@ -187,7 +188,15 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except RecursionError as error:
         raise InputError(f"{path} is not valid TOML: it is nested too deeply; correct the file.") from error
     except ValueError as error:  # TOML's own, and for whole numbers with thousands of digits
-        raise InputError(f"{path} is not valid TOML: {error}; correct the file.") from error
+        comma = _decimal_comma(text, str(error))
+        raise InputError(f"{path} is not valid TOML: {error}; {comma or 'correct the file'}.") from error
+
+
+def _decimal_comma(text: str, error: str) -> str:
+    """Advice where the line that an error names holds a number with a decimal comma, else nothing."""
+    line = re.search(r"at line (\d+)", error)
+    number = re.search(r"\d+,\d+", text.split("\n")[int(line[1]) - 1].partition("#")[0]) if line else None
+    return f"decimals need a point, not a comma, as in {number[0].replace(',', '.')}" if number else ""
 
 
 def check_nesting(table: Any, most_keys: float = math.inf) -> None:

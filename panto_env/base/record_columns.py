@@ -41,16 +41,20 @@ def read_columns(
 
     Units are given in the header, as in ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which has
     priority. Other columns are ignored, and so are lines that are empty or begin with #. The separator is a
-    comma, semicolon or tab. Raises InputError, naming line and column, for anything missing or not a number.
+    comma, semicolon or tab. Where it is no comma, and no number has a decimal point, commas are decimal.
+    Raises InputError, naming line and column, for anything missing or not a number.
     """
-    lines = _lines(path)
+    lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
     places = _places(path, header, columns, dict(units or {}))
+    used = {place for place, _ in places.values()}
+    points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
+    decimal = "." if separator == "," or points else ","
     values: dict[str, Array] = {name: np.empty(len(body)) for name in places}
     for row, (number, cells) in enumerate(body):
         for name, (place, scale) in places.items():
             text = cells[place].strip() if place < len(cells) else ""
-            values[name][row] = scale * _number(text, path, number, name)
+            values[name][row] = scale * _number(text, decimal, path, number, name)
     return values
 
 
@@ -78,8 +82,8 @@ def equal_step(time: Array, minimum: int, purpose: str) -> float:
     return step
 
 
-def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
-    """Numbered lines as cells, the header first."""
+def _lines(path: str | Path) -> tuple[list[tuple[int, list[str]]], str]:
+    """Numbered lines as cells, the header first; and the separator of cells."""
     check_regular(path)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -109,7 +113,7 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
             f"Line {kept[len(rows)][0]} of {path} has a quotation mark without its second one, or a cell "
             "without end; correct or remove such lines."
         ) from error
-    return rows
+    return rows, separator
 
 
 def _places(
@@ -152,15 +156,15 @@ def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> flo
     return column.units[unit]
 
 
-def _number(text: str, path: str | Path, line: int, name: str) -> float:
+def _number(text: str, decimal: str, path: str | Path, line: int, name: str) -> float:
     try:
-        value = float(text)
+        value = float(text.replace(decimal, "."))
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
         shown = f"holds '{text}'" if text else "is empty"
         raise InputError(
             f"Line {line} of {path}: column {name} {shown}, which is not a finite number; "
-            "correct or remove such lines (decimals need a point, not a comma)."
+            "correct or remove such lines (decimals need a point; or all a comma, with semicolons between)."
         )
     return value

@@ -16,6 +16,21 @@ _CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u2
 """Characters that control a terminal or change the direction of writing, except line ends."""
 
 
+def beside(value: float, limit: float, form: str) -> str:
+    """A value beside a limit that it is compared with, in a format such as "+.1f" or ".3g".
+
+    It has as many more digits as it takes to stand on its side of the limit: a value of 1.504 % is not shown
+    as 1.5 %, more than 1.5 %. limit: as it is shown.
+    """
+    sign, digits, kind = re.fullmatch(r"([+,]*)\.(\d+)([fg])", form).groups()  # type: ignore[union-attr]
+    for more in range(18):
+        text = format(value, f"{sign}.{int(digits) + more}{kind}")
+        rounded = float(text.replace(",", ""))
+        if (rounded > limit, rounded < limit) == (value > limit, value < limit):
+            return text
+    return str(value)
+
+
 def shown(value: Any) -> str:
     """A value as Python writes it, whole unless it is very long."""
     return _cut(_written(repr, value), LONGEST)

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.errors import InputError
+from ..base.errors import InputError, UnusualWarning
 from ..base.explanation import explain
 from ..base.files import read_toml
 from ..base.names import nearest, suggest
 from ..base.settings import Settings
 from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
+from ..plant.pantograph.build import check_at_rest
 from ..plant.pantograph.schema import PantographData
 from .family import PREFIX, LineFamily
+from .unusual import Ranges, ranges_of, remarks
+
+E = TypeVar("E", CatenaryData, PantographData)
 
 Lines = CatenaryData | tuple[CatenaryData, ...] | LineFamily
 """A line, lines to choose from, or a family to draw from."""
@@ -44,27 +49,35 @@ def available(family: str) -> tuple[str, ...]:
 def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
     """Line from a catalogue name, a TOML file, or an entry that is already loaded.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid. Warns of values
+    far from the catalogue's.
     """
     if isinstance(source, str) and source.startswith(PREFIX):
         raise InputError(f"One line is needed here, not the family '{source}' to draw from; name a line.")
-    return source if isinstance(source, CatenaryData) else _load("catenary", source)
+    return _checked(source if isinstance(source, CatenaryData) else _load("catenary", source), source)
 
 
 def load_pantograph(source: str | Path | PantographData) -> PantographData:
     """Pantograph from a catalogue name, a TOML file, or an entry that is already loaded.
 
-    Raises InputError, naming the file and the key, where it cannot be read or is not valid.
+    Raises InputError, naming the file and the key, where it cannot be read or is not valid. Warns of values
+    far from the catalogue's.
     """
-    return source if isinstance(source, PantographData) else _load("pantograph", source)
+    return _checked(source if isinstance(source, PantographData) else _load("pantograph", source), source)
 
 
 def load_family(source: str | Path | LineFamily) -> LineFamily:
     """Family of lines from a catalogue name, a TOML file, or a family that is already loaded.
 
     Raises InputError, naming the file and the key, where it cannot be read, is not valid, or has no lines.
+    Warns of values of an example line that are far from the catalogue's.
     """
-    return source if isinstance(source, LineFamily) else _load("family", source)
+    if isinstance(source, LineFamily):
+        return source
+    family: LineFamily = _load("family", source)
+    if source != family.name:
+        _checked(family.draw(np.random.default_rng(0))[0], source)
+    return family
 
 
 def load_lines(source: Any) -> Lines:
@@ -95,6 +108,26 @@ def text_of(name: str) -> str:
     raise InputError(
         f"No line, pantograph or family of the catalogue is called '{name}': {suggest(name, known)}."
     )
+
+
+def unusual(entry: CatenaryData | PantographData) -> list[str]:
+    """A sentence for each value that is as far from the catalogue's as a wrong unit or sign makes it."""
+    line = getattr(entry, "line", None)  # of a rig
+    return remarks(entry, _ranges(entry.kind)) + (unusual(line) if isinstance(line, CatenaryData) else [])
+
+
+@cache
+def _ranges(kind: str) -> Ranges:
+    entries = (_load(family, name) for family in ("catenary", "pantograph") for name in available(family))
+    return ranges_of(entry for entry in entries if entry.kind == kind)
+
+
+def _checked(entry: E, source: Any) -> E:
+    """The entry, with a warning for each unusual value; those of the catalogue itself are not looked at."""
+    if not (isinstance(source, str) and source == entry.name):
+        for sentence in unusual(entry):
+            warnings.warn(sentence, UnusualWarning, stacklevel=3)
+    return entry
 
 
 def _load(family: str, source: str | Path) -> Any:
@@ -131,17 +164,21 @@ def _read(family: str, path: Path, _modified: int) -> Any:
         table = {"name": path.stem, **_split(read_toml(path), "", sources), "sources": sources}
         schema = _schema(family, table)
         if "line" in schema.model_fields and isinstance(table.get("line"), str):
-            table["line"] = load_catenary(table["line"])  # a rig may name its computed line
+            table["line"] = _load("catenary", table["line"])  # a rig may name its computed line
         entry = schema.model_validate(table)
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
     except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
-    if isinstance(entry, CatenaryData | LineFamily):
-        try:
-            check_line(entry) if isinstance(entry, CatenaryData) else entry.draw(np.random.default_rng(0))
-        except InputError as error:
-            raise InputError(f"{path} is not a valid entry: {error}") from error
+    try:
+        if isinstance(entry, CatenaryData):
+            check_line(entry)
+        elif isinstance(entry, LineFamily):
+            entry.draw(np.random.default_rng(0))
+        elif isinstance(entry, PantographData):
+            check_at_rest(entry)
+    except InputError as error:
+        raise InputError(f"{path} is not a valid entry: {error}") from error
     return entry
 
 

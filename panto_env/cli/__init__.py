@@ -11,7 +11,7 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer import Abort
 
-from ..base.errors import AccuracyWarning, InputError, PlugInWarning
+from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning
 from ..base.plain_characters import show_always
 from ..base.shown import one_line
 from ..base.standard_streams import guarded_streams, say
@@ -85,7 +85,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
-    if issubclass(category, AccuracyWarning | PlugInWarning):
+    if issubclass(category, AccuracyWarning | PlugInWarning | UnusualWarning):
         say(f"warning: {message}")
     elif sys.stderr is not None:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

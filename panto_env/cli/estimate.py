@@ -213,8 +213,11 @@ def _plain(
         "deviation": found.deviation,
         "lift": motion.lift,
         "nis": tested.nis,
-        "nis_bounds": tested.nis_bounds,
         "largest_autocorrelation": tested.whiteness.largest,
+        "tests": [
+            {"name": test.name, "value": test.value, "low": test.low, "high": test.high, "kept": test.kept}
+            for test in found.verdict.tests
+        ],
         "believe": found.verdict.believe,
         "reasons": found.verdict.reasons,
         "settings": settings.model_dump(),
@@ -227,22 +230,19 @@ def _print(
 ) -> None:
     from ..metrics.labels import LABELS
 
-    tested, (low, high) = found.consistency, found.consistency.nis_bounds
-    rows: list[tuple[str, str]] = [
-        (LABELS[key].heading, number(value)) for key, value in _figures(found).items()
+    rows: list[tuple[str, str, str]] = [
+        (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()
     ]
     rows += [
-        ("lift, which determines the mean (N)", number(motion.lift)),
-        ("rms error by the model, all frequencies (N)", number(found.deviation)),
-        (f"innovations, squared (1; a true model's {low:.3f} to {high:.3f})", f"{tested.nis:.3f}"),
-        (
-            f"their autocorrelation (0; a true model's to {tested.whiteness.bound:.3f})",
-            f"{tested.whiteness.largest:+.3f}",
-        ),
-        ("reliable", "yes" if found.verdict.believe else Alarm("no")),
+        ("lift, which determines the mean (N)", number(motion.lift), ""),
+        ("rms error by the model, all frequencies (N)", number(found.deviation), ""),
     ]
+    rows += [
+        (test.name, test.text if test.kept else Alarm(test.text), test.bounds) for test in found.verdict.tests
+    ]
+    rows.append(("reliable", "yes" if found.verdict.believe else Alarm("no"), "all within these bounds"))
     model = f"{settings.observation}, {settings.force_model.kind}"
-    print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", ""), rows))
+    print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", "", "judged by"), rows))
     for reason in found.verdict.reasons:
         alert("Warning:", f"{reason}.")
     if scores:

@@ -35,7 +35,7 @@ def sweep(
         list[str],
         typer.Argument(
             metavar="NAME=VALUES...",
-            help="One or two parameters by dotted name, e.g. pantograph.masses.0, "
+            help="One or two parameters by dotted name, e.g. pantograph.masses.1, "
             "catenary.contact_wire.tension, actuator.lag, policy.gain or speed_kmh; values as "
             "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),

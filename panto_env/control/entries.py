@@ -22,8 +22,9 @@ from .state import NOW, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
 """Kinds of observation: what a train can measure; in addition values that it cannot, without noise and
-delay; measured values and the nominal force, each with a mean near 0 and a spread near 1 in a passive run;
-measured values with the contact force that a filter estimates instead of a measured one."""
+delay; measured values and the nominal force, from fixed centres and in fixed scales, by which each has a mean
+near 0 and a spread near 1 in a passive run of Pantograph-v0's own line and pantograph; measured values with
+the contact force that a filter estimates instead of a measured one."""
 CENTRES = {
     "head displacement": (0.056, 0.012),
     "frame displacement": (0.084, 0.013),

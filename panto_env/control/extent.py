@@ -6,6 +6,7 @@ import math
 from functools import partial
 
 from ..base.errors import InputError
+from ..base.shown import beside
 from ..metrics.spans import CLEAR
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.drift import largest_drift
@@ -34,7 +35,8 @@ def spans(settings: RunSettings) -> int | None:
     if needed > MOST_SPANS:
         longest = line.alignment().support(MOST_SPANS - CLEAR)
         raise InputError(
-            f"distance must be at most {longest:,g} m on line '{line.name}', not {settings.distance:,g} m."
+            f"distance must be at most {longest:,g} m on line '{line.name}', not "
+            f"{beside(settings.distance, longest, ',.6g')} m."
         )
     return max(line.spans, needed)
 

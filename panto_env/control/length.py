@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import beside
 from ..base.units import from_kmh
 from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
@@ -28,7 +29,7 @@ class EpisodeLength:
         if self.distance > plant.model.length:
             raise InputError(
                 f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
-                f"not {self.distance:g} m; set more spans."
+                f"not {beside(self.distance, plant.model.length, '.6g')} m; set more spans."
             )
         self.control_interval = settings.control_interval
         self.control_steps = whole_steps(settings.control_interval, plant.time_step)

@@ -26,6 +26,11 @@ LOW_PASSED = len(Reading)
 """Row of the contact force behind EN 50317's filter, after those of ``Reading``."""
 SPREADS = LOW_PASSED + 1
 """Number of rows of means, after which those of spreads begin."""
+ADVICE = (
+    "a line and a pantograph for this speed, or a policy, a reward or a range 'normalise' for the speeds of "
+    "this line"
+)
+"""What to do where a line is not for the speeds of the runs."""
 NO_MATTER = {*NOT_OF_A_RUN, "estimator", "known_pantograph", "actuator", "sensors", "washout"}
 """Settings on which a passive run does not depend."""
 
@@ -75,7 +80,9 @@ def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[fl
 def _measured(run: Trajectory) -> list[list[float]]:
     if run.terminated:
         raise InputError(
-            f"The passive run that normalises observation or reward has no figures: {run.ending}"
+            f"Observation or reward are normalised by passive runs of '{run.pantograph}' on "
+            f"'{run.catenary}', and the one at {run.speed_kmh:.4g} km/h has no figures; take {ADVICE}. "
+            f"{run.ending}"
         )
     inside = run.inside()
     filtered = low_pass(run.contact_force, run.time_step)

@@ -25,7 +25,7 @@ from .length import EpisodeLength
 from .mean_force import PassiveMean, Trim, TrimAsDesigned, target_mean
 from .normalise import normalised
 from .observation import layout
-from .passive_run import PassiveRun
+from .passive_run import ADVICE, PassiveRun
 from .record import diverged, divergence, ending, trajectory
 from .reset import reset
 from .running_figures import figures_so_far, running_figures
@@ -68,7 +68,7 @@ class Task(TaskState):
         self.known_pantograph = settings.known_pantograph or settings.pantograph
         if settings.normalise is not None:
             known = settings.model_copy(update={"pantograph": self.known_pantograph})
-            speeds = length.check_speeds(settings.normalise)
+            speeds = self._speeds_of_passive_runs(settings.normalise)
             run = PassiveRun(known, speeds, passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
         self.passive = None
@@ -90,6 +90,17 @@ class Task(TaskState):
             entries=len(self.layout.entries),
             threads=threads,
         )
+
+    def _speeds_of_passive_runs(self, normalise: tuple[float, float]) -> tuple[float, float]:
+        """Lowest and highest speed (m/s); InputError, which says what they are for, if not valid here."""
+        try:
+            return self.length.check_speeds(normalise)
+        except InputError as error:
+            low, high = (f"{speed:g}" for speed in normalise)
+            raise InputError(
+                f"The observation is normalised by passive runs at {low} to {high} km/h; take {ADVICE}. "
+                f"{error}"
+            ) from error
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
         """Cost of the longest episode.

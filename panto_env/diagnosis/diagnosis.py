@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.shown import beside
 from ..catalog import load_pantograph
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
@@ -160,7 +161,7 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
     level = float(np.median(healthy.levels))
     if count >= MANY and level > ALIKE:  # of fewer, the mean itself is off by as much
         notes.append(
-            f"Healthy passes differ by {level:.1f} N rms, more than the {ALIKE:g} N of passes over one line: "
-            "if they are over other lines of its design, much less is found."
+            f"Healthy passes differ by {beside(level, ALIKE, '.1f')} N rms, more than the {ALIKE:g} N of "
+            "passes over one line: if they are over other lines of its design, much less is found."
         )
     return notes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from ..base.units import to_kmh
 from ..control import Task
 from ..control.episode import Flags
 from ..control.state import Result
-from ..metrics.figures import Figures
 from .lanes import Answer, ended_figures
 
 # Rows of results as plain integers: members of an enum would take longer.
@@ -23,14 +21,14 @@ CONTACT_FORCE, HEAD, WIRE = int(Result.CONTACT_FORCE), int(Result.HEAD_HEIGHT), 
 FRAME_FORCE, HEAD_FORCE = int(Result.FRAME_FORCE), int(Result.HEAD_FORCE)
 POSITION, COST = int(Result.POSITION), int(Result.COST)
 
-FIGURES_TO_COME = {field.name: math.inf for field in fields(Figures)}
-"""Figures of an episode that has not ended. Recorders require the same keys in every info; nan would make two
-infos unequal, which Gymnasium's checkers refuse, as some learners do."""
-
 
 def final_figures(task: Task) -> dict[str, float]:
-    """Figures of the ended episode of a task's only lane, for infos."""
-    return {name: float(value[0]) for name, value in ended_figures(task, np.zeros(1, dtype=np.int64)).items()}
+    """Figures of the ended episode of a task's only lane, for infos, without those that it does not have.
+
+    Neither nan nor infinity stands for these: strict JSON refuses both, and nan makes two infos unequal.
+    """
+    figures = {name: float(value[0]) for name, value in ended_figures(task, np.zeros(1, dtype=int)).items()}
+    return {name: value for name, value in figures.items() if math.isfinite(value)}
 
 
 def lane_infos(answer: Answer) -> dict[str, Any]:
@@ -78,10 +76,16 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
 
 
 def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
-    """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended."""
+    """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended.
+
+    A figure that a lane does not have is 0 there, and not marked under "_name"; one that none has is left
+    out.
+    """
     values: dict[str, Any] = {}
     for name, value in figures.items():
-        values[name], values[f"_{name}"] = value, lanes.copy()
+        marked = lanes & np.isfinite(value)
+        if marked.any():
+            values[name], values[f"_{name}"] = np.where(marked, value, 0.0), marked
     return {"figures": values, "_figures": lanes.copy()}
 
 
@@ -93,4 +97,4 @@ def first_info(task: Task) -> dict[str, Any]:
         return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
 
     answer = Answer(task.results, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
-    return of_lane(lane_infos(answer)) | {"figures": FIGURES_TO_COME.copy()}
+    return of_lane(lane_infos(answer))

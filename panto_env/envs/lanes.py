@@ -126,7 +126,7 @@ class VectorLanes:
     def figures(self, lanes: Flags) -> dict[str, Array]:
         """Figures of the episodes of lanes, by name, (lanes,), zero for the others.
 
-        Infinite, with an AccuracyWarning, where a computation diverged.
+        Not finite, with an AccuracyWarning, where a computation diverged.
         """
         values: dict[str, Array] = {}
         for task, its in self._tasks():
@@ -154,10 +154,10 @@ class VectorLanes:
 def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:
     """Figures of lanes, (n,), whose episodes have ended, by name, for infos.
 
-    Infinite where a run has none, for example uplift without supports; all figures where its computation
+    Not finite where a run has none, for example uplift without supports; all figures where its computation
     diverged, with an AccuracyWarning.
     """
     figures, without = task.figures_of(lanes)
     for lane in lanes[without].tolist():
         warnings.warn(task.divergence(lane), AccuracyWarning, stacklevel=2)
-    return {name: np.where(without | np.isnan(value), np.inf, value) for name, value in figures.items()}
+    return {name: np.where(without, np.nan, value) for name, value in figures.items()}

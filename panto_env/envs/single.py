@@ -19,7 +19,7 @@ from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
 from .description import described
 from .episodes import Episodes, with_longest_episode
-from .infos import CONTACT_FORCE, FIGURES_TO_COME, final_figures, first_info
+from .infos import CONTACT_FORCE, final_figures, first_info
 from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
 from .reset_arguments import checked_options, checked_seed
 from .settings import EnvironmentSettings, render_metadata
@@ -58,8 +58,10 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
 
     ## Observation Space
     `Box(-10, 10, (n,), float32)`; each entry is a physical value minus its centre, divided by its scale. In
-    `Pantograph-v0`, with `observation="centred"`, entries have a mean near 0 and a spread near 1 in a passive
-    run:
+    `Pantograph-v0`, with `observation="centred"`, these are fixed, so that entries have a mean near 0 and a
+    spread near 1 in a passive run of its own line and pantograph. With others they may have not: heights
+    under `identified-2dof` are 3 to 5 scales low. `observation="measured", normalise=[200, 350]` takes
+    centres and scales from passive runs of the given line and pantograph at these speeds (km/h):
 
     {centred}
 
@@ -95,11 +97,11 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
     actuators (N), position (m), speed (km/h), the reward's terms, and the cost of safe learning: the share of
     the step without contact, with an uplift beyond its limit at a support, and with a low-passed contact
-    force beyond the line's maximum, in sum, with the weights of `cost`. `info["figures"]` holds the figures
-    of an episode when it ends, over the part that counts for the reward: after `run_in` and `settle`, to the
-    end. `trajectory.summary()` has those of whole spans after the start has died out, which the benchmark
-    compares. Until the end they are infinite; a figure that the run does not have, such as uplift where no
-    support is passed, stays infinite. A `TimeLimit` ends episodes without the environment's knowledge:
+    force beyond the line's maximum, in sum, with the weights of `cost`. The last info of an episode has one
+    key more, as Gymnasium's "episode" is: `info["figures"]`, its figures over the part that counts for the
+    reward, after `run_in` and `settle`, to the end. `trajectory.summary()` has those of whole spans after the
+    start has died out, which the benchmark compares. A figure that the run does not have, such as uplift
+    where no support is passed, is left out. A `TimeLimit` ends episodes without the environment's knowledge:
     `trajectory.summary("all")` has the figures of all of it then, too.
 
     ## Arguments
@@ -232,7 +234,6 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
                 "mean_force": mean_force,
                 "low_passed": low_passed,
             },
-            "figures": FIGURES_TO_COME.copy(),
         }
         if terminated or truncated:
             self._running = False

@@ -57,7 +57,8 @@ class PantographVectorEnv(
 
     `infos` has the content of the single environment's info in the form of Gymnasium's vector environments:
     arrays with a value per lane, and under "_key" the lanes that have one. Lanes whose episodes end have
-    "figures"; with "SameStep" these and all other final values are in "final_info", next to "final_obs".
+    "figures", each with its own mask, since a run may lack one; with "SameStep" these and all other final
+    values are in "final_info", next to "final_obs".
 
     For Stable-Baselines3, wrap it in `panto_agents.vec_env.PantographVecEnv`.
     """

@@ -24,7 +24,7 @@ from .motion import Motion
 from .plausibility import check_motion
 from .settings import PAPER2, EstimatorSettings
 
-HEAD_MASS = "masses.0"
+HEAD_MASS = "masses.1"
 LIFT = "lift"
 PRIOR = 0.1
 """How far a parameter may be from its known value, rms, relative. Own choice."""
@@ -52,9 +52,11 @@ class Parameters:
 
 
 def parameter_names(pantograph: PantographData) -> tuple[str, ...]:
-    """All of the chain, as "masses.0" for the head's mass, without those that are 0."""
+    """All of the chain, as "masses.1" for the head's mass, without those that are 0."""
     keys = ("masses", "stiffnesses", "dampings")
-    return tuple(f"{key}.{k}" for key in keys for k, value in enumerate(getattr(pantograph, key)) if value)
+    return tuple(
+        f"{key}.{k}" for key in keys for k, value in enumerate(getattr(pantograph, key), start=1) if value
+    )
 
 
 def frame_parameters(pantograph: PantographData) -> tuple[str, ...]:
@@ -151,7 +153,7 @@ def changed(pantograph: PantographData, values: dict[str, float]) -> PantographD
     for name, value in values.items():
         key, _, place = name.partition(".")
         chain = list(update.get(key, getattr(pantograph, key)))
-        chain[int(place)] = float(value)
+        chain[int(place) - 1] = float(value)
         update[key] = tuple(chain)
     return pantograph.model_copy(update=update)
 
@@ -208,5 +210,5 @@ def _check(names: Sequence[str], pantograph: PantographData) -> None:
 
 def _get(pantograph: PantographData, name: str) -> float:
     key, _, place = name.partition(".")
-    value: float = getattr(pantograph, key)[int(place)]
+    value: float = getattr(pantograph, key)[int(place) - 1]
     return value

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.shown import beside
 from ..plant.pantograph.schema import PantographData
 from .motion import Motion
 
@@ -93,11 +94,13 @@ def _check_time(motion: Motion) -> None:
     if samples > MOST_SAMPLES:
         raise InputError(f"The record has {samples:,} samples; give a part of {MOST_SAMPLES:,} at most.")
     if duration < SHORTEST:
-        raise InputError(f"The record is {duration:.3g} s long; give {SHORTEST:g} s at least.")
+        raise InputError(
+            f"The record is {beside(duration, SHORTEST, '.3g')} s long; give {SHORTEST:g} s at least."
+        )
     if motion.speed and motion.span and duration * motion.speed < motion.span:
         raise InputError(
-            f"The record covers {duration * motion.speed:.3g} m, less than a span of {motion.span:g} "
-            "m; give a longer one."
+            f"The record covers {beside(duration * motion.speed, motion.span, '.3g')} m, less than a span of "
+            f"{motion.span:g} m; give a longer one."
         )
 
 

@@ -9,7 +9,7 @@ from ..base.colours import BLUE, LIMIT, ORANGE
 from ..base.legend import legend_above
 from ..metrics.low_pass import zero_phase_low_pass
 from .estimate import Estimate
-from .verdict import WINDOW_NIS
+from .verdict import window_bound
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,8 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     tested = estimate.consistency
     innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3, label="found")
     innovations.axhline(1.0, color="0.4", linestyle=":", label="expected")
-    innovations.axhline(WINDOW_NIS, color=LIMIT, linestyle="--", linewidth=0.9, label="doubted above")
+    bound = window_bound(tested.nis)
+    innovations.axhline(bound, color=LIMIT, linestyle="--", linewidth=0.9, label="doubted above")
     rest = f"; the record ends at {estimate.time[-1]:.4g} s" if end < estimate.time[-1] else ""
     innovations.set(xlabel=f"time (s){rest}", ylabel="squared\ninnovations (-)")
     legend_above(innovations)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from ..base.shown import beside
 from ..base.table import Alarm, Table
 
 
@@ -62,9 +63,9 @@ def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
     rows = [
         (
             criterion.heading,
-            _digits(criterion.value),
+            value_in_words(criterion),
             limits_in_words(criterion),
-            _digits(criterion.margin),
+            margin_in_words(criterion),
             verdicts[criterion.kept],
             criterion.source,
         )
@@ -81,18 +82,46 @@ def remarks(criteria: Sequence[Criterion]) -> list[str]:
     return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in without)]
 
 
+def value_in_words(criterion: Criterion) -> str:
+    """The value as text, on the same side of the limits as text: a broken criterion never looks kept."""
+    return _digits(criterion.value, _more(criterion))
+
+
 def limits_in_words(criterion: Criterion) -> str:
     """The limits as text, e.g. "at most 0.2"; "" without limits."""
+    more = _more(criterion)
     below, above = ("below", "above") if criterion.strict else ("at most", "at least")
     if criterion.lowest is None:
-        return "" if criterion.highest is None else f"{below} {_digits(criterion.highest)}"
+        return "" if criterion.highest is None else f"{below} {_digits(criterion.highest, more)}"
     if criterion.highest is None:
-        return f"{above} {_digits(criterion.lowest)}"
-    return f"{_digits(criterion.lowest)} to {_digits(criterion.highest)}"
+        return f"{above} {_digits(criterion.lowest, more)}"
+    return f"{_digits(criterion.lowest, more)} to {_digits(criterion.highest, more)}"
 
 
-def _digits(value: float) -> str:
-    """A value with one decimal from 10 on, with three below; 0 is exact."""
+def margin_in_words(criterion: Criterion) -> str:
+    """The margin as text, never 0 unless it is."""
+    form = ".1f" if abs(criterion.margin) >= 10 else ".3f"
+    return beside(criterion.margin, 0.0, form) if math.isfinite(criterion.margin) else "–"
+
+
+def _more(criterion: Criterion) -> int:
+    """How many more digits than usual it takes until value and limits as text say whether they are kept."""
+
+    def rounded(number: float | None, more: int) -> float | None:
+        return number if number is None or not math.isfinite(number) else float(_digits(number, more))
+
+    for more in range(16):
+        value = rounded(criterion.value, more) or 0.0
+        lowest, highest = rounded(criterion.lowest, more), rounded(criterion.highest, more)
+        if replace(criterion, value=value, lowest=lowest, highest=highest).kept == criterion.kept:
+            return more
+    return 0
+
+
+def _digits(value: float, more: int = 0) -> str:
+    """A value with one decimal from 10 on, with three below, or more; 0 is exact, a dash not finite."""
+    if not math.isfinite(value):
+        return "–"
     if value == 0:
         return "0"
-    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.3f}"
+    return f"{value:.{1 + more}f}" if abs(value) >= 10 else f"{value:.{3 + more}f}"

@@ -139,9 +139,10 @@ class Trajectory:
         InputError as ``summary`` does.
         """
         tension, _ = evaluated(self, spans)
+        inside = self.inside(spans)
         return compliance(
             self.summary(spans),
-            arcing(self.contact_force[self.inside(spans)], self.time_step),
+            arcing(self.contact_force[inside], self.time_step),
             self.line,
             float(self.speeds[inside].mean()) if self.drifts else self.speed,
             self.alignment.mean_length,

@@ -10,13 +10,14 @@ import numpy as np
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
+from ..base.shown import beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
 from .drift import DRIFT_ROWS, ahead, gain
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
-from .pantograph.build import pantographs, rest_state
+from .pantograph.build import check_compression, pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples
@@ -137,7 +138,8 @@ class Plant:
         lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of the
         wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition gives
         them. pantographs: the lanes' own, where they are varied. static_forces: instead of the pantograph's,
-        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed.
+        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed,
+        and for springs of a pantograph that give way.
         """
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
@@ -162,6 +164,7 @@ class Plant:
         now = strides + gain(run.drift[lanes], 0.0)
         lifts = nominal_forces + run.aerodynamic[0] * (now**2 - strides**2)
         state = rest_state(pantographs or self.pantograph, lifts, heights, compliance)
+        check_compression(self.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         if not self.model.massless:
             for lane, line, force in zip(lanes.tolist(), drawn, forces.tolist(), strict=True):
@@ -215,8 +218,9 @@ class Plant:
         drifted = self.ahead(np.arange(self.lanes), end[:, None])[:, 0]
         position = end * self.row(Row.STRIDE) + drifted
         if not self.model.massless and position.max() > self.model.length + 1e-6:
+            farthest = beside(position.max(), self.model.length, ".1f")
             raise InputError(
-                f"Lane {position.argmax()} would run to {position.max():.1f} m, beyond the line's end at "
+                f"Lane {position.argmax()} would run to {farthest} m, beyond the line's end at "
                 f"{self.model.length:g} m; take fewer steps, or more spans."
             )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..catalog import unusual
 from ..metrics.criterion import Criterion
 from ..metrics.droppers import MovingDropper, moving_droppers
 from ..metrics.figures import Figures, losses_of_contact
@@ -76,6 +77,11 @@ class Findings:
     def pantograph(self) -> PantographData:
         """Data of the pantograph. Raises InputError where the file does not hold them."""
         return PantographData.model_validate(self._design("pantograph"))
+
+    @cached_property
+    def remarks(self) -> list[str]:
+        """Sentences about values far from the catalogue's, as a wrong unit makes them."""
+        return unusual(self.line) + unusual(self.pantograph)
 
     def _design(self, part: str) -> dict[str, Any]:
         if part not in self.run.design:

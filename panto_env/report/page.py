@@ -11,7 +11,7 @@ from ..base.errors import InputError
 from ..base.files import PAGES, check_output, write_whole
 from ..base.version import __version__
 from ..catalog.values import values_of
-from ..metrics.criterion import limits_in_words
+from ..metrics.criterion import limits_in_words, margin_in_words, value_in_words
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory
@@ -31,7 +31,8 @@ def page(found: Sequence[Findings]) -> str:
     """
     if not 1 <= len(found) <= MOST:
         raise InputError(f"A report shows 1 to {MOST} runs, not {len(found)}.")
-    template = page_template("panto_env.report", number=number, digits=digits, limits=limits_in_words)
+    words = {"value": value_in_words, "limits": limits_in_words, "margin": margin_in_words}
+    template = page_template("panto_env.report", number=number, digits=digits, **words)
     names = charts.names_of(found)
     judged = {one: name for one, name in names.items() if one.figures is not None}
     lines = _different(found, "line")

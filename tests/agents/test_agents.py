@@ -304,7 +304,7 @@ class TestSettings:
             ({"hyperparameters": {"batch_size": 100}}, "must be a multiple of batch_size = 100"),
             ({"hyperparameters": 3}, "[hyperparameters] must be"),
             ({"evaluation": {"interval": 5}}, "unknown key 'interval' in [evaluation]"),
-            ({"evaluation": {"interval_steps": 5, "speeds_kmh": [-250.0]}}, "key 'evaluation.speeds_kmh.0'"),
+            ({"evaluation": {"interval_steps": 5, "speeds_kmh": [-250.0]}}, "key 'evaluation.speeds_kmh.1'"),
             ({"environment": LINE | {"id": "Pantograph-v0", "speed_kmh": 2000}}, "wave speed"),
             ({"environment": {"id": "Pantograf-v0"}}, "did you mean 'Pantograph-v0'?"),
             ({"environment": {}}, "unknown id None"),

@@ -11,7 +11,8 @@ from safetensors.numpy import load_file
 from panto_agents.model_file import read_model
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER
-from panto_env import simulate
+from panto_env import InputError, simulate
+from panto_env.catalog import load_catenary
 from panto_env.policies import find_policy, policy_names
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.safetensors"))
@@ -72,3 +73,24 @@ def test_they_need_no_torch():
 def test_their_docstrings_are_what_the_list_shows():
     for name in NAMES:
         assert find_policy(f"agent-{name}").facts.needs.observation == "measured"
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        (
+            "sweden-st15",
+            r"runs of 'dsa250' on 'sweden-st15', and the one at 37\d.\d km/h has no figures",
+        ),
+        ("slow", r"normalised by passive runs at 250 to 400 km/h; take .* below the wave speed"),
+    ],
+)
+def test_a_line_too_slow_for_an_agent_is_refused_with_the_reason(line, sentence):
+    """The train runs at 160 km/h: it must be said what another speed has to do with it."""
+    given = load_catenary("sweden-st15")
+    if line == "slow":
+        wire = given.contact_wire.model_copy(update={"tension": 12e3})
+        given = given.model_copy(update={"contact_wire": wire})
+    with pytest.raises(InputError, match=sentence) as caught:
+        simulate(given, "dsa250", 160.0, "agent-high-speed", actuator="realistic", sensors="realistic")
+    assert "or a range 'normalise' for the speeds of this line" in str(caught.value)

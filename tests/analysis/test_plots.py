@@ -85,7 +85,7 @@ def test_all_of_a_run_can_be_drawn_and_one_that_ended_early():
 
 
 def test_forces_of_several_runs_say_which_ended_early(run):
-    heavy = load_pantograph("three-mass").model_copy(update={"static_force": 5000.0})
+    heavy = load_pantograph("three-mass").model_copy(update={"static_force": 1500.0})
     ended = simulate("periodic-stiffness", heavy, 300.0)
     first, second = plot_forces((run, ended), ("p", "heavy"), (10, 11), "both").axes
     assert first.get_title("left") == "p"

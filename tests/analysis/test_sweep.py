@@ -28,8 +28,8 @@ def expected(run, spans):
 @pytest.mark.parametrize(
     ("parameter", "value"),
     [
-        ("pantograph.masses.0", 9.5),
-        ("pantograph.stiffnesses.1", 4000.0),
+        ("pantograph.masses.1", 9.5),
+        ("pantograph.stiffnesses.2", 4000.0),
         ("pantograph.static_force", 90.0),
         ("catenary.mean_stiffness", 5500.0),
         ("catenary.span_length", 55.0),
@@ -42,7 +42,7 @@ def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path)
     entry = (load_catenary if family == "catenary" else load_pantograph)(name).model_dump(exclude={"sources"})
     if place:
         changed = list(entry[key])
-        changed[int(place[0])] = value
+        changed[int(place[0]) - 1] = value
         entry[key] = changed
     else:
         entry[key] = value
@@ -86,7 +86,7 @@ def test_speed_actuator_and_policy_parameters_take_effect():
 
 def test_outcome_does_not_depend_on_threads_and_progress_counts_every_pass():
     told = []
-    values = {"pantograph.masses.0": [5.0, 7.5, 10.0]}
+    values = {"pantograph.masses.1": [5.0, 7.5, 10.0]}
     short = {"policies": [None, "p"], "distance": 180, "spans": "all"}
     one = sweep(values, **short, workers=1)
     three = sweep(values, **short, workers=3, progress=lambda *done: told.append(done))
@@ -120,19 +120,19 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
     [
         ({}, {}, "One or two parameters"),
         ({"a.b": [1], "c.d": [1], "e.f": [1]}, {}, "One or two parameters"),
-        ({"pantograph.mases.0": [1]}, {}, r"did you mean 'pantograph.masses.0'\?"),
+        ({"pantograph.mases.1": [1]}, {}, r"did you mean 'pantograph.masses.1'\?"),
         ({"pantograph.masses": [1]}, {}, "Unknown parameter 'pantograph.masses' of en50318-2002"),
-        ({"pantograph.masses.2": [1]}, {}, "Unknown parameter 'pantograph.masses.2'"),
+        ({"pantograph.masses.3": [1]}, {}, "Unknown parameter 'pantograph.masses.3'"),
         ({"catenary.mean_stiffness": [1]}, {}, "Unknown parameter 'catenary.mean_stiffness'"),
         ({"speed": [300]}, {}, r"did you mean 'speed_kmh'\?"),
         ({"policy": [300]}, {}, "Unknown parameter 'policy'"),
         (
-            {"pantograph.masses.0": [7.0, -7.0]},
+            {"pantograph.masses.1": [7.0, -7.0]},
             {},
-            r"pantograph.masses.0 cannot be -7: must be a number from 0.1 to 200 kg",
+            r"pantograph.masses.1 cannot be -7: must be a number from 0.1 to 200 kg",
         ),
-        ({"pantograph.masses.0": [float("nan")]}, {}, "cannot be nan"),
-        ({"pantograph.masses.0": []}, {}, "no values of pantograph.masses.0"),
+        ({"pantograph.masses.1": [float("nan")]}, {}, "cannot be nan"),
+        ({"pantograph.masses.1": []}, {}, "no values of pantograph.masses.1"),
         ({"catenary.spans": [12.5]}, {}, "catenary.spans cannot be 12.5"),
         ({"catenary.span_length": [20.0]}, {}, "catenary.span_length cannot be 20: dropper at"),
         ({"catenary.contact_wire.tension": [-1.0]}, {}, "catenary.contact_wire.tension cannot be -1"),
@@ -155,7 +155,7 @@ def test_bad_input_is_refused_in_one_sentence(values, settings, message):
 def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
     monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
     with pytest.raises(InputError, match="cannot be -1"):
-        sweep({"pantograph.masses.0": [7.0, 8.0, -1.0]})
+        sweep({"pantograph.masses.1": [7.0, 8.0, -1.0]})
 
 
 def test_run_that_ends_early_has_no_figures():
@@ -201,12 +201,12 @@ def test_command_writes_the_rows_it_prints(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["pantograph.masses.0"], "must read NAME=VALUES"),
+        (["pantograph.masses.1"], "must read NAME=VALUES"),
         (["speed_kmh=1:2"], "start:stop:count"),
         (["speed_kmh=200", "speed_kmh=250"], "given twice"),
         (["speed_kmh=200", "--speed", "250"], "swept already"),
-        (["pantograph.mases.0=5"], "did you mean 'pantograph.masses.0'"),
-        (["pantograph.masses.0=5,-5"], "pantograph.masses.0 cannot be -5"),
+        (["pantograph.mases.1=5"], "did you mean 'pantograph.masses.1'"),
+        (["pantograph.masses.1=5,-5"], "pantograph.masses.1 cannot be -5"),
         (["speed_kmh=250", "--plot", "s.doc"], "must end in one of"),
         (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .xlsx, .parquet"),
     ],
@@ -264,9 +264,9 @@ def test_plot_shows_what_varies():
 
 def test_a_plot_names_parameters_in_words_with_their_units():
     wanted = {
-        "pantograph.masses.0": "pantograph: masses, head first, 1st (kg)",
+        "pantograph.masses.1": "pantograph: masses, head first, 1st (kg)",
         "catenary.contact_wire.tension": "catenary: contact wire: tension (N)",
-        "catenary.droppers.sag.10": "catenary: droppers: how far the contact wire hangs below its height at "
+        "catenary.droppers.sag.11": "catenary: droppers: how far the contact wire hangs below its height at "
         "the support, 11th (m)",
         "speed_kmh": "speed of the train (km/h)",
         "policy.gain": "policy: gain",
@@ -287,7 +287,7 @@ def test_what_is_bright_on_a_map_is_bad():
 
 
 def test_the_table_s_title_says_what_all_rows_share(capsys):
-    rows = sweep({"pantograph.masses.0": [6.0]}, catenary="periodic-stiffness", pantograph="three-mass")
-    print_sweep(rows, ["pantograph.masses.0"])
+    rows = sweep({"pantograph.masses.1": [6.0]}, catenary="periodic-stiffness", pantograph="three-mass")
+    print_sweep(rows, ["pantograph.masses.1"])
     printed = " ".join(capsys.readouterr().out.split())
     assert "three-mass on periodic-stiffness at 300 km/h, spans 10-19" in printed

@@ -18,7 +18,7 @@ from panto_env.base import machine
 from panto_env.base.files import read_toml, write_whole
 from panto_env.base.inline import parse_inline
 from panto_env.base.settings import Settings, parse
-from panto_env.base.shown import LONGEST_LINE, shown
+from panto_env.base.shown import LONGEST_LINE, beside, shown
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.envs import IDS
 from panto_env.policies import find_policy
@@ -292,3 +292,20 @@ def test_of_many_wrong_keys_the_first_are_told_and_the_others_counted():
     with pytest.raises(InputError, match=r"and 32 more keys are wrong\.$") as caught:
         simulate(actuator=table)
     assert str(caught.value).count("is not known") == 8
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "form", "text"),
+    [
+        (1.504, 1.5, "+.1f", "+1.504"),
+        (-1.50001, -1.5, "+.1f", "-1.50001"),
+        (1.56, 1.5, ".1f", "1.6"),
+        (1.5, 1.5, ".1f", "1.5"),
+        (0.30004, 0.3, ".2g", "0.30004"),
+        (12345.6, 12345.5, ",.6g", "12,345.6"),
+        (np.nan, 1.0, ".1f", "nan"),
+        (1.0 + 2**-52, 1.0, ".1f", "1.0000000000000002"),
+    ],
+)
+def test_a_value_beside_a_limit_stands_on_its_side(value, limit, form, text):
+    assert beside(value, limit, form) == text

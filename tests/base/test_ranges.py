@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from panto_env import InputError, simulate
+from panto_env.base.explanation import dotted
 from panto_env.base.ranges import Between, ranges_of
 from panto_env.base.settings import parse
 from panto_env.catalog import available, load_catenary, load_pantograph
@@ -138,7 +139,7 @@ def test_an_absurd_number_of_a_file_is_refused(kind, keys, annotation, place, tm
         with pytest.raises(InputError) as caught:
             (load_pantograph if pantograph else load_catenary)(str(path))
         message = str(caught.value)
-        one_sentence(message.replace(str(path), "FILE"), ".".join(map(str, (*keys, *place))))
+        one_sentence(message.replace(str(path), "FILE"), dotted((*keys, *place)))
         (between,) = set(ranges_of(annotation))
         assert f"from {between.low:,g} to {between.high:,g}" in message
         path.unlink()
@@ -159,7 +160,7 @@ def test_an_absurd_number_of_a_table_is_refused(read, kind, keys, annotation, pl
     for absurd in ABSURD:
         with pytest.raises(InputError, match=r"must be a (whole )?number from") as caught:
             read(put(kind, keys, with_absurd(annotation, place, absurd)))
-        one_sentence(str(caught.value), ".".join(map(str, (*keys, *place))))
+        one_sentence(str(caught.value), dotted((*keys, *place)))
 
 
 def test_units_of_ranges_are_those_of_the_descriptions():

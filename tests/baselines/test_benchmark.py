@@ -21,6 +21,7 @@ from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.controls import ORACLE_TAPE, policy_of
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.benchmark.statistics import MOVED, MOVED_AT_MOST
 from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
@@ -191,7 +192,7 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"trainings": {P: ["p", "pd"]}}, f"'{P}' is given twice"),
         ({"seeds": 0}, "key 'seeds'"),
         ({"seeds": [1, 1]}, "key 'seeds': 1 is given twice"),
-        ({"seeds": [-1]}, "key 'seeds.0'"),
+        ({"seeds": [-1]}, "key 'seeds.1'"),
         ({"lines": []}, "key 'lines'"),
         ({"lines": [LINE, LINE]}, "is given twice"),
         ({"lines": [{"speeds_kmh": [300, 300]}]}, "300.0 is given twice"),
@@ -199,7 +200,7 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"lines": [{"catenary": "nowhere"}]}, "Unknown catenary 'nowhere'"),
         ({"lines": [{"distance": 200.0}]}, "no spans 10 to 3 to evaluate"),
         ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
-        ({"lines": [{"speed": 300}]}, "key 'lines.0.speed'"),
+        ({"lines": [{"speed": 300}]}, "key 'lines.1.speed'"),
         ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
         ({"control_interval": 0.0}, "must be a number from 0.0001 to 10 s"),
@@ -255,7 +256,7 @@ def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
     [
         ("seeds = ", "is not valid TOML"),
         ("seed = 3", "key 'seed'"),
-        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.0.speeds_kmh.0'"),
+        ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.1.speeds_kmh.1'"),
         (None, "does not exist"),
     ],
 )
@@ -402,3 +403,21 @@ def test_a_line_can_have_policies_of_its_own():
         ("ln2", "passive"),
         ("ln2", "p"),
     ]
+
+
+def test_the_help_says_what_policies_are_ranked_by() -> None:
+    """Two cells: the one with the lower CF is not first if its sigma is higher at the same mean force."""
+    app = typer.Typer()
+    app.command()(command.benchmark)
+    words = " ".join(CliRunner().invoke(app, ["--help"], terminal_width=200).stdout.split())
+    assert "Ranks them by the change of σ from a passive pantograph at the same mean force" in words
+    assert "cost function" not in words
+    assert f"more than {100 * MOVED:g} % in a cell" in words
+    assert f"more than {100 * MOVED_AT_MOST:g} % in any pass" in words
+
+
+def test_skyhook_says_how_to_give_gains_where_none_are_stored() -> None:
+    with pytest.raises(InputError, match=r"give them \(frame, head\) as the parameter gains"):
+        simulate("re250", policy="skyhook", speed_kmh=200.0)
+    run = simulate("re250", policy="skyhook:gains=[100,0]", speed_kmh=200.0, distance=300.0, spans=7)
+    assert np.abs(run.frame_force).max() > 1.0

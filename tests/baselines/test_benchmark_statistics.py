@@ -40,7 +40,7 @@ def test_the_qualified_are_ranked_by_sigma_and_the_others_are_not():
         ]
     )
     assert [cell.rank for cell in cells] == [3, None, 2, 1, None, None, None]
-    assert cells[1].disqualified == "it moves the mean force by -1.5 %, more than 1.5 %"
+    assert cells[1].disqualified == "it moves the mean force by -1.55 %, more than 1.5 %"
     assert "1 of 1 runs ended early" in cells[5].disqualified
     assert "no passive pantograph can reach its mean force" in cells[6].disqualified
     assert cells[0].disqualified == ""

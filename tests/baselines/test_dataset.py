@@ -44,7 +44,7 @@ TABLE = {
 RANGES = {
     "speed_kmh": (200.0, 300.0),
     "catenary.span_length": (50.0, 65.0),
-    "pantograph.masses.0": (5.0, 10.0),
+    "pantograph.masses.1": (5.0, 10.0),
 }
 
 
@@ -267,7 +267,7 @@ class TestParts:
     def test_the_whole_command_may_be_killed(self, tmp_path):
         """SIGKILL of the command itself while a table is made: what is whole stays, and is not made again."""
         (tmp_path / "few.toml").write_text(
-            'title = "few"\ncount = 200\n[ranges]\nspeed_kmh = [200, 300]\n"pantograph.masses.0" = [5, 10]\n'
+            'title = "few"\ncount = 200\n[ranges]\nspeed_kmh = [200, 300]\n"pantograph.masses.1" = [5, 10]\n'
         )
         command = [PANTO, "dataset", "designs", "few.toml", "--output", "out", "--workers", "1"]
         process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
@@ -334,7 +334,7 @@ class TestDesigns:
             assert (counts == 16).all()
 
     def test_a_row_is_what_simulate_says(self):
-        values = {"speed_kmh": 250.0, "catenary.span_length": 60.0, "pantograph.masses.0": 7.2}
+        values = {"speed_kmh": 250.0, "catenary.span_length": 60.0, "pantograph.masses.1": 7.2}
         row = designs.design(few_designs(), 5, values)
         figures = simulate(speed_kmh=250.0).summary().as_dict()
         assert {name: row[name] for name in designs.FIGURES} == {
@@ -343,7 +343,7 @@ class TestDesigns:
         assert (row["design"], row["refused"], row["ending"], row["accuracy_warning"]) == (5, "", "", "")
 
     def test_a_longer_span_takes_its_droppers_along(self):
-        values = {"speed_kmh": 250.0, "catenary.span_length": 54.0, "pantograph.masses.0": 7.2}
+        values = {"speed_kmh": 250.0, "catenary.span_length": 54.0, "pantograph.masses.1": 7.2}
         line, _ = designs.designed(few_designs(), values)
         base = few_designs().entries()["catenary"]
         assert line.span_length == 54.0
@@ -389,8 +389,8 @@ class TestDesigns:
     @pytest.mark.parametrize(
         ("changes", "message"),
         [
-            ({"ranges": {"pantograph.masses.0": (5, 10)}}, "ranges must have speed_kmh"),
-            ({"ranges": RANGES | {"pantograph.mases.0": (5, 10)}}, "did you mean 'pantograph.masses.0'"),
+            ({"ranges": {"pantograph.masses.1": (5, 10)}}, "ranges must have speed_kmh"),
+            ({"ranges": RANGES | {"pantograph.mases.1": (5, 10)}}, "did you mean 'pantograph.masses.1'"),
             ({"ranges": RANGES | {"actuator.lag": (0, 0.1)}}, "must be speed_kmh or begin with"),
             ({"ranges": {"speed_kmh": (300, 200)}}, "must rise"),
             ({"count": 0}, "count"),

@@ -294,7 +294,7 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
         (
             "out.json",
             json.dumps(with_checksum(result(traces=[{"policy": 1}]))),
-            "'traces.0.policy' is missing or wrong",
+            "'traces.1.policy' is missing or wrong",
         ),
         ("out.json", json.dumps(with_checksum(result(spans=[]))), "do not fit together"),
     ],

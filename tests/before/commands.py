@@ -22,7 +22,7 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 STUDIES = ("paper1-control", "paper1-identification", "paper3-parameters")
 MEASURED = ("--measured", "k1T=32992 m2=5 k2=14544")
 SMALL = ("--line-condition", "fair", "--workers", "2")
-SWEEP = ("sweep", "pantograph.masses.0=5:9:3", "speed_kmh=250,300", "--spans", "5-6")
+SWEEP = ("sweep", "pantograph.masses.1=5:9:3", "speed_kmh=250,300", "--spans", "5-6")
 POLICY_SWEEP = ("sweep", "policy.gain=0.4,0.9", "--policy", "p", "--policy", "pd", "--speed", "280")
 SIMULATE = ("simulate", "--speed", "270", "--spans", "4-9", "--policy", "fb+ff", "--seed", "3")
 ARGUMENTS: dict[str, tuple[str, ...]] = {

@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+import panto_env
 from panto_env import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.envs import BARE
@@ -202,3 +203,27 @@ def test_line_values_say_what_the_line_is(kind):
     assert len(observation) == len(before) + 7
     with pytest.raises(InputError, match="line 'periodic-stiffness' is not one; leave out line_values"):
         gymnasium.make("panto_env:PantographStiffness-v0", line_values=True)
+
+
+@pytest.mark.parametrize(
+    ("settings", "near"),
+    [
+        ({"observation": "centred"}, True),
+        ({"observation": "centred", "pantograph": "identified-2dof"}, False),
+        ({"observation": "measured", "normalise": (200, 350)}, True),
+        ({"observation": "measured", "normalise": (200, 350), "pantograph": "identified-2dof"}, True),
+    ],
+)
+def test_readings_are_near_0_and_spread_by_1_where_documents_say_so(settings, near):
+    """In a passive run; see "Observation Space" in the description of ``PantographEnv``."""
+    env = panto_env.envs.PantographEnv(speed_kmh=275.0, **settings)
+    seen, ended = [env.reset(seed=0)[0]], False
+    while not ended:
+        observation, _, terminated, ended, _ = env.step(np.zeros(1, np.float32))
+        assert not terminated
+        seen.append(observation)
+    rows = [k for k, entry in enumerate(env.context.layout.entries) if "displacement" in entry.name]
+    settled = np.array(seen)[len(seen) // 3 :, rows]
+    assert len(rows) == 2
+    assert (np.abs(settled.mean(axis=0)) < 0.5).all() == near
+    assert (np.abs(settled.std(axis=0) - 1) < 0.5).all() or not near

@@ -52,7 +52,7 @@ def assert_same(ours, theirs, where="infos"):
         if isinstance(value, dict):
             assert_same(value, theirs[key], f"{where}[{key}]")
         elif "figures" in where or "figures" in key:
-            # Each of the single environments has figures in each info: of no episode until one ends.
+            # Each of the single environments has the figures of its own episodes that have ended.
             mask = ours[key if key[0] == "_" else f"_{key}"]
             np.testing.assert_allclose(value[mask], theirs[key][mask], rtol=1e-9, atol=1e-9)
         elif key == "final_obs":

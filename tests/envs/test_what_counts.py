@@ -83,7 +83,7 @@ def test_an_early_end_before_anything_counts_is_charged_for_what_would_have_coun
     counted = 100.0 / (env.context.speed * env.context.control_interval)
     assert rewards[:-1].any() == 0
     assert rewards[-1] == pytest.approx(-2 * counted, rel=0.02)  # as if without contact: CF and CL are 1
-    assert info["figures"]["std"] == np.inf  # it has none
+    assert "std" not in info["figures"]  # it has none
 
 
 @pytest.mark.parametrize("lanes", [None, 3])

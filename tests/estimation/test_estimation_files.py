@@ -113,6 +113,8 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     assert told["mean"] == pytest.approx(116.4, abs=0.5)
     assert told["std"] == pytest.approx(27.4, abs=1.0)
     assert told["believe"] is True
+    assert [test["kept"] for test in told["tests"]] == 4 * [True]
+    assert "nis_bounds" not in told  # it is not judged by these
     assert told["scores"][-1]["correlation"] > 0.97
     table = pq.read_table(output)
     assert table.column_names == ["time", "contact_force", "nis"]
@@ -124,7 +126,10 @@ def test_the_command_prints_compares_and_writes(record, tmp_path):
     )  # fmt: skip
     assert shown.returncode == 0, shown.stderr
     assert "from displacements, periodic" in " ".join(shown.stdout.split())
-    assert "reliable" in shown.stdout
+    words = " ".join(shown.stdout.split())
+    for bounds in ("0.667 to 1.5", "up to 2.5", "-0.6 to 0.6", "-20 to 20"):
+        assert bounds in words
+    assert "all within these bounds" in words
 
 
 def test_a_table_of_scores_has_the_units_of_its_headings():

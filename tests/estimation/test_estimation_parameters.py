@@ -67,8 +67,8 @@ def test_names_are_those_of_the_chain():
     keys = ("masses", "stiffnesses", "dampings")
     assert parameter_names(TRUE) == tuple(f"{key}.{place}" for key in keys for place in (0, 1))
     assert frame_parameters(TRUE) == parameter_names(TRUE)[1:]
-    assert "dampings.0" not in parameter_names(load_pantograph("dsa380"))  # it is 0: there is no logarithm
-    other = changed(TRUE, {"masses.1": 20.0, "masses.0": 9.0, "dampings.1": 1.0})
+    assert "dampings.1" not in parameter_names(load_pantograph("dsa380"))  # it is 0: there is no logarithm
+    other = changed(TRUE, {"masses.2": 20.0, "masses.1": 9.0, "dampings.2": 1.0})
     assert (other.masses, other.dampings) == ((9.0, 20.0), (20.0, 1.0))
 
 
@@ -135,9 +135,9 @@ def test_a_wrong_lift_scales_all_parameters_alike(motion):
 
 
 def test_unknown_parameters_are_refused(motion):
-    with pytest.raises(InputError, match=r"'masses.7' is no parameter of 'own-two-mass'"):
-        estimate_parameters(motion, TRUE, PLAIN, ("masses.7",))
-    with pytest.raises(InputError, match=r"The head's mass, 'masses.0', can't be estimated"):
+    with pytest.raises(InputError, match=r"'masses.8' is no parameter of 'own-two-mass'"):
+        estimate_parameters(motion, TRUE, PLAIN, ("masses.8",))
+    with pytest.raises(InputError, match=r"The head's mass, 'masses.1', can't be estimated"):
         estimate_parameters(motion, TRUE, PLAIN, parameter_names(TRUE))
     with pytest.raises(InputError, match="at least one parameter"):
         estimate_parameters(motion, TRUE, PLAIN, ())

@@ -108,7 +108,7 @@ def test_a_free_zero_leaves_the_mean_to_the_lift(motion):
     assert suspension_offset(back, TRUE) == pytest.approx(0.0, abs=1e-9)
     assert np.abs(back.head - motion.head).max() < 1e-4
     with pytest.raises(InputError, match="No spring holds the head"):
-        rezeroed(motion, changed(TRUE, {"stiffnesses.0": 0.0}))
+        rezeroed(motion, changed(TRUE, {"stiffnesses.1": 0.0}))
 
 
 def scaled(motion):
@@ -125,7 +125,7 @@ def as_it_is(motion):
     return motion
 
 
-NEAR = {"masses.0": 8.4, "masses.1": 13.65, "stiffnesses.0": 6650.0, "dampings.1": 105.0}
+NEAR = {"masses.1": 8.4, "masses.2": 13.65, "stiffnesses.1": 6650.0, "dampings.2": 105.0}
 FAULTS = {
     "healthy": (as_it_is, TRUE, None),
     "parameters 5 % wrong": (as_it_is, changed(TRUE, NEAR), None),
@@ -134,15 +134,19 @@ FAULTS = {
     "a step of a sensor": (
         lambda m: with_value(m, "head", slice(9000, None), m.head[9000:] + 1e-3),
         TRUE,
-        r"about [89]\.\d+ s they are",
+        r"about [89]\.\d+ s, where it is largest",
     ),
     "a sensor dead for 80 ms": (
         lambda m: with_value(m, "head", slice(8000, 8080), m.head[8000]),
         TRUE,
-        r"about [78]\.\d+ s they are",
+        r"about [78]\.\d+ s, where it is largest",
     ),
-    "a wrong suspension": (as_it_is, changed(TRUE, {"stiffnesses.0": 9100.0}), r"carries \+3\d N more"),
-    "another pantograph": (as_it_is, load_pantograph("en50318-2002"), "carries -"),
+    "a wrong suspension": (
+        as_it_is,
+        changed(TRUE, {"stiffnesses.1": 9100.0}),
+        r"what the lift leaves \(N\): 3\d.*, not -20 to 20",
+    ),
+    "another pantograph": (as_it_is, load_pantograph("en50318-2002"), r"leaves \(N\): -"),
 }
 
 
@@ -155,7 +159,7 @@ def test_what_not_to_believe_is_said(change, pantograph, reason, motion):
 
 def test_a_wrong_head_mass_and_a_wrong_lift_cannot_be_seen(motion):
     """The limits of all tests, which documents and the command's help tell."""
-    heavy = estimate(motion, changed(TRUE, {"masses.0": 10.0}))
+    heavy = estimate(motion, changed(TRUE, {"masses.1": 10.0}))
     assert heavy.verdict.believe
     assert (heavy.force - motion.contact_force)[2000:].std() > 1.05 * (
         (estimate(motion, TRUE).force - motion.contact_force)[2000:].std()
@@ -170,3 +174,35 @@ def test_less_noise_than_said_is_told():
     tested = Consistency(0.5, (0.98, 1.02), np.full(4, 0.5), np.arange(4.0), whiteness)
     assert not judge(tested, 0.0).believe
     assert "less noise than said" in judge(tested, 0.0).reasons[0]
+
+
+def made_up(nis=1.0, window=1.0, correlation=0.0):
+    whiteness = Whiteness(correlation, 0.03, 1.0)
+    return Consistency(nis, (0.98, 1.02), np.array([1.0, window]), np.arange(2.0), whiteness)
+
+
+@pytest.mark.parametrize(
+    ("name", "found", "suspension"),
+    [
+        ("innovations squared", made_up, 0.0),
+        ("the same about", lambda value: made_up(window=value), 0.0),
+        ("their autocorrelation", lambda value: made_up(correlation=value), 0.0),
+        ("force of the head's suspension", None, 1.0),
+    ],
+)
+def test_an_estimate_is_judged_by_the_bounds_that_are_printed(name, found, suspension):
+    """A hair within the printed bounds and a hair beyond them, and the value as it is printed."""
+
+    def verdict(value):
+        return judge(made_up() if found is None else found(value), suspension * value)
+
+    (bounds,) = [test.bounds for test in verdict(1.0).tests if test.name.startswith(name)]
+    *low, high = (float(number) for number in bounds.removeprefix("up to ").split(" to "))
+    for bound, beyond in ((high, 1), *((each, -1) for each in low)):
+        for step, believed in ((-1e-5, True), (1e-5, False)):
+            judged = verdict(bound + beyond * step)
+            assert judged.believe is believed
+            (test,) = [test for test in judged.tests if test.name.startswith(name)]
+            shown = float(test.text)
+            assert (shown > high or bool(low and shown < low[0])) is not believed
+            assert believed or f"{test.text}, not {bounds}" in judged.reasons[0]

@@ -213,10 +213,10 @@ def test_less_tension_is_a_slower_line():
         ({"hard_spots": [(2, 61.0, 5.0, 0.0)]}, "no place 61 m from the first support of span 2"),
         ({"hard_spots": [(1, 0.0, 5.0, 0.0)]}, "must lie between the line's anchors, at 0 and 600 m"),
         ({"hard_spots": [(2, 1.0, 5.0, 0.0), (2, 1.0, 6.0, 0.0)]}, r"names \(2, 1.0\) twice"),
-        ({"hard_spots": [(2, 1.0, 500.0, 0.0)]}, "hard_spots.0.2"),
+        ({"hard_spots": [(2, 1.0, 500.0, 0.0)]}, "hard_spots.1.3"),
         ({"worn_stretches": [(10, 50.0, 11.0, 0.1)]}, "ends at 601 m, but the line at 600 m"),
         ({"worn_stretches": [(2, 5.0, 9.0, 0.1), (2, 1.0, 5.0, 0.1)]}, "must not overlap: .* 61 and 65 m"),
-        ({"worn_stretches": [(2, 5.0, 1.0, 0.1)]}, "worn_stretches.0.2"),
+        ({"worn_stretches": [(2, 5.0, 1.0, 0.1)]}, "worn_stretches.1.3"),
         ({"lost_contact_tension": 0.6}, "lost_contact_tension"),
     ],
 )

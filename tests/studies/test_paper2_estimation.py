@@ -86,11 +86,11 @@ def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
 
 def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
     told = parameter_information(trajectory)
-    true = {"masses.1": 13.0, "stiffnesses.0": 7000.0, "dampings.1": 100.0}
+    true = {"masses.2": 13.0, "stiffnesses.1": 7000.0, "dampings.2": 100.0}
     found = dict(zip(told.found.names, told.found.values, strict=True))
     for name, value in true.items():
         assert found[name] == pytest.approx(value, rel=0.005)
-    assert told.bounds["masses.0"] > 5 * told.bounds["masses.1"]
+    assert told.bounds["masses.1"] > 5 * told.bounds["masses.2"]
     assert told.scale > 0.5
     assert len(parameters_table(told).rows) == 8
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Protocol
 from ...backend import operation
 from ...base.arrays import Array
 from ...base.errors import InputError
+from ...base.shown import beside
 from ...base.units import to_kmh
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
@@ -99,11 +100,10 @@ def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
     """Raise InputError unless all speeds (m/s) are below the wave speed (m/s) of a line."""
     for speed in speeds:
         if not (math.isfinite(speed) and SLOWEST <= speed < wave_speed):
-            bound = (
-                ""
-                if math.isinf(wave_speed)
-                else f" and below the wave speed of the contact wire, {to_kmh(wave_speed):.0f} km/h"
-            )
+            bound = ""
+            if math.isfinite(wave_speed):
+                highest = beside(to_kmh(wave_speed), to_kmh(speed), ".0f")
+                bound = f" and below the wave speed of the contact wire, {highest} km/h"
             raise InputError(
                 f"The speed must lie above 0{bound} on line '{line}', not at {to_kmh(speed):g} km/h."
             )

@@ -11,6 +11,8 @@ import numpy as np
 
 from ...backend import aligned_zeros
 from ...base.arrays import Array, Lanes
+from ...base.errors import InputError
+from ...base.shown import beside
 from ..catenary.protocol import CatenaryModel
 from .schema import PantographData
 from .step import Part
@@ -19,6 +21,9 @@ STRIP_STIFFNESS = 50e3
 """Contact spring (N/m) of a 'rigid' collector strip on a wire with mass: EN 50318's."""
 LARGEST_PART, TERMS, TINY = 0.25, 11, 1e-300
 """Norm up to which this number of terms of the exponential's series is enough: the next one is 1e-16."""
+MOST_COMPRESSED = 0.3
+"""Change of length at rest (m) beyond which a spring between two masses cannot be a pantograph's: heads have
+strokes of 40 to 100 mm (recalled), and a head as a whole works within 300 mm."""
 STABILITY_MARGIN = 0.3
 """Contact stiffness with the explicit contact law, as a share of the stiffness at which it gets unstable."""
 
@@ -163,6 +168,26 @@ def rest_state(
     forces = nominal_forces[:, None], (wire_heights / compliance)[:, None]
     heights = flexibility[:, :, -1] * forces[0] + flexibility[:, :, 0] * forces[1]
     return np.concatenate([heights, np.zeros_like(heights)], axis=1)
+
+
+def check_at_rest(pantograph: PantographData) -> None:
+    """Raise InputError where a spring between two masses gives way under the static force."""
+    force = np.array([pantograph.static_force])
+    check_compression(pantograph.name, rest_state(pantograph, force, np.zeros(1), 1 / STRIP_STIFFNESS))
+
+
+def check_compression(name: str, states: Array) -> None:
+    """Raise InputError where a spring between two masses gives way in states at rest, (lanes, 2n)."""
+    size = states.shape[1] // 2
+    pressed = np.abs(np.diff(states[:, :size], axis=1))
+    if pressed.size and pressed.max() > MOST_COMPRESSED:
+        spring = int(pressed.max(axis=0).argmax())
+        most = beside(float(pressed.max()), MOST_COMPRESSED, ".3g")
+        raise InputError(
+            f"At rest spring {spring + 1} of pantograph '{name}' would be compressed by "
+            f"{most} m, more than {MOST_COMPRESSED:g} m, and no pantograph has that room: give "
+            f"number {spring + 1} of its stiffnesses in N/m (10 N/mm are 10e3), and forces in N."
+        )
 
 
 @lru_cache(maxsize=64)

@@ -100,7 +100,7 @@ def parameters_table(estimated: ParameterInformation) -> Table:
         if not place:
             rows.append((name, "–", "–", "–", "–", f"{100 * bound:.3g}"))
             continue
-        right, known = (float(getattr(each, key)[int(place)]) for each in (true, estimated.known))
+        right, known = (float(getattr(each, key)[int(place) - 1]) for each in (true, estimated.known))
         known_error = f"{100 * (known / right - 1):+.2f}"
         if name in found:
             cells = (f"{100 * (found[name] / right - 1):+.2f}", f"{100 * deviation[name]:.2f}")

@@ -104,8 +104,8 @@ def influences() -> tuple[Influence, ...]:
     basic = (
         ("variation", "catenary.stiffness_variation", "ε", "", line.stiffness_variation),  # type: ignore[attr-defined]
         ("mean-stiffness", "catenary.mean_stiffness", "k_m", "N/m", line.mean_stiffness),  # type: ignore[attr-defined]
-        ("mass", "pantograph.masses.0", "m_1", "kg", pantograph.masses[0]),
-        ("suspension", "pantograph.stiffnesses.0", "k_1", "N/m", pantograph.stiffnesses[0]),
+        ("mass", "pantograph.masses.1", "m_1", "kg", pantograph.masses[0]),
+        ("suspension", "pantograph.stiffnesses.1", "k_1", "N/m", pantograph.stiffnesses[0]),
     )
     varied = [
         Influence(key, name, symbol, unit, tuple(factor * value for factor in FACTORS), 6 + 2 * k)

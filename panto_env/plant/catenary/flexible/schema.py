@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ....base.explanation import comma_hint
 from ....base.ranges import Between
 from ....base.settings import Settings
 from ..schema import LONGEST_SPAN, CatenaryData, Wire
@@ -40,7 +41,7 @@ class Droppers(Settings):
         if len(self.sag) != len(self.positions):
             raise ValueError(
                 f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
-                f"but {len(self.sag)} sags"
+                f"but {len(self.sag)} sags{comma_hint(len(self.positions), len(self.sag))}"
             )
         if any(b - a < CLOSEST for a, b in zip(self.positions, self.positions[1:], strict=False)):
             raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")

@@ -13,6 +13,7 @@ import numpy as np
 from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
+from ....base.shown import beside
 from .beams import GRAVITY, PeriodicWire, Profile
 from .schema import FlexibleCatenaryData
 
@@ -22,6 +23,10 @@ HEIGHT_RANGE = 0.5
 """Maximum difference of the contact wire's heights along a span (m); pantographs follow 0.3 m."""
 STEEPEST = 0.2
 """Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+MOST_STRETCH = 0.1
+"""Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
+MOST_YIELD = 0.3
+"""Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
 SETTLED, USABLE = 1e-12, 1e-9
 """Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
 POINTS = 401
@@ -58,9 +63,17 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
 def hang(line: FlexibleCatenaryData) -> StaticShape:
     """Static shape of a line that can exist: every dropper pulls, wires do not cross and are level.
 
-    Raises InputError, naming the dropper or the wire, where it can't.
+    Nothing in it gives way under the wires' weight either. Raises InputError, naming the dropper, the wire or
+    the support, where it can't.
     """
     shape = solve(line)
+    yielded = line.encumbrance - float(shape.messenger.height(np.zeros(1))[0])
+    if yielded > MOST_YIELD:
+        raise InputError(
+            f"At rest the messenger's supports of line '{line.name}' would yield by "
+            f"{beside(yielded, MOST_YIELD, '.2g')} m, more than {MOST_YIELD} m; give support.stiffness in "
+            "N/m (500 N/mm are 500e3)."
+        )
     _check_droppers(line, shape)
     x = np.linspace(0.0, line.span_length, POINTS)
     contact, messenger = shape.contact.height(x), shape.messenger.height(x)
@@ -72,15 +85,17 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
         )
     if np.ptp(contact) > HEIGHT_RANGE:
         raise InputError(
-            f"At rest the contact wire of line '{line.name}' would differ by {np.ptp(contact):.2g} m in "
-            f"height along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+            f"At rest the contact wire of line '{line.name}' would differ by "
+            f"{beside(float(np.ptp(contact)), HEIGHT_RANGE, '.2g')} m in height along a span, more than "
+            f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
         )
     for name, height in (("contact", contact), ("messenger", messenger)):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
             raise InputError(
-                f"At rest the {name} wire of line '{line.name}' would have a slope of {slope:.2g}, more than "
-                f"{STEEPEST}, and the model is of nearly level wires; give it more tension, or shorter spans."
+                f"At rest the {name} wire of line '{line.name}' would have a slope of "
+                f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
+                "level wires; give it more tension, or shorter spans."
             )
     return shape
 
@@ -96,7 +111,15 @@ def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
                 f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
                 "position, or the sags."
             )
-    for place, length in zip(places, shape.dropper_length, strict=True):
+    stretch = shape.dropper_tension / shape.dropper_stiffness
+    for place, length, longer in zip(places, shape.dropper_length, stretch, strict=True):
+        if 0 < MOST_STRETCH * (length + longer) < longer:
+            share = beside(100 * longer / (length + longer), 100 * MOST_STRETCH, ".2g")
+            raise InputError(
+                f"At rest {place} would be stretched by {longer:.2g} m, {share} % of its length, more "
+                f"than {100 * MOST_STRETCH:g} %; give stiffer droppers: stiffness in N/m (100 N/mm are "
+                "100e3), axial_stiffness in N."
+            )
         if length <= 0:
             raise InputError(
                 f"Unloaded, {place} would be {length:.4g} m long; give a larger encumbrance, more tension "
