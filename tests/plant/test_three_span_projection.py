@@ -18,7 +18,7 @@ from tests.plant.test_three_span_motion import Wire
 
 SPEED_KMH, STEP, SPANS, SETTLED = 150.0, 2.5e-3, 9, 5
 """km/h; s between samples; spans that are solved; those that are left out at the start."""
-LINE, PANTOGRAPH = "ohl-three-span", "dsa350"
+LINE, PANTOGRAPH = "ohl-three-span", "own-two-mass"
 
 
 @dataclass(frozen=True)
