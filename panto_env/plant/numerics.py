@@ -17,7 +17,7 @@ from .line_condition import LineCondition
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
 WINDOW = {"full": 16, "fast": 8}
-"""Spans computed about the train, by accuracy."""
+"""Spans computed about the train, by accuracy; more about slow trains for full accuracy."""
 
 
 class Numerics(Settings):
@@ -39,8 +39,8 @@ class Numerics(Settings):
     window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, with an even number one more "
-        f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
-        "0: the whole line",
+        f"ahead than behind; by default {WINDOW['full']}, or 24 about trains below 40 % of the "
+        f'faster wire\'s wave speed; with accuracy="fast" {WINDOW["fast"]}; 0: the whole line',
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
