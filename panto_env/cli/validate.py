@@ -26,7 +26,7 @@ def validate(
         typer.Option(
             "--lines",
             help="Print the errors of the default grid and step on every line of the catalogue and on twenty "
-            "drawn ones, at all speeds (half an hour).",
+            "drawn ones, at all speeds (ten minutes).",
         ),
     ] = False,
     start: Annotated[

@@ -15,7 +15,7 @@ from ..base.units import from_kmh, to_kmh
 from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
-"""Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
+"""Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
 WINDOW = {"full": 16, "fast": 8}
 """Spans computed about the train, by accuracy; more about slow trains for full accuracy."""
 
@@ -26,7 +26,7 @@ class Numerics(Settings):
     accuracy: Literal["full", "fast"] = Field(
         "full",
         description='"full": grid and time step for which figures of a flexible line are within 1 % of '
-        'converged ones at the given speeds; "fast": coarser ones, three to twenty times as fast',
+        'converged ones up to 70 % of the wave speed; "fast": coarser ones, three to twenty times as fast',
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one for the accuracy"

@@ -83,7 +83,6 @@ class LineCheck:
     max: float | None = None  # change (% of the mean force)
     min: float | None = None  # change (% of the mean force)
     contact_loss: float | None = None  # change (percentage points)
-    lost: bool = False  # whether contact is ever lost
 
 
 def catalogue_lines() -> Iterator[tuple[str, FlexibleCatenaryData, PantographData]]:
@@ -204,6 +203,5 @@ def _compared(check: LineCheck, ours: Trajectory, true: Trajectory) -> LineCheck
             "max": 100 * (a.max - b.max) / b.mean,
             "min": 100 * (a.min - b.min) / b.mean,
             "contact_loss": a.contact_loss - b.contact_loss,
-            "lost": max(a.contact_loss, b.contact_loss) > 0,
         }
     )

@@ -4,7 +4,8 @@ A force that changes at f Hz and travels at v sends waves ahead whose length shr
 from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. Three errors of a grid
 grow with k: it carries no wave of less than two nodes; its bending term is of second order, so that a wave
 comes back from the next dropper too early or too late; and a clamp, which hangs on two nodes, reflects
-too little. All three limits were set where the figures of the catalogue's lines and of drawn ones leave 1 %.
+too little. All three limits were set where figures of the catalogue's lines and of drawn ones leave their
+bounds, those of ``fine_enough`` in ``resolution``.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from ..schema import CLEAR, MOST_SPANS, Wire
 ENOUGH = ((0.4, 24), (0.65, 16), (1.0, 8))
 """Up to a share of the faster wire's wave speed: spans about the train that make figures as of an endless
 line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (docs/validation.md)."""
-ERRORS = ((16, 3), (8, 5), (0, 20))
+ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
 """From a number of spans on: error (%) of figures where more are needed."""
 
 
