@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
+.PHONY: demo benchmark test lint docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -83,6 +83,10 @@ proofs: $(READY)
 # Studies of minutes each: papers 1 and 2 against what the documents say of them, and learning from whole data sets.
 studies: $(READY)
 	$(BIN)/pytest -n auto --dist worksteal -m study
+
+# Errors of the default grid, step and window on the catalogue's lines and twenty drawn ones, at all speeds.
+accuracy: $(READY)
+	$(BIN)/panto validate --lines --window
 
 # Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
 coverage: $(READY)

@@ -61,6 +61,7 @@ def simulate(
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(driver) | settings
     task = _ready(given, seed, evaluated, record_droppers)
+    task.settings.line.warn_if_short(task.settings.numerics, task.settings.runs)
     if driver is None:
         task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)

@@ -16,7 +16,7 @@ def validate(
         bool, typer.Option("--convergence", help="Print the convergence of figures with grid and step.")
     ] = False,
     window: Annotated[
-        bool, typer.Option("--window", help="Print how travelling windows compare with a whole line.")
+        bool, typer.Option("--window", help="Print how travelling windows compare with whole lines.")
     ] = False,
     wear: Annotated[
         bool, typer.Option("--wear", help="Print the effect of the time step on figures of a worn line.")
@@ -30,7 +30,9 @@ def validate(
     lines: Annotated[
         bool,
         typer.Option(
-            "--lines", help="Print the errors of the default grid and step on every line and speed."
+            "--lines",
+            help="Print the errors of the default grid and step on every line of the catalogue and on twenty "
+            "drawn ones, at all speeds (ten minutes).",
         ),
     ] = False,
     start: Annotated[

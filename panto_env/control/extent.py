@@ -7,21 +7,10 @@ from functools import partial
 
 from ..base.errors import InputError
 from ..base.shown import beside
-from ..metrics.spans import CLEAR
 from ..plant.catenary.schema import MOST_SPANS
-from ..plant.drift import largest_drift
-from ..plant.numerics import Runs
 from ..plant.plant import Plant
 from .cost import FEW_LANES, check_lanes
 from .settings import RunSettings
-
-
-def runs(settings: RunSettings) -> Runs:
-    """The runs for which the plant is built."""
-    slow, quick = settings.speeds
-    drift = largest_drift(settings.drift)
-    pantograph, interval = settings.pantograph, settings.control_interval
-    return Runs((slow - drift, quick + drift), interval, settings.line_condition, pantograph.hard_contact)
 
 
 def spans(settings: RunSettings) -> int | None:
@@ -31,9 +20,10 @@ def spans(settings: RunSettings) -> int | None:
         more = math.ceil(settings.settle)
         return line.spans + more if settings.spans is None and more else settings.spans
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
-    needed = last + (CLEAR if last >= line.spans else 1)
+    clear = line.clear_spans(settings.numerics, settings.runs, last) if last >= line.spans else 1
+    needed = last + clear
     if needed > MOST_SPANS:
-        longest = line.alignment().support(MOST_SPANS - CLEAR)
+        longest = line.alignment().support(MOST_SPANS - clear)
         raise InputError(
             f"distance must be at most {longest:,g} m on line '{line.name}', not "
             f"{beside(settings.distance, longest, ',.6g')} m."
@@ -60,7 +50,7 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
         settings.train,
         spans=spans(settings),
         numerics=settings.numerics,
-        runs=runs(settings),
+        runs=settings.runs,
         bilateral=settings.bilateral,
         varied=settings.pantograph_scatter > 0,
         drifting=settings.speed_drift > 0,

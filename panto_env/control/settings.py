@@ -23,12 +23,13 @@ from ..base.units import from_kmh, to_kmh
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
-from ..metrics.spans import CLEAR, LAST_USUAL
+from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.schema import check_span_count
+from ..plant.drift import largest_drift
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
-from ..plant.numerics import Numerics
+from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
 from ..plant.train import Train
@@ -271,6 +272,14 @@ class RunSettings(Numerics):
         return from_kmh(self.speed_drift)
 
     @property
+    def runs(self) -> Runs:
+        """The runs for which the plant is built."""
+        slow, quick = self.speeds
+        drift = largest_drift(self.drift)
+        pantograph, interval = self.pantograph, self.control_interval
+        return Runs((slow - drift, quick + drift), interval, self.line_condition, pantograph.hard_contact)
+
+    @property
     def numerics(self) -> Numerics:
         """Settings of the discretisation."""
         return Numerics(**{name: getattr(self, name) for name in Numerics.model_fields})
@@ -285,7 +294,8 @@ def far_enough(settings: RunSettings) -> RunSettings:
     if settings.distance is not None or settings.spans is not None:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
-    return settings.model_copy(update={"distance": line.alignment(last).length, "spans": last + CLEAR})
+    spans = last + line.clear_spans(settings.numerics, settings.runs, last)
+    return settings.model_copy(update={"distance": line.alignment(last).length, "spans": spans})
 
 
 def as_designed(settings: RunSettings, speed: float) -> RunSettings:

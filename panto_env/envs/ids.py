@@ -17,7 +17,7 @@ IDS: dict[str, dict[str, Any]] = {
         "actuator": "realistic",
         "sensors": "realistic",
         "observation": "centred",
-        "window": 8,  # half of what figures take by default: sigma within 1 to 2 %, and twice as fast
+        "window": 8,  # a half to a third of the default: sigma within 2 % at these speeds, and twice as fast
         "reward": "benchmark",
     },
     "PantographStiffness-v0": {"catenary": "periodic-stiffness", "pantograph": "three-mass"},

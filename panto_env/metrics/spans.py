@@ -19,9 +19,6 @@ FIRST_SETTLED = 10
 falls by about a fifth per span at any speed; docs/validation.md shows the remaining error."""
 LAST_USUAL = 19
 """Default last span of a run, so that ten are evaluated."""
-CLEAR = 8
-"""Spans of a line beyond the last one of a pass: no window about the train then reaches the line's end, whose
-anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
 
 
 def check_spans(spans: Any) -> None:

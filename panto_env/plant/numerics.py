@@ -15,9 +15,9 @@ from ..base.units import from_kmh, to_kmh
 from .line_condition import LineCondition
 
 SAMPLES_PER_WAVE = 8
-"""Time steps in which a train passes the shortest wave of the wire, for figures within 1 %."""
+"""Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
 WINDOW = {"full": 16, "fast": 8}
-"""Spans computed about the train, by accuracy."""
+"""Spans computed about the train, by accuracy; more about slow trains for full accuracy."""
 
 
 class Numerics(Settings):
@@ -26,7 +26,7 @@ class Numerics(Settings):
     accuracy: Literal["full", "fast"] = Field(
         "full",
         description='"full": grid and time step for which figures of a flexible line are within 1 % of '
-        'converged ones at the given speeds; "fast": coarser ones, three to twenty times as fast',
+        'converged ones up to 70 % of the wave speed; "fast": coarser ones, three to twenty times as fast',
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one for the accuracy"
@@ -39,8 +39,8 @@ class Numerics(Settings):
     window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, with an even number one more "
-        f'ahead than behind; by default {WINDOW["full"]}, with accuracy="fast" {WINDOW["fast"]}; '
-        "0: the whole line",
+        f"ahead than behind; by default {WINDOW['full']}, or 24 about trains below 40 % of the "
+        f'faster wire\'s wave speed; with accuracy="fast" {WINDOW["fast"]}; 0: the whole line',
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'

@@ -49,7 +49,7 @@ class Validation:
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
             *([tables.conditions_table(self.conditions)] if self.conditions else []),
-            *([tables.lines_table(self.lines)] if self.lines else []),
+            *([tables.lines_table(self.lines), tables.largest_table(self.lines)] if self.lines else []),
             *([tables.start_table(self.start)] if self.start else []),
         ]
 
@@ -89,10 +89,9 @@ def run(
         report(str(numerics))
         rows += convergence.converge(numerics)
     windows: list[WindowCheck] = []
-    for catenary, pantograph in window.LINES if with_windows else ():
-        for speed in window.SPEEDS_KMH:
-            report(f"windows on {catenary} at {speed:g} km/h")
-            windows += window.check_windows(catenary, pantograph, speed)
+    for case in window.window_cases() if with_windows else ():
+        report(f"windows on {case.name} at {case.speed_kmh:g} km/h")
+        windows += window.check_windows(case)
     worn: list[WearCheck] = []
     for condition in wear.CONDITIONS if with_wear else ():
         for numerics in wear.DISCRETISATIONS:
@@ -104,9 +103,9 @@ def run(
             report(f"conditions of {catenary} at {speed:g} km/h")
             levels += conditions.check_conditions(catenary, pantograph, speed)
     every: list[LineCheck] = []
-    for name, speed in lines.cases() if with_lines else ():
-        report(f"{name} at {speed:g} km/h")
-        every += lines.check_line(name, speed)
+    for case in lines.every_case() if with_lines else ():
+        report(f"{case.name} at {case.speed_kmh:.0f} km/h")
+        every += lines.check_case(case)
     starts: list[StartCheck] = []
     for speed in start.SPEEDS_KMH if with_start else ():
         report(f"the start of runs at {speed:g} km/h")

@@ -11,6 +11,7 @@ from ...terminal import number
 from . import conditions, convergence, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
+ERRORS = ("std", "max", "min", "contact_loss")
 
 
 def checks_table(checks: Sequence[reference.Check]) -> Table:
@@ -62,24 +63,33 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
 
 
 def windows_table(checks: Sequence[window.WindowCheck]) -> Table:
-    """Travelling windows beside the whole line."""
-    rows = []
-    for check in checks:
-        changes = (f"{change:+.2f}" for change in (check.std, check.max, check.min, check.uplift))
-        case = (check.catenary, f"{check.speed_kmh:g}", str(check.window))
-        rows.append((*case, *changes, number(check.rms)))
+    """Travelling windows beside the whole line: the largest changes over all lines at each speed."""
+    rows, section_ends = [], []
+    for speed in dict.fromkeys(check.speed_kmh for check in checks):
+        at_speed = [check for check in checks if check.speed_kmh == speed]
+        for asked in dict.fromkeys(check.asked for check in at_speed):
+            those = [check for check in at_speed if check.asked == asked]
+            used = sorted({check.window for check in those})
+            shown = str(asked) if asked else f"default: {' or '.join(map(str, used))}"
+            worst = max(those, key=lambda check: abs(check.std)).catenary
+            changes = (f"{_largest(those, name):.2f}" for name in ("std", "max", "min", "uplift"))
+            rows.append(
+                (worst, f"{speed:g}", str(len(those)), shown, *changes, number(_largest(those, "rms")))
+            )
+        section_ends.append(len(rows) - 1)
     first, last = window.COMPARED
+    share = f"(% of {LABELS['mean'].short})"
     return Table(
-        f"Travelling windows beside a whole line of {window.LINE_SPANS} spans, spans {first} to {last}",
+        f"Travelling windows beside whole lines, spans {first} to {last}: largest changes over the flexible "
+        "lines of the catalogue",
         (
-            *("line", "km/h", "window\n(spans)"),
-            *(_in_percent(name) for name in ("std", "max")),
-            f"{LABELS['min'].short}\n(% of {LABELS['mean'].short})",
+            *("worst line\nfor σ", "km/h", "lines", "window\n(spans)", _in_percent("std")),
+            *(f"{LABELS[name].short}\n{share}" for name in ("max", "min")),
             _in_percent("max_uplift"),
             "force, rms\ndifference (N)",
         ),
         rows,
-        section_ends=tuple(k for k, check in enumerate(checks) if check.window == window.WINDOWS[-1]),
+        section_ends=tuple(section_ends),
     )
 
 
@@ -141,33 +151,65 @@ def conditions_table(checks: Sequence[conditions.ConditionCheck]) -> Table:
 
 
 def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
-    """Every line at every speed beside converged figures; last the largest change of each accuracy."""
-    rows, section_ends = [], []
+    """Every line at every speed beside converged figures."""
+    rows: list[Row] = []
+    section_ends = []
     for k, check in enumerate(checks):
-        changes = (f"{value:+.2f}" for value in (check.std, check.max, check.min, check.contact_loss))
-        case = (check.catenary, f"{check.speed_kmh:g}", check.accuracy, f"{check.spacing:.3g}")
-        rows.append((*case, f"{1e3 * check.time_step:.3g}", number(check.converged, 2), *changes))
+        case = (check.catenary, check.pantograph, f"{check.speed_kmh:.0f}", f"{check.share:.2f}")
+        used = (check.accuracy, f"{check.spacing:.3g}", f"{1e3 * check.time_step:.3g}")
+        figures = ["ended early", *("" for _ in ERRORS)]
+        if check.converged is not None:
+            figures = [number(check.converged, 2), *(f"{getattr(check, name):+.2f}" for name in ERRORS)]
+        rows.append((*case, *used, *figures, "yes" if check.warned else ""))
         if k + 1 == len(checks) or checks[k + 1].catenary != check.catenary:
             section_ends.append(k)
-    for accuracy in dict.fromkeys(check.accuracy for check in checks):
-        those = [check for check in checks if check.accuracy == accuracy]
-        largest = (
-            max(abs(getattr(check, name)) for check in those)
-            for name in ("std", "max", "min", "contact_loss")
-        )
-        rows.append(("largest", "", accuracy, "", "", "", *(f"{value:.2f}" for value in largest)))
     first, last = lines.SPANS
     return Table(
-        f"Every flexible line beside a grid of {lines.CONVERGED.spacing:g} m and a step of "
-        f"{1e3 * (lines.CONVERGED.time_step or 0.0):g} ms, spans {first} to {last}",
+        f"Every flexible line beside a grid of {lines.GRID:g} m and a step of at most "
+        f"{1e3 * lines.LONGEST_STEP:g} ms, spans {first} to {last}",
         (
-            *("line", "km/h", "accuracy", "grid\n(m)", "step\n(ms)"),
+            *("line", "pantograph", "km/h", "v / c", "accuracy", "grid\n(m)", "step\n(ms)"),
             f"converged\n{LABELS['std'].column}",
-            _in_percent("std"),
-            *(LABELS[name].column for name in ("max", "min")),
+            *(_in_percent(name) for name in ("std", "max", "min")),
+            f"{LABELS['contact_loss'].short}\n(points)",
+            "warned",
+        ),
+        rows,
+        text_columns=2,
+        section_ends=tuple(section_ends),
+    )
+
+
+def largest_table(checks: Sequence[lines.LineCheck]) -> Table:
+    """The largest change of each figure, by kind of line, accuracy and warning, and by speed."""
+    rows: list[Row] = []
+    section_ends = []
+    for drawn, accuracy in dict.fromkeys((check.drawn, check.accuracy) for check in checks):
+        group = [check for check in checks if (check.drawn, check.accuracy) == (drawn, accuracy)]
+        complete = [check for check in group if check.std is not None]
+        for warned in (False, True):
+            those = [check for check in complete if check.warned == warned]
+            if those:
+                rows.append(
+                    (
+                        "drawn" if drawn else "catalogue",
+                        accuracy,
+                        "yes" if warned else "no",
+                        str(len(those)),
+                        str(len(group) - len(complete)),
+                        *(f"{_largest(those, name):.2f}" for name in ERRORS),
+                    )
+                )
+        section_ends.append(len(rows) - 1)
+    return Table(
+        "Largest errors",
+        (
+            *("lines", "accuracy", "warned", "runs", "ended\nearly"),
+            *(_in_percent(name) for name in ("std", "max", "min")),
             f"{LABELS['contact_loss'].short}\n(points)",
         ),
         rows,
+        text_columns=2,
         section_ends=tuple(section_ends),
     )
 
@@ -193,6 +235,10 @@ def _scaled(row: dict[str, Any], name: str) -> float:
     """A figure in its label's unit."""
     value: float = LABELS[name].scale * row[name]
     return value
+
+
+def _largest(checks: Sequence[Any], name: str) -> float:
+    return float(max(abs(getattr(check, name)) for check in checks))
 
 
 def _in_percent(name: str) -> str:

@@ -1,14 +1,15 @@
 """Grid, time step and window of a flexible catenary: fine enough for the runs that it is built for.
 
-A coarse grid fails in three ways. Near the wave speed the waves ahead of a train are short: a force at f Hz
-sends waves of length (c - v) / f ahead. A slow train passes a node every dx / v, and the force has a ripple
-of this period, which the 20 Hz filter removes only while it is short. And droppers that go slack and taut
-again need a time step well below the milliseconds in which they do so: slow trains excite this most.
-docs/validation.md compares the figures at every speed, on every line, with converged ones.
+A coarse grid fails in three ways. The waves ahead of a train are short: without bending stiffness a force
+at f Hz sends waves of length (c - v) / f ahead (``waves``). A slow train passes a node every dx / v, and the
+force has a ripple of this period, which the 20 Hz filter removes only while it is short. And droppers that go
+slack and taut again need a time step well below the milliseconds in which they do so: slow trains excite this
+most. docs/validation.md compares the figures at every speed, on every line, with converged ones.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import NamedTuple
 
@@ -17,10 +18,12 @@ import numpy as np
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
 from ....base.units import from_kmh, to_kmh
-from ...numerics import SAMPLES_PER_WAVE, WINDOW, Numerics, Runs
+from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
+from .waves import carrying_grid
+from .window import window_of
 
 GRIDS = (
     (0.6, 1 / 3, 1e-2 / 6),
@@ -28,7 +31,8 @@ GRIDS = (
     (0.72, 0.25, 1e-3),
     (0.78, 0.2, 1e-3),
     (0.87, 0.15, 1e-3),
-    (1.0, 0.125, 1e-3),
+    (0.94, 0.125, 1e-3),
+    (1.0, 0.11, 1e-3),
 )
 """Up to a share of the wave speed: a grid (m) that is fine enough, a time step (s) that is short enough."""
 NODES_HZ = 60.0
@@ -36,7 +40,12 @@ NODES_HZ = 60.0
 SLOWEST_HZ = 22.0
 """Rate of nodes (Hz) below which their ripple is in the filtered force."""
 FINEST_GRID = 0.1
-"""Grid (m) for the slowest trains."""
+"""Grid (m) for the slowest trains, and the finest one that is taken for any."""
+REACH = 1.2
+"""Up to this multiple of the grid that carries the waves ahead, figures were within their bounds."""
+NOT_CARRIED = (5, 4)
+"""Errors beyond it, on the finest grid: of the standard deviation, maximum and minimum (%), and of the
+contact-loss ratio (points)."""
 SLOW = (
     (from_kmh(50), 0.12, 0.125e-3),
     (from_kmh(100), 0.2, 0.25e-3),
@@ -45,6 +54,9 @@ SLOW = (
     (np.inf, np.inf, np.inf),
 )
 """Below a speed (m/s): a grid (m) that is fine enough, a time step (s) that is short enough."""
+LIMP_BELOW, LIMP_GRID, LIMP_NODES = from_kmh(200), 0.15, 0.2
+"""Below a speed (m/s) that shows how evenly a line yields: grid (m) for a contact wire without bending
+stiffness, which kinks within a grid, and nodes to which a kink, sqrt(EI / T) wide, must spread elsewhere."""
 HARD_CONTACT_GRID = 0.15
 """Grid (m) for a hard contact."""
 HARD_CONTACT_ERROR = 20
@@ -54,6 +66,8 @@ HARD_CONTACT_MEAN_ERROR = 5
 in a different order on a different grid."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) above which the grid must resolve the waves that they excite."""
+DEEP_GRID = 0.125
+"""Finest grid (m) for them, unless clamps are heavy."""
 NODES_PER_WAVE = 4
 """Nodes per wave that runs ahead of the train at the rate at which it passes deep wear waves. With two, the
 contact loss at every wear wave was wrong by up to 6 points of 29."""
@@ -72,6 +86,13 @@ one, on a coarser grid if necessary."""
 FAST_SAMPLES_PER_WAVE = 3
 
 
+class Required(NamedTuple):
+    """The coarsest discretisation that is fine enough."""
+
+    spacing: float  # of the grid, at most (m)
+    time_step: float  # at most (s)
+
+
 class Resolution(NamedTuple):
     """Discretisation of a line."""
 
@@ -83,7 +104,8 @@ class Resolution(NamedTuple):
 def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Resolution:
     """Grid, time step and window: the given ones, or those for the accuracy, stable together.
 
-    Warns where they are coarser than required for figures within 1 %. Raises InputError where grid and step
+    Warns where they are coarser than required for figures within the bounds that ``fine_enough`` states, and
+    where no default is fine enough. Raises InputError where grid and step
     are not stable together, or waves of the wire are too short for the step.
     """
     fast = numerics.accuracy == "fast"
@@ -92,6 +114,7 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
     runs.check_wave(found.time_step)
     if not fast:
         _warn_if_coarse(data, found, required, runs)
+        _warn_if_not_carried(data, found, required, runs)
     if runs.hard_contact:
         warnings.warn(
             f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
@@ -113,8 +136,13 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
     return found
 
 
-def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
-    """The coarsest grid and the longest step, stable or not, that give figures within 1 % of converged."""
+def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
+    """The coarsest grid and the longest step, stable or not, that give figures within these bounds.
+
+    Beside a grid of 0.05 m sigma is within 1 %, maximum and minimum within 1 % of the mean force, up to 70 %
+    of the wave speed; beyond it within 1.5 and 2.5 %. Contact loss is within 0.5 points (``panto validate
+    --lines``).
+    """
     slow, quick = runs.speeds
     wave_speed = data.contact_wire.wave_speed
     spacing, longest = next((fine for share, *fine in GRIDS if quick <= share * wave_speed), GRIDS[-1][1:])
@@ -122,16 +150,20 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
     if deep:
         ahead = min(deep) * (wave_speed - quick) / quick
-        spacing = min(spacing, max(ahead / NODES_PER_WAVE, GRIDS[-1][1]))
+        spacing = min(spacing, max(ahead / NODES_PER_WAVE, DEEP_GRID))
         if data.droppers.contact_clamp_mass > HEAVY_CLAMP:
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
+    if slow < LIMP_BELOW:
+        wire = data.contact_wire
+        spacing = min(spacing, max(math.sqrt(wire.bending_stiffness / wire.tension) / LIMP_NODES, LIMP_GRID))
+    spacing = min(spacing, max(carrying_grid(data, quick), FINEST_GRID))
     grid, step = _by_clamps(data)
     spacing, longest = min(spacing, grid), min(longest, step)
     grid, step = next(fine for speed, *fine in SLOW if slow < speed)
     longest = min(longest, step, runs.wave_step(SAMPLES_PER_WAVE))
-    return Resolution(min(spacing, grid), longest, WINDOW["full"])
+    return Required(min(spacing, grid), longest)
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
@@ -141,7 +173,7 @@ def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
     return grid, step
 
 
-def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
+def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
     longer, shorter = FAST_STEPS
     slow, quick = runs.speeds
     wave_speed = data.contact_wire.wave_speed
@@ -152,20 +184,7 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
     spacing = min(spacing, 2 * _by_clamps(data)[0])
     grid = data.span_length / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer, _lightest(runs)) else shorter
-    return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)), WINDOW["fast"])
-
-
-def _window(numerics: Numerics, runs: Runs, usual: int) -> int:
-    """Spans computed about the train. Raises InputError for a window where the wire itself has defects."""
-    whole = any(condition.hard_spots or condition.worn_stretches for condition in runs.conditions)
-    if whole and numerics.window:
-        raise InputError(
-            "A line with hard_spots or worn_stretches is computed as a whole, not in a window that travels "
-            f"with the train: leave out window={numerics.window}, or set it to 0."
-        )
-    if numerics.window is not None:
-        return numerics.window
-    return 0 if whole else usual
+    return Required(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
 
 
 def _lightest(runs: Runs) -> float:
@@ -174,10 +193,10 @@ def _lightest(runs: Runs) -> float:
     return 1 - max(worn, default=0.0)
 
 
-def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Resolution) -> Resolution:
+def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.span_length, numerics.spacing
-    window, lightest = _window(numerics, runs, required.window), _lightest(runs)
+    window, lightest = window_of(data.wires, numerics, runs), _lightest(runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(required.time_step)
@@ -196,7 +215,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
 
 
-def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Resolution, runs: Runs) -> None:
+def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:
     """Warn of the expected error: third order in the grid and second order in the step, from 1 % on."""
     grid, step = found.spacing / required.spacing, found.time_step / required.time_step
     if max(grid, step) < 1.01:
@@ -209,6 +228,24 @@ def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Res
         f"line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
         f"{1e3 * required.time_step:.3g} ms): "
         f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
+        AccuracyWarning,
+        stacklevel=2,
+    )
+
+
+def _warn_if_not_carried(
+    data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs
+) -> None:
+    """Warn where a grid as fine as required does not carry the waves ahead of the fastest train."""
+    carrying, quick = carrying_grid(data, runs.speeds[1]), runs.speeds[1]
+    if found.spacing <= REACH * carrying or found.spacing > 1.01 * required.spacing:
+        return
+    force, loss = NOT_CARRIED
+    warnings.warn(
+        f"At {to_kmh(quick):.0f} km/h, {100 * quick / data.contact_wire.wave_speed:.0f} % of the wave speed, "
+        f"the waves ahead of a train need a grid of {carrying:.2g} m on line '{data.name}'; on the "
+        f"{found.spacing:.3g} m in use standard deviation, maximum and minimum may be wrong by up to about "
+        f"{force} %, the contact-loss ratio by {loss} points. Give a smaller spacing.",
         AccuracyWarning,
         stacklevel=2,
     )

@@ -10,7 +10,9 @@ from pydantic import Field, model_validator
 from ....base.explanation import comma_hint
 from ....base.ranges import Between
 from ....base.settings import Settings
+from ...numerics import Numerics, Runs
 from ..schema import LONGEST_SPAN, CatenaryData, Wire
+from .window import clear_spans, warn_if_short
 
 CLOSEST = 0.1
 """Least distance between two droppers, or between one and a support (m)."""
@@ -89,6 +91,19 @@ class FlexibleCatenaryData(CatenaryData):
     support: Support
     steady_arm: SteadyArm
     damping: Rayleigh
+
+    @property
+    def wires(self) -> tuple[Wire, Wire]:
+        """Contact wire and messenger."""
+        return self.contact_wire, self.messenger_wire
+
+    def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
+        """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
+        return clear_spans(self.wires, numerics, runs, last)
+
+    def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
+        """Warn where a given window costs more than 1 % of the figures."""
+        warn_if_short(self.wires, numerics, runs)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.

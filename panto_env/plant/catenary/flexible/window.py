@@ -1,0 +1,82 @@
+"""Spans of a line that a run needs: about the train, and beyond the end of its pass.
+
+What a line sends back from beyond the window is missing. Waves come back from the farther, the slower the
+train is, and first along the faster wire; so the share of that wire's wave speed decides how many spans are
+enough. A whole line has an anchor at its far end, which reflects waves too: a line is long enough if the
+train meets none of them before its pass ends.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+from ....base.errors import AccuracyWarning, InputError
+from ....base.units import to_kmh
+from ...numerics import WINDOW, Numerics, Runs
+from ..schema import CLEAR, MOST_SPANS, Wire
+
+ENOUGH = ((0.4, 24), (0.65, 16), (1.0, 8))
+"""Up to a share of the faster wire's wave speed: spans about the train that make figures as of an endless
+line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (docs/validation.md)."""
+ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
+"""From a number of spans on: error (%) of figures where more are needed."""
+
+
+def enough_spans(wires: tuple[Wire, Wire], runs: Runs) -> int:
+    """Spans about the slowest train that are enough for figures of an endless line."""
+    share = runs.speeds[0] / max(wire.wave_speed for wire in wires)
+    return next((spans for limit, spans in ENOUGH if share <= limit), ENOUGH[-1][1])
+
+
+def window_of(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs) -> int:
+    """Spans computed about the train; 0: the whole line.
+
+    Raises InputError for a given window where the wire itself has defects.
+    """
+    whole = any(condition.hard_spots or condition.worn_stretches for condition in runs.conditions)
+    if whole and numerics.window:
+        raise InputError(
+            "A line with hard_spots or worn_stretches is computed as a whole, not in a window that travels "
+            f"with the train: leave out window={numerics.window}, or set it to 0."
+        )
+    if numerics.window is not None or whole:
+        return numerics.window or 0
+    usual = WINDOW[numerics.accuracy]
+    return max(usual, enough_spans(wires, runs)) if numerics.accuracy == "full" else usual
+
+
+def clear_spans(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, last: int) -> int:
+    """Spans of a line beyond the ``last`` one of a pass that keep its far anchor's waves from the train.
+
+    Waves and the train leave the line's start together. Raises InputError where a whole line would be too
+    long.
+    """
+    window = window_of(wires, numerics, runs)
+    if window:
+        return max(CLEAR, window // 2)
+    speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
+    if not 0 < speed < math.inf:
+        return CLEAR  # refused later, in better words
+    needed = math.ceil(last * (fastest + speed) / (2 * speed))
+    if needed > MOST_SPANS:
+        raise InputError(
+            f"At {to_kmh(speed):.3g} km/h waves from a whole line's far anchor would meet the train unless "
+            f"the line had {needed:,} spans, but {MOST_SPANS:,} are the maximum; leave out window=0, or give "
+            "spans."
+        )
+    return max(CLEAR, needed - last)
+
+
+def warn_if_short(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs) -> None:
+    """Warn where a given window costs more than 1 % of the figures."""
+    window, enough = numerics.window, enough_spans(wires, runs)
+    if numerics.accuracy == "full" and window and window < enough:
+        error = next(percent for spans, percent in ERRORS if window >= spans)
+        warnings.warn(
+            f"A window of {window} spans is too short at {to_kmh(runs.speeds[0]):.0f} km/h, where "
+            f"{enough} are needed: standard deviation, maximum and minimum may be wrong by up to about "
+            f"{error} %; leave out window.",
+            AccuracyWarning,
+            stacklevel=4,
+        )
