@@ -14,7 +14,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
@@ -41,6 +40,7 @@ class Wave(NamedTuple):
 
 def wave_ahead(wire: Wire, speed: float, frequency: float) -> Wave:
     """The wave that a train below the wave speed sends ahead at a frequency (Hz); speed: m/s."""
+    from scipy.optimize import brentq  # slow to import
 
     def omega(k: float) -> float:
         return math.sqrt((wire.tension * k**2 + wire.bending_stiffness * k**4) / wire.mass)
