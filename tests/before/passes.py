@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from renamed import pantograph_named
 from single import BROKEN, LATE, MISCUT, SCATTER, WEAR
 from tape import Tape
 
@@ -119,17 +120,17 @@ def _add(tape: Tape, name: str, run: Trajectory) -> None:
 
 def _every_pantograph(line: str, tape: Tape) -> None:
     for pantograph in PANTOGRAPHS:
-        _add(tape, pantograph, simulate(line, pantograph, LINES[line]))
+        _add(tape, pantograph, simulate(line, pantograph_named(pantograph), LINES[line]))
 
 
 def _rig(rig: str, tape: Tape) -> None:
     pantograph, speed = RIGS[rig]
-    tape.add("run", simulate(rig, pantograph, speed, distance=400.0))
+    tape.add("run", simulate(rig, pantograph_named(pantograph), speed, distance=400.0))
 
 
 def _policy(title: str, policy: str, tape: Tape) -> None:
     line, pantograph, speed, settings = PLACES[title]
-    _add(tape, "run", simulate(line, pantograph, speed, policy, seed=4, **settings))
+    _add(tape, "run", simulate(line, pantograph_named(pantograph), speed, policy, seed=4, **settings))
 
 
 def _settings(settings: dict[str, Any], tape: Tape) -> None:

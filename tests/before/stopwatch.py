@@ -17,6 +17,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
+from renamed import pantograph_named
 
 Chunk = Callable[[], NDArray[np.float64]]
 """Runs the work; the seconds that it took, by the clock and of the processor (all threads together)."""
@@ -126,7 +127,7 @@ def _rows() -> dict[str, Row]:
         ("periodic-stiffness", "three-mass", 10),
         ("ohl-three-span", "own-two-mass", 2),
     ):
-        prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph)
+        prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph_named(pantograph))
         found[f"simulate, {line}"] = Row("passes/s", passes, prepare)
     for name, count in (
         ("Pantograph-v0", 4000),
