@@ -278,9 +278,10 @@ def test_unstable_step_is_refused(spacing):
 
 
 def test_irregularity_reaches_the_contact_force():
+    uneven = {"irregularity": 1.0, "wear_depth": 0.3e-3}
     new, worn, other = (
         simulate(line_condition=condition, seed=seed, time_step=1e-3, record_droppers=False)
-        for condition, seed in (("new", 0), ("worn", 0), ("worn", 1))
+        for condition, seed in (("new", 0), (uneven, 0), (uneven, 1))
     )
     assert 2 < (worn.contact_force - new.contact_force).std() < 20
     assert other.contact_force[-1] != worn.contact_force[-1]
