@@ -64,7 +64,7 @@ def bound(motion, names, settings=PLAIN):
 
 def test_names_are_those_of_the_chain():
     keys = ("masses", "stiffnesses", "dampings")
-    assert parameter_names(TRUE) == tuple(f"{key}.{place}" for key in keys for place in (0, 1))
+    assert parameter_names(TRUE) == tuple(f"{key}.{place}" for key in keys for place in (1, 2))
     assert frame_parameters(TRUE) == parameter_names(TRUE)[1:]
     assert "dampings.1" not in parameter_names(load_pantograph("dsa380"))  # it is 0: there is no logarithm
     other = changed(TRUE, {"masses.2": 20.0, "masses.1": 9.0, "dampings.2": 1.0})
