@@ -123,7 +123,7 @@ def test_the_extended_filter_finds_what_it_can_and_says_how_well(motion):
 
 def value(name):
     key, place = name.split(".")
-    return getattr(TRUE, key)[int(place)]
+    return getattr(TRUE, key)[int(place) - 1]
 
 
 def test_a_wrong_lift_scales_all_parameters_alike(motion):
