@@ -105,7 +105,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
         for name in names:
             value = entry
             for part in name.split(".")[1:]:
-                value = value[int(part)] if part.isdigit() else getattr(value, part)
+                value = value[int(part) - 1] if part.isdigit() else getattr(value, part)
             if isinstance(value, int | float):
                 assert change(entry, name, value) == entry
     assert "pantograph.contact_stiffness" in parameter_names(load_pantograph("three-mass"), "pantograph")

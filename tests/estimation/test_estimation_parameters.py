@@ -65,7 +65,7 @@ def bound(motion, names, settings=PLAIN):
 
 def test_names_are_those_of_the_chain():
     keys = ("masses", "stiffnesses", "dampings")
-    assert parameter_names(TRUE) == tuple(f"{key}.{place}" for key in keys for place in (0, 1))
+    assert parameter_names(TRUE) == tuple(f"{key}.{place}" for key in keys for place in (1, 2))
     assert frame_parameters(TRUE) == parameter_names(TRUE)[1:]
     assert "dampings.1" not in parameter_names(load_pantograph("dsa380"))  # it is 0: there is no logarithm
     other = changed(TRUE, {"masses.2": 20.0, "masses.1": 9.0, "dampings.2": 1.0})
@@ -124,7 +124,7 @@ def test_the_extended_filter_finds_what_it_can_and_says_how_well(motion):
 
 def value(name):
     key, place = name.split(".")
-    return getattr(TRUE, key)[int(place)]
+    return getattr(TRUE, key)[int(place) - 1]
 
 
 def test_a_wrong_lift_scales_all_parameters_alike(motion):
