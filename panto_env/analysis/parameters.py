@@ -75,7 +75,7 @@ def change(entry: S, name: str, value: float) -> S:
         return _checked(entry, _put(entry.model_dump(), path, value))
     except ValidationError as error:
         found = complaints(error, type(entry))
-        words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found)
+        words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found if c)
         raise InputError(f"{name} cannot be {value:g}: {'; '.join(words)}.") from error
     except InputError as error:
         raise InputError(f"{name} cannot be {value:g}: {error}") from error

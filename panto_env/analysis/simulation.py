@@ -55,6 +55,8 @@ def simulate(
     check_arguments(settings, RunSettings, "simulate")
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed must be a whole number from 0 up, not {shown(seed)}.")
+    if not isinstance(record_droppers, bool):
+        raise InputError(f"record_droppers must be True or False, not {shown(record_droppers)}.")
     driver = None if policy is None else find_policy(policy)
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(driver) | settings

@@ -12,7 +12,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from .checksums import with_checksum, without_checksum
-from .files import write_whole
+from .files import check_regular, write_whole
 
 KEY = "panto_env"
 """Key of the file's metadata that holds the table as JSON."""
@@ -34,6 +34,7 @@ def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any
     Raises OSError where the file cannot be read, and ValueError, with the reason as a clause, where it is
     damaged or was written by something else.
     """
+    check_regular(path)
     try:
         with safe_open(path, "np") as file:
             metadata = file.metadata() or {}

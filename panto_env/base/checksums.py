@@ -15,7 +15,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .files import write_whole
+from .files import check_nesting, check_regular, write_whole
 
 CHECKSUM = "sha256"
 """Key of the checksum in the table."""
@@ -40,6 +40,10 @@ def with_checksum(table: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]] =
 def without_checksum(table: Any, arrays: Mapping[str, NDArray[Any]] = NO_ARRAYS) -> dict[str, Any]:
     """The table without its checksum. Raises ValueError where the checksum is missing or does not fit."""
     if isinstance(table, dict):
+        try:
+            check_nesting(table)
+        except RecursionError as error:
+            raise ValueError("it is nested too deeply") from error
         rest = {key: value for key, value in table.items() if key != CHECKSUM}
         if table.get(CHECKSUM) == checksum(rest, arrays):
             return rest
@@ -54,6 +58,7 @@ def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:
 
 def read_checked(path: str | Path) -> dict[str, Any]:
     """The table of a file of ``write_checked``. Raises InputError where it cannot be read or is damaged."""
+    check_regular(path)
     try:
         return without_checksum(json.loads(Path(path).read_text(encoding="utf-8")))
     except FileNotFoundError as error:

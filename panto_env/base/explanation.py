@@ -44,7 +44,7 @@ def explain(error: ValidationError, kind: type[BaseModel]) -> str:
     """One clause per wrong key of a table of ``kind``; of many only the first ones, and their number."""
     clauses = []
     found = complaints(error, kind)
-    for key, words, given, clause in found[:MOST]:
+    for key, words, given, clause in filter(None, found):
         place = "" if not key else f"key '{key}': " if clause else f"key '{key}' "
         clauses.append(f"{place}{words}{f' (given: {given})' if given else ''}")
     more = len(found) - len(clauses)
@@ -52,24 +52,31 @@ def explain(error: ValidationError, kind: type[BaseModel]) -> str:
 
 
 def sentence(error: ValidationError, kind: type[BaseModel]) -> str:
-    """All errors in keyword arguments, as one sentence without its full stop."""
+    """Errors in keyword arguments, the first ones of many, as one sentence without its full stop."""
     clauses = []
-    for key, words, given, clause in complaints(error, kind):
+    for key, words, given, clause in filter(None, complaints(error, kind)):
         clauses.append(words if clause else f"{key} {words}{f', not {given}' if given else ''}")
     return "; ".join(clauses)
 
 
-def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint]:
-    """One complaint per key; errors of the alternatives of a union are joined."""
-    found: dict[str, Complaint] = {}
+def complaints(error: ValidationError, kind: type[BaseModel]) -> list[Complaint | None]:
+    """One complaint per key; errors of the alternatives of a union are joined.
+
+    None for keys beyond the first ``MOST``: a file may hold thousands, and the nearest known name takes time.
+    """
+    found: dict[str, Complaint | None] = {}
     for problem in error.errors():
         if problem["type"] == "too_short" and len(problem["input"]) and len(error.errors()) > 1:
             continue  # wrong entries are not counted, but explained by their own errors
+        key = ".".join(map(str, _place(problem, kind)[0]))
+        before = found.get(key)
+        if before is None and len(found) >= MOST:
+            found[key] = None
+            continue
         one = _complaint(problem, kind)
-        before = found.get(one.key)
         if before is not None:
             one = before._replace(words=f"{before.words} or {one.words.removeprefix('must be ')}")
-        found[one.key] = one
+        found[key] = one
     return list(found.values())
 
 

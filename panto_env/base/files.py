@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import stat
 import tempfile
 import tomllib
@@ -160,11 +161,42 @@ def write_rows(rows: list[dict[str, Any]], path: str | Path) -> None:
             write_table(table, temporary, write_page_checksum=True)
 
 
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """The table of a TOML file. Raises InputError, naming the file, where it cannot be read."""
+def check_regular(path: str | Path) -> None:
+    """Raise InputError where a file to be read is a device, a pipe or a socket: reading might never end."""
     check_path(path)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        mode = os.stat(path).st_mode
+    except OSError:  # reading it says why
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise InputError(
+            f"{path} could not be read: it is not a regular file, but a device, a pipe or a socket."
+        )
+
+
+LARGEST = 20_000_000
+"""Maximum bytes of a TOML file; those of people have some thousands."""
+DEEPEST = 32
+"""Maximum levels of tables and lists within each other; settings have five."""
+MOST_KEYS = 20_000
+"""Maximum keys in all tables of a TOML file: a line of a thousand spans has some thousands."""
+# A key of more parts; possessive, so that no text makes it slow.
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEEPEST}}}", re.ASCII)
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The table of a TOML file. Raises InputError, naming the file, where it cannot be read."""
+    check_regular(path)
+    try:
+        if os.stat(path).st_size > LARGEST:
+            raise ValueError(f"it has more than {LARGEST / 1e6:g} MB")
+        text = Path(path).read_text(encoding="utf-8")
+        if _DEEP_KEY.search(text):
+            raise RecursionError
+        table = tomllib.loads(text)
+        check_nesting(table, MOST_KEYS)
+        return table
     except FileNotFoundError as error:
         raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
     except OSError as error:
@@ -175,6 +207,28 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path} is not valid TOML: it is nested too deeply; correct the file.") from error
     except ValueError as error:  # TOML's own, and for whole numbers with thousands of digits
         raise InputError(f"{path} is not valid TOML: {error}; correct the file.") from error
+
+
+def check_nesting(table: Any, most_keys: float = math.inf) -> None:
+    """Raise RecursionError for tables nested too deeply, ValueError for more keys than ``most_keys``.
+
+    What is read of a file goes through functions that call themselves for each level.
+    """
+    level, keys = [table], 0
+    for _ in range(DEEPEST + 1):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, Mapping):
+                keys += len(value)
+                below += value.values()
+            elif isinstance(value, list):
+                below += value
+        level = [value for value in below if isinstance(value, Mapping | list)]
+        if keys > most_keys:
+            raise ValueError(f"it has more than {most_keys:,} keys")
+        if not level:
+            return
+    raise RecursionError
 
 
 def finite(value: Any) -> Any:

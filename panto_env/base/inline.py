@@ -8,11 +8,14 @@ from typing import Any
 
 from .errors import InputError
 
+TRUTH = {"true": True, "false": False}
+"""As TOML writes them; Python's own are literals."""
 OPENING, CLOSING, QUOTES = "([{", ")]}", "'\""
 
 
 def parse_inline(text: str) -> dict[str, Any]:
-    """Values by name from "name=value,name=value"; a value is a Python literal, or else a word.
+    """Values by name from "name=value,name=value"; a value is a Python literal, true or false, or else
+    a word.
 
     Commas within brackets and quotes belong to a value. Raises InputError where a part has no "=", or a
     name occurs twice.
@@ -25,10 +28,14 @@ def parse_inline(text: str) -> dict[str, Any]:
             raise InputError(f"'{part}' must read name=value.")
         if name in values:
             raise InputError(f"'{name}' is given twice.")
+        word = value.strip()
+        if word in TRUTH:
+            values[name] = TRUTH[word]
+            continue
         try:
-            values[name] = ast.literal_eval(value.strip())
+            values[name] = ast.literal_eval(word)
         except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):  # not a literal
-            values[name] = value.strip()
+            values[name] = word
     return values
 
 

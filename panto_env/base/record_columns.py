@@ -12,6 +12,7 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError
+from .files import check_regular
 from .names import suggest
 
 JITTER = 0.05
@@ -79,6 +80,7 @@ def equal_step(time: Array, minimum: int, purpose: str) -> float:
 
 def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
     """Numbered lines as cells, the header first."""
+    check_regular(path)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from .errors import InputError
 from .explanation import explain
@@ -16,21 +17,45 @@ from .names import suggest
 from .shown import shown
 
 
-def _number(value: Any) -> Any:
+def _number(value: Any, kind: str) -> Any:
     """The value, unless it is text or a truth value, which pydantic would accept as a number."""
     if isinstance(value, str | bytes | bool):
-        raise PydanticCustomError("float_type", "must be a number")
+        raise PydanticCustomError(f"{kind}_type", "must be a number")
     return value
 
 
-Positive = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, BeforeValidator(_number), Field(ge=0, allow_inf_nan=False)]
+def _exact(schema: Any) -> Any:
+    """A schema of pydantic, or part of one, whose numbers and truth values take nothing else."""
+    if isinstance(schema, list):
+        return [_exact(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    inner = {key: value if key in _NO_SCHEMAS else _exact(value) for key, value in schema.items()}
+    match inner.get("type"):
+        case "bool":
+            return inner | {"strict": True}
+        case "int" | "float" as kind:
+            return core_schema.no_info_before_validator_function(partial(_number, kind=kind), inner)
+    return inner
+
+
+_NO_SCHEMAS = ("default", "expected", "metadata", "serialization")
+"""Keys of a schema that hold values."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Settings(BaseModel):
     """Frozen, validated data; an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The usual schema, in which text is no number and no truth value, and a truth value no number."""
+        schema: CoreSchema = _exact(handler(source))
+        return schema
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         """Itself: frozen data need no copy, and a copy of an environment should be quick."""

@@ -21,6 +21,7 @@ from .description import described
 from .episodes import Episodes, with_longest_episode
 from .infos import CONTACT_FORCE, FIGURES_TO_COME, final_figures, first_info
 from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
+from .reset_arguments import checked_options, checked_seed
 from .settings import EnvironmentSettings, render_metadata
 
 if TYPE_CHECKING:
@@ -159,9 +160,13 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; ``options`` are arguments of the class, only for this episode."""
-        episodes = self._usual.with_options(options or {})
-        super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed)
+        """Start an episode; ``options`` are arguments of the class, only for this episode.
+
+        Raises InputError, and changes nothing, where seed or options are not valid.
+        """
+        seed = checked_seed(seed)
+        episodes = self._usual.with_options(checked_options(options))
+        super().reset(seed=seed)
         task = episodes.draw(lambda: self.np_random)
         if task is not self.task:
             self._watch(task)

@@ -27,6 +27,7 @@ from .groups import lanes_of
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
 from .one_thread import CopiedAlone, InUse, one_at_a_time
+from .reset_arguments import checked_options, checked_seeds
 from .settings import VectorSettings, render_metadata
 from .stable_baselines import NamedToStableBaselines
 
@@ -134,11 +135,11 @@ class PantographVectorEnv(
         seed: of lane 0, and seed + i for lane i; or one per lane. Other options are arguments of the class,
         only for these episodes. Raises InputError, and changes nothing, where one is not valid.
         """
-        options = dict(options or {})
+        seeds, options = checked_seeds(seed, self.num_envs), checked_options(options)
         mask = self._mask(options.pop("reset_mask", None))
         lanes = self._all if mask is None else mask
         episodes = self._lanes.episodes_with(options)
-        self._seed(lanes, seed)
+        self._seed(lanes, seeds)
         self._begin(lanes, episodes, anew=mask is None or seed is not None)
         self._running = True
         answer = self._lanes.answer()
@@ -253,11 +254,8 @@ class PantographVectorEnv(
         lanes: Flags = mask.copy()
         return lanes
 
-    def _seed(self, lanes: Flags, seed: int | Sequence[int | None] | None) -> None:
+    def _seed(self, lanes: Flags, seeds: Sequence[int | None]) -> None:
         """Seed the marked lanes; a lane without a given seed keeps its generator if it has one."""
-        seeds = self._lane_seeds(seed)
-        for wrong in (each for each in seeds if each is not None and each < 0):
-            seeding.np_random(wrong)  # raises Gymnasium's own error
         for lane in np.flatnonzero(lanes).tolist():
             if seeds[lane] is not None or lane not in self._seeds:
                 self._seeds[lane] = seeds[lane]
@@ -268,12 +266,3 @@ class PantographVectorEnv(
         if lane not in self._random:
             self._random[lane], self._seeds[lane] = seeding.np_random(self._seeds.get(lane))
         return self._random[lane]
-
-    def _lane_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + lane for lane in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise InputError(f"seed must be a number or one per lane, {self.num_envs}, not {len(seed)}.")
-        return [None if each is None else int(each) for each in seed]

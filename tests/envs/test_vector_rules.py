@@ -133,7 +133,7 @@ def test_lanes_are_seeded_as_gymnasium_seeds_them(kind):
 def test_a_bad_seed_changes_nothing():
     envs = native("PantographStiffness-v0")
     envs.reset(seed=1)
-    with pytest.raises(gymnasium.error.Error, match="Seed must be"):
+    with pytest.raises(InputError, match="seed must be a whole number from 0 up, or a list of 3 such"):
         envs.reset(seed=[4, -1, 4])
     assert envs.np_random_seed == (1, 2, 3)
 
