@@ -76,10 +76,10 @@ HARM = {
 
 
 def refused(read, path, limit=20.0):
-    begin = time.perf_counter()
+    begin = time.process_time()  # whatever else the machine does
     with pytest.raises(InputError) as caught:
         read(path)
-    assert time.perf_counter() - begin < limit
+    assert time.process_time() - begin < limit
     message = str(caught.value)
     assert "\n" not in message
     assert len(message) < 1500
