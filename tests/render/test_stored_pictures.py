@@ -6,23 +6,28 @@ python -m tests.render.test_stored_pictures   # writes stored/*.png anew
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-cv2 = pytest.importorskip("cv2", reason="the extra 'render' is not installed")
-
 from panto_env.analysis.plots import plot_forces, plot_run
 from panto_env.analysis.sweep_plots import plot_sweep
-from panto_env.render.picture import Picture
 
 from ..metrics.test_summary import RUN
+
+pytest.importorskip("cv2", reason="the extra 'render' is not installed")
+
+import cv2
+
+from panto_env.render.picture import Picture
+
 from .test_render import driven, moment
 
 STORED = Path(__file__).with_name("stored")
 SLIGHT = 40
-"""Difference of a pixel's colour, of 255, that another processor's rounding may make at the edge of a line."""
+"""Difference of a pixel's colour, of 255, that another processor's rounding may make at a line's edge."""
 BOTH = {"actuator": {"place": "both"}, "steps": 400, "action": 0.6}
 FRAMES = {
     "flexible": {"catenary": "en50318-2002", "line_condition": {"broken_droppers": [(6, 3), (6, 4)]}} | BOTH,
@@ -46,12 +51,7 @@ def pixels(figure):
 
 def rows():
     """A sweep over two parameters whose figures are made up."""
-    for k, (speed, mass, policy) in enumerate(
-        (speed, mass, policy)
-        for policy in ("passive", "pd")
-        for speed in (200.0, 300.0)
-        for mass in (5.0, 7.0)
-    ):
+    for k, (policy, speed, mass) in enumerate(product(("passive", "pd"), (200.0, 300.0), (5.0, 7.0))):
         figures = {"mean": 120.0 + k, "std": 20.0 + 3 * k, "max": 180.0 + 9 * k, "min": 60.0 - 5 * k}
         figures |= {"statistical_max": 190.0 + 9 * k, "statistical_min": 50.0 - 6 * k}
         figures |= {"max_uplift": 0.04 + 0.003 * k, "contact_loss": 0.1 * k}
