@@ -119,8 +119,8 @@ def test_an_output_that_can_t_be_written_is_refused_before_the_work(option, trou
 def outputs(command, words=()):
     """Options and arguments of a command, and of those in its group, that name something to write."""
     if isinstance(command, typer.core.TyperGroup):
-        for name, each in command.commands.items():
-            yield from outputs(each, (*words, name))
+        for name in command.list_commands(None):
+            yield from outputs(command.get_command(None, name), (*words, name))
         return
     for parameter in command.params:
         if parameter.name in ("output", "plot", "html"):

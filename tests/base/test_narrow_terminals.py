@@ -25,6 +25,12 @@ COMMANDS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def console_without_a_width(monkeypatch):
+    """A worker of pytest has COLUMNS from its start, which the console would keep."""
+    monkeypatch.setattr("panto_env.terminal.console._width", None)
+
+
 def printed(table, width):
     console = PlainConsole(width=width)
     with console.capture() as text:

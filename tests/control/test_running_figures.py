@@ -30,7 +30,7 @@ def play(env, act):
 
 
 def same(figures, run):
-    expected = {k: math.inf if math.isnan(v) else v for k, v in run.summary("all").as_dict().items()}
+    expected = {k: v for k, v in run.summary("all").as_dict().items() if not math.isnan(v)}
     return figures == pytest.approx(expected, rel=1e-9)
 
 

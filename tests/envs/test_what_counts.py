@@ -54,7 +54,7 @@ def test_figures_and_reward_are_of_what_comes_after_settle(name, more):
     total = sum(each["cost_function"] for each in terms)
     assert figures["cost_function"] == pytest.approx(total)  # from the nominal force, both
     ways = np.diff(run.position[first - 1 :])
-    deviation = np.abs(run.contact_force[first - 1 :] - run.nominal_force)
+    deviation = np.abs(run.contact_force[first - 1 :] - run.lift[first - 1 :])
     by_hand = np.sum(0.5 * (deviation[1:] + deviation[:-1]) * ways)
     assert total == pytest.approx(by_hand, rel=1e-3)
 

@@ -30,7 +30,7 @@ def test_an_episode_that_is_no_longer_finite_ends(name, row, value):
     assert np.isfinite(reward)
     assert reward < -1.0  # it does not pay
     assert all(np.isfinite(each) for each in info["reward_terms"].values())
-    assert set(info["figures"].values()) == {np.inf}
+    assert info["figures"] == {}  # it has none
     assert "the computation diverged" in task.ending(0)
     with pytest.raises(InputError, match="diverged"):
         task.figures(0)
@@ -53,7 +53,7 @@ def test_the_other_lanes_go_on(name):
         assert np.isfinite(ours).all()
         np.testing.assert_array_equal(ours[others], usual[others])
     assert told[2].tolist() == [False, False, True, False, False]
-    assert told[4]["figures"]["std"][2] == np.inf
+    assert "std" not in told[4].get("figures", {})
 
 
 def changed(**values):

@@ -41,7 +41,7 @@ def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch
     validate.validate(convergence=True, wear=True)
     printed = capsys.readouterr().out
     assert row_of(printed, "300")[1:5] == ["0.3", "1.25", "16", "single"]
-    assert row_of(printed, "0.8")[1:5] == ["0.3", "0.3", "1.11", "8.6"]
+    assert row_of(printed, "0.8")[1:5] == ["0.5", "0.3", "1.11", "8.6"]
 
 
 def test_json_holds_the_same_tables(short, capsys):

@@ -89,7 +89,7 @@ def test_what_is_shown_is_what_the_run_has():
 
 
 def test_lost_contact_is_marked():
-    task = driven(200, catenary="shinkansen-simple", line_condition="worn", speed_kmh=300.0)
+    task = driven(200, catenary="shinkansen-simple", line_condition="new", speed_kmh=300.0)
     calm = text(Strip(task, "passive")).splitlines()[3 + FORCE_ROWS]
     view = Strip(task, "passive")
     view._felt.force[len(view._felt.force) // 2] = 0.0

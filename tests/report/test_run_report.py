@@ -325,7 +325,7 @@ def test_no_table_of_a_printed_report_is_away_from_its_heading(file, tmp_path):
         ("Requirements", "v/c, train over wave"),
         ("Figures", "span slack"),
         ("Contact losses in the evaluated spans", "longest (ms)"),
-        ("Droppers", "slack (% of time)"),
+        ("Droppers", "stretch at rest (mm)"),
         ("Pantograph", "masses"),
         ("What was left out", "EN 50318:2018"),
     ):
