@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -17,6 +17,7 @@ from ..valid_range import FREE_UPLIFT
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 LONGEST_SPAN = 200.0  # m
 """Two and a half times the longest span of usual lines."""
+SpanLength: TypeAlias = Annotated[float, Between(2, LONGEST_SPAN, "m")]
 
 
 def check_span_count(spans: Any) -> int:
@@ -34,9 +35,7 @@ class CatenaryData(Settings):
     kind: str = Field(description="which of CATENARIES it is")
     name: str = Field(description="name in the catalogue")
     description: str = Field(description="what it is and how its open values were chosen")
-    span_length: Annotated[float, Between(2, LONGEST_SPAN, "m")] = Field(
-        description="distance between supports (m)"
-    )
+    span_length: SpanLength = Field(description="distance between supports (m)")
     system: Literal["AC", "DC 1.5 kV", "DC 3 kV"] = Field(
         "AC", description="power supply, by which EN 50367 sets the mean force: AC, DC 1.5 kV or DC 3 kV"
     )

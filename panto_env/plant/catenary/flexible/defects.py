@@ -18,13 +18,12 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, Beams
+from .beams import GRAVITY, HELD, Beams, add_to_band
 from .schema import FlexibleCatenaryData
 from .static import solve
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 
-HELD = 1e18  # N/m, that holds a wire at the anchor
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
@@ -75,9 +74,9 @@ class DefectiveLine:
         lengths = np.tile(np.diff(self.breaks), spans)
         self._unknowns: Any = UNKNOWNS * number[:-1, None] + 2 * CONTACT + [0, 1, 4, 5]
         self._beams = Beams(left.contact_wire, lengths)
-        _add(self._band, self._unknowns, self._beams.stiffness)
+        add_to_band(self._band, self._unknowns, self._beams.stiffness)
         above = Beams(left.messenger_wire, lengths)
-        _add(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
+        add_to_band(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
         self._band[0, masts] += data.steady_arm.stiffness
         self._band[0, masts + 2] += data.support.stiffness
         self._load[masts + 2] = data.support.stiffness * height
@@ -207,10 +206,3 @@ def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) ->
             )
         height[support - 1] = wrong
     return broken, error, height
-
-
-def _add(band: Array, unknowns: Any, stiffness: Array) -> None:
-    """Add the elements' stiffness matrices, (elements, 4, 4), to the lower diagonals of the line's matrix."""
-    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-    lower = row >= column
-    np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ....base.ranges import Between
 from ....base.settings import Settings
+from ...alignment import Alignment
 from ..flexible import FlexibleCatenaryData
 from ..schema import CatenaryData
 from ..three_span import ThreeSpanData
@@ -113,3 +114,7 @@ class RigData(CatenaryData):
             return values
         names = [name for name in CatenaryData.model_fields if name not in ("kind", "name", "description")]
         return {name: known[name] for name in names if name in known} | values
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans of the computed line lie."""
+        return self.line.alignment(spans)
