@@ -129,10 +129,13 @@ def designed(line: ClosedLine) -> LineShape:
     return line.shape(contact, messenger, tension)
 
 
-def built(line: ClosedLine, unloaded: Array, stiffness: Array) -> LineShape:
+def built(
+    line: ClosedLine, unloaded: Array, stiffness: Array, pushed: tuple[int, float] = (0, 0.0)
+) -> LineShape:
     """The shape that droppers of these lengths (m) and stiffnesses (N/m), (n_droppers,), hold the wires in.
 
-    Arms that hold the wire keep it at the support's height.
+    Arms that hold the wire keep it at the support's height. pushed: number of a node of the contact wire, and
+    an upward force there (N).
     """
     lower, weight = line.wire(line.wires[0])
     upper, above_weight = line.wire(line.wires[1])
@@ -148,6 +151,7 @@ def built(line: ClosedLine, unloaded: Array, stiffness: Array) -> LineShape:
     force[2 * line.hung] -= GRAVITY * (half + line.lower)
     force[size + 2 * line.hung] -= GRAVITY * (half + line.upper)
     force += apart.T @ (k * lengths)
+    force[2 * pushed[0]] += pushed[1]
     both = both + apart.T @ sparse.diags_array(k) @ apart
     holding = 2 * line.masts[np.flatnonzero(line.holds)]
     state = np.zeros(2 * size)

@@ -5,6 +5,7 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.catalog import available, load_catenary
+from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import GRAVITY, hang, solve
@@ -143,6 +144,28 @@ def test_a_line_that_cannot_hang_so_is_refused_with_span_and_dropper(sequence, m
     with pytest.raises(InputError, match=message) as caught:
         hang(line)
     assert str(caught.value).count(". ") == 0
+
+
+@pytest.mark.parametrize("changes", [MIXED, BRIDGE], ids=["mixed", "bridge"])
+def test_elasticity_along_the_line_is_that_of_finite_elements(changes):
+    """Of a force so small that every dropper stays taut."""
+    line = line_of("re250", changes)
+    if changes is BRIDGE:  # an arm that holds the wire at rest is no support of it in motion
+        types = BRIDGE["span_types"] | {"stiff": {"support": {"stiffness": 2e6}}}
+        line = line_of("re250", BRIDGE | {"span_types": types})
+    places, yields = elasticity(line, 5.0)
+    supports = np.array(line.alignment().supports)
+    assert places[0] == supports[1]
+    assert places[-1] == supports[-2]
+    shape, closed = solve(line), judged(line, 0.2)
+    droppers = shape.dropper_length, shape.dropper_stiffness
+    rest = judge.built(closed, *droppers)
+    for k in range(100, len(places) - 100, 37):
+        node = int(np.abs(rest.x - places[k]).argmin())
+        lifted = judge.built(closed, *droppers, pushed=(node, 5.0))
+        assert lifted.dropper_tension.min() > 0
+        theirs = (lifted.contact[node] - rest.contact[node]) / 5.0
+        assert np.interp(rest.x[node], places, yields) == pytest.approx(theirs, rel=0.01)
 
 
 def test_trains_do_not_run_on_unlike_spans_yet():
