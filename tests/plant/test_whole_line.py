@@ -5,6 +5,7 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.catalog import available, load_catenary
+from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
@@ -174,3 +175,21 @@ def test_trains_do_not_run_on_unlike_spans_yet():
         with pytest.raises(InputError, match="Trains do not run on line 're250' yet") as caught:
             simulate(line, "dsa380", 200.0, **given)
         assert str(caught.value).count(". ") == 0
+
+
+def test_the_dropper_table_names_every_dropper_of_every_span():
+    line = line_of("re250", MIXED)
+    table, shape = droppers_at_rest(line), solve(line)
+    spans = spans_of(line).each
+    assert [(each.span, each.number) for each in table] == [
+        (k, n) for k, span in enumerate(spans, 1) for n in range(1, len(span.droppers.sag) + 1)
+    ]
+    assert [each.position for each in table] == [x for span in spans for x in span.droppers.positions]
+    assert [each.static_force for each in table] == shape.dropper_tension.tolist()
+    assert [each.length for each in table] == shape.dropper_length.tolist()
+    printed = dropper_table(table)
+    assert printed.headings[:2] == ("span", "dropper")
+    assert [row[0] for row in printed.rows] == [str(each.span) for each in table]
+    uniform = droppers_at_rest(load_catenary("re250"))
+    assert dropper_table(uniform).headings[0] == "dropper"
+    assert [each.length for each in uniform] == solve(load_catenary("re250")).dropper_length.tolist()

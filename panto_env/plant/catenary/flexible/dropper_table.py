@@ -1,0 +1,76 @@
+"""The droppers of one span at rest, or of all spans where they differ: force, length to cut and stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from ....base.table import Table
+from .parts import Span
+from .schema import FlexibleCatenaryData
+from .spans import spans_of
+from .static import hang
+
+HEADINGS = {
+    "position": "from support (m)",
+    "sag": "sag (m)",
+    "length": "length, unloaded (m)",
+    "static_force": "static force (N)",
+    "stretch": "stretch at rest (m)",
+}
+"""Headings of ``RestingDropper``, with units."""
+
+
+class RestingDropper(NamedTuple):
+    """One dropper of a line at rest, as designed."""
+
+    number: int  # from the support, from 1
+    position: float  # from the support (m)
+    sag: float  # of the contact wire below the line from its height at one support to that at the next (m)
+    length: float  # unloaded: to which it is cut (m)
+    static_force: float  # at the contact wire, clamp and half its own weight included (N)
+    stretch: float  # under the static force (m)
+    span: int = 1  # number of its span, from 1; 1 where all are alike
+
+
+def dropper_table(droppers: Sequence[RestingDropper]) -> Table:
+    """The droppers as a table to print, with sag and stretch in millimetres."""
+    differ = any(each.span > 1 for each in droppers)
+    rows = [
+        (
+            *([str(each.span)] if differ else []),
+            str(each.number),
+            f"{each.position:g}" if not differ else f"{each.position:.3f}",
+            f"{1e3 * each.sag:.1f}",
+            f"{each.length:.4f}",
+            f"{each.static_force:.1f}",
+            f"{1e3 * each.stretch:.2f}",
+        )
+        for each in droppers
+    ]
+    in_mm = HEADINGS | {"sag": "sag (mm)", "stretch": "stretch at rest (mm)"}
+    headings = (*(["span"] if differ else []), "dropper", *in_mm.values())
+    title = f"Droppers of {'all spans' if differ else 'a span'} at rest, as designed"
+    last = [k for k, each in enumerate(droppers[1:]) if each.span != droppers[k].span]
+    return Table(title, headings, rows, text_columns=0, section_ends=tuple(last))
+
+
+def droppers_at_rest(line: Any) -> list[RestingDropper]:
+    """The droppers of a span, in order, or of all spans where they differ; none for lines without.
+
+    Raises InputError where the line cannot hang.
+    """
+    line = getattr(line, "line", line)  # of a rig
+    if not isinstance(line, FlexibleCatenaryData):
+        return []
+    shape = hang(line)
+    stretch = shape.dropper_tension / shape.dropper_stiffness
+    rows = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
+    each: Sequence[FlexibleCatenaryData | Span] = spans_of(line).each if line.sequence else [line]
+    return [
+        RestingDropper(number, position, sag, *next(rows), number_of_span)
+        for number_of_span, span in enumerate(each, start=1)
+        for number, (position, sag) in enumerate(
+            zip(span.droppers.positions, span.droppers.sag, strict=True), start=1
+        )
+    ]
