@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,9 @@ class Column:
     units: Mapping[str, float]  # scale to SI by unit
     example: str  # unit for messages
     required: bool = True
+    blank: bool = False  # whether cells may be empty, which are nan
+    usual: str = ""  # unit where the header names none
+    text: bool = False  # whether cells are texts, which have no unit
 
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}
@@ -35,21 +39,32 @@ TIME = Column(("time", "t"), {"s": 1.0, "ms": 1e-3}, "s")
 
 def read_columns(
     path: str | Path, columns: Mapping[str, Column], units: Mapping[str, str] | None = None
-) -> dict[str, Array]:
-    """Columns by name, (n,) each, in SI units.
+) -> dict[str, Any]:
+    """Columns by name, (n,) each, in SI units; lists of texts.
 
     Units are given in the header, as in ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which has
     priority. Other columns are ignored, and so are lines that are empty or begin with #. The separator is a
-    comma, semicolon or tab. Raises InputError, naming line and column, for anything missing or not a number.
+    comma, semicolon or tab. Where it is no comma, and no number has a decimal point, commas are decimal.
+    Raises InputError, naming line and column, for anything missing or not a number.
     """
-    lines = _lines(path)
+    lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
     places = _places(path, header, columns, dict(units or {}))
-    values: dict[str, Array] = {name: np.empty(len(body)) for name in places}
+    used = {place for place, _ in places.values()}
+    points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
+    decimal = "." if separator == "," or points else ","
+    values: dict[str, Any] = {
+        name: [""] * len(body) if columns[name].text else np.empty(len(body)) for name in places
+    }
     for row, (number, cells) in enumerate(body):
         for name, (place, scale) in places.items():
             text = cells[place].strip() if place < len(cells) else ""
-            values[name][row] = scale * _number(text, path, number, name)
+            if columns[name].text:
+                values[name][row] = text
+            elif columns[name].blank and not text:
+                values[name][row] = np.nan
+            else:
+                values[name][row] = scale * _number(text, decimal, path, number, name)
     return values
 
 
@@ -77,8 +92,8 @@ def equal_step(time: Array, minimum: int, purpose: str) -> float:
     return step
 
 
-def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
-    """Numbered lines as cells, the header first."""
+def _lines(path: str | Path) -> tuple[list[tuple[int, list[str]]], str]:
+    """Numbered lines as cells, the header first; and the separator of cells."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -107,7 +122,7 @@ def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
             f"Line {kept[len(rows)][0]} of {path} has a quotation mark without its second one, or a cell "
             "without end; correct or remove such lines."
         ) from error
-    return rows
+    return rows, separator
 
 
 def _places(
@@ -126,7 +141,8 @@ def _places(
             continue
         if name in places:
             raise InputError(f"{path} has column {name} twice; keep one.")
-        places[name] = (place, _scale(path, name, columns[name], units.get(name) or (match[2] or "").strip()))
+        unit = units.get(name) or (match[2] or "").strip() or columns[name].usual
+        places[name] = (place, 1.0 if columns[name].text else _scale(path, name, columns[name], unit))
     missing = [name for name, column in columns.items() if column.required and name not in places]
     if missing:
         names = ", ".join(f"{name} ({column.example})" for name, column in columns.items())
@@ -150,15 +166,15 @@ def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> flo
     return column.units[unit]
 
 
-def _number(text: str, path: str | Path, line: int, name: str) -> float:
+def _number(text: str, decimal: str, path: str | Path, line: int, name: str) -> float:
     try:
-        value = float(text)
+        value = float(text.replace(decimal, "."))
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
         shown = f"holds '{text}'" if text else "is empty"
         raise InputError(
             f"Line {line} of {path}: column {name} {shown}, which is not a finite number; "
-            "correct or remove such lines (decimals need a point, not a comma)."
+            "correct or remove such lines (decimals need a point; or all a comma, with semicolons between)."
         )
     return value

@@ -15,9 +15,9 @@ from ..alignment import Alignment
 from ..valid_range import FREE_UPLIFT
 
 FEWEST_SPANS, MOST_SPANS = 3, 1000
-LONGEST_SPAN = 200.0  # m
+SHORTEST_SPAN, LONGEST_SPAN = 2.0, 200.0  # m
 """Two and a half times the longest span of usual lines."""
-SpanLength: TypeAlias = Annotated[float, Between(2, LONGEST_SPAN, "m")]
+SpanLength: TypeAlias = Annotated[float, Between(SHORTEST_SPAN, LONGEST_SPAN, "m")]
 
 
 def check_span_count(spans: Any) -> int:

@@ -19,7 +19,7 @@ from ....base.names import suggest
 from ....base.ranges import Between
 from ....base.remember import remembered
 from ....base.settings import Settings
-from ..schema import LONGEST_SPAN
+from ..schema import LONGEST_SPAN, SHORTEST_SPAN
 from .parts import CLOSEST, Span
 
 if TYPE_CHECKING:
@@ -72,8 +72,10 @@ def laid_out(droppers: Any, span_length: Any) -> Any:
     rule = {key: droppers[key] for key in Spacing.model_fields if key in droppers}
     if not rule:
         return droppers
-    if not (isinstance(span_length, int | float) and 2 <= span_length <= LONGEST_SPAN):
-        raise InputError("Droppers at a spacing need a span_length, a number from 2 to 200 m.")
+    if not _is_length(span_length):
+        raise InputError(
+            f"Droppers at a spacing need a span_length from {SHORTEST_SPAN:g} to {LONGEST_SPAN:g} m."
+        )
     kept = {key: value for key, value in droppers.items() if key not in rule}
     if "sag" in kept and ("pre_sag" in rule or "positions" not in kept):
         raise InputError("The droppers' sag needs their positions, and no pre_sag beside it.")
@@ -161,13 +163,14 @@ def _droppers(own: Table, changes: Any, span_length: Any) -> Any:
     if not isinstance(changes, Mapping):
         return changes
     old, length = own["droppers"], own["span_length"]
+    if not _is_length(span_length):
+        return old
     kept = dict(old)
     if not changes.keys().isdisjoint({"stiffness", "axial_stiffness"}):
         kept = {key: value for key, value in kept.items() if key not in ("stiffness", "axial_stiffness")}
     table = kept | dict(changes)
-    numbers = isinstance(span_length, int | float)
     placed = changes.keys() & {"positions", "sag", *Spacing.model_fields}
-    if numbers and ("positions" not in placed) and (span_length != length or placed & {"spacing", "first"}):
+    if "positions" not in placed and (span_length != length or placed & {"spacing", "first"}):
         x, sag = old["positions"], old["sag"]
         usual = {
             "spacing": (x[-1] - x[0]) / (len(x) - 1) if len(x) > 1 else length,
@@ -179,10 +182,14 @@ def _droppers(own: Table, changes: Any, span_length: Any) -> Any:
         table = usual | table
     elif "positions" in placed and "sag" not in placed:
         del table["sag"]
-        table = {"pre_sag": max(old["sag"]) * span_length / length if numbers else 0.0} | table
+        table = {"pre_sag": max(old["sag"]) * span_length / length} | table
     elif "pre_sag" in placed:
         del table["sag"]
     return laid_out(table, span_length)
+
+
+def _is_length(value: Any) -> bool:
+    return isinstance(value, int | float) and SHORTEST_SPAN <= value <= LONGEST_SPAN
 
 
 def _valid(schema: type[S], table: Table, where: str) -> S:
