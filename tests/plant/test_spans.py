@@ -1,6 +1,8 @@
 """Lines as sequences of spans: how their TOML is read, and what is refused."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -169,3 +171,15 @@ def test_types_without_a_sequence_are_refused(tmp_path):
     text = FILE + "spans = 8\n" + DROPPERS + "[span_types.long]\n"
     with pytest.raises(InputError, match="span_types or an end_support needs a sequence"):
         read(text, tmp_path)
+
+
+def test_the_example_of_the_document_hangs(tmp_path):
+    """With the droppers that it sets without a table, too."""
+    page = (Path(__file__).parents[2] / "docs" / "own-section.md").read_text()
+    spans, droppers = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    own = FILE.replace("span_length = 65.0\n", "") + droppers + spans
+    line = read(own, tmp_path)
+    assert [span.span_length for span in spans_of(line).each] == [65.0, 65.0, 45.0, 40.0, 45.0, 65.0]
+    assert spans_of(line).contact_heights == (0.0, 0.0, 0.0, -0.05, -0.05, 0.0, 0.0)
+    assert len(line.droppers.positions) == 9
+    assert max(line.droppers.sag) == pytest.approx(0.05)
