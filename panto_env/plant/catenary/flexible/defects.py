@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ....base.arrays import Array
+from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ...alignment import Alignment
 from ...line_condition import LineCondition
@@ -75,26 +76,24 @@ class DefectiveLine:
         )
         own = locate(data, spans, condition)
 
-        breaks = [_breaks(each[0], own, nodes)] * spans
+        divided = [_divided(each[0], own, nodes)] * spans
         if data.sequence:
-            supports = alignment.supports
-            breaks = [
-                _breaks(span, own, [x - begin for x in nodes if begin <= x < end])
-                for span, begin, end in zip(each, supports, supports[1:], strict=False)
+            divided = [
+                _divided(span, own, [x - begin for x in nodes if begin <= x < end])
+                for span, (begin, end) in zip(each, pairwise(alignment.supports), strict=True)
             ]
-        firsts = np.cumsum([0, *(len(own) - 1 for own in breaks)])  # numbers of the supports' nodes
-        hung = [
-            first + np.searchsorted(own, span.droppers.positions)
-            for span, own, first in zip(each, breaks, firsts, strict=False)
-        ]
+        firsts = np.cumsum(
+            [0, *(len(lengths) for _, lengths, _ in divided)]
+        )  # numbers of the supports' nodes
         number = np.arange(firsts[-1] + 1)
-        self._ends = UNKNOWNS * np.concatenate(hung)[:, None] + [0, 2]  # of the droppers
+        hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
+        self._ends = UNKNOWNS * hung[:, None] + [0, 2]  # of the droppers
         self._masts = masts = UNKNOWNS * firsts[1:-1]
         self._band = np.zeros((BAND, UNKNOWNS * len(number)))
         self._load = np.zeros(UNKNOWNS * len(number))
-        lengths = np.concatenate([np.diff(own) for own in breaks])
-        self._places = np.concatenate([alignment.support(k) + own[:-1] for k, own in enumerate(breaks)])
-        self.breaks = np.append(self._places, alignment.length) if data.sequence else breaks[0]
+        lengths = np.concatenate([lengths for _, lengths, _ in divided])
+        self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
+        self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
         self._repeats = not data.sequence
         self._unknowns: Any = UNKNOWNS * number[:-1, None] + 2 * CONTACT + [0, 1, 4, 5]
@@ -209,9 +208,12 @@ class DefectiveLine:
         return np.asarray(solveh_banded(band, load, lower=True, overwrite_ab=True, overwrite_b=True))
 
 
-def _breaks(span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float]) -> Array:
-    """Limits of the pieces of a span (m)."""
-    return own.breaks(span.span_length, [0.0, *span.droppers.positions, span.span_length], nodes)
+def _divided(
+    span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float]
+) -> tuple[Array, Array, Index]:
+    """Limits and lengths of the pieces of a span (m), and at which limits its droppers hang."""
+    breaks = own.breaks(span.span_length, [0.0, *span.droppers.positions, span.span_length], nodes)
+    return breaks, np.diff(breaks), np.searchsorted(breaks, span.droppers.positions)
 
 
 def _locate(
