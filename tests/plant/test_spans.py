@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.parameters import change
+from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -121,6 +121,17 @@ def test_a_parameter_changes_every_span_that_leaves_it_out(tmp_path):
     assert spans_of(line).encumbrances == (1.6, 1.6, 1.6, 1.2, 1.6, 1.6)
     stiffer = change(line, "catenary.contact_wire.tension", 18e3)
     assert solve(stiffer).dropper_tension.max() != solve(line).dropper_tension.max()
+
+
+def test_a_parameter_that_every_span_replaces_is_refused(tmp_path):
+    spans = ", ".join(f"{{span_length = {length}, encumbrance = 1.7}}" for length in (65.0, 60.0, 50.0, 65.0))
+    line = read(FILE + DROPPERS + f"sequence = [{spans}]\n", tmp_path)
+    with pytest.raises(InputError, match=r"encumbrance cannot be 1.5: Each span .* so nothing would change"):
+        change(line, "catenary.encumbrance", 1.5)
+    with pytest.raises(InputError, match=r"do not go together.* place of encumbrance, so nothing"):
+        change_together(line, {"catenary.encumbrance": 1.5})
+    stiffer = change(line, "catenary.support.stiffness", 1e6)
+    assert {span.support.stiffness for span in spans_of(stiffer).each} == {1e6}
 
 
 @pytest.mark.parametrize(

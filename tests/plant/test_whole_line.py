@@ -128,7 +128,7 @@ def test_a_gradient_from_end_to_end_is_the_level_line_tilted():
         ),
         (
             ["a", "a", {"encumbrance": 0.3}, {"encumbrance": 0.3}, "a"],
-            r"Unloaded, dropper \d of span 3 of line",
+            r"ropper \d of span 3 of line",
         ),
         (
             [
