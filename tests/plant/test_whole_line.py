@@ -1,9 +1,13 @@
 """Static shape of lines whose spans differ, beside finite elements of the whole line."""
 
+import re
+
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from panto_env import InputError, simulate
+from panto_env.base.explanation import explain
 from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity
@@ -193,3 +197,55 @@ def test_the_dropper_table_names_every_dropper_of_every_span():
     uniform = droppers_at_rest(load_catenary("re250"))
     assert dropper_table(uniform).headings[0] == "dropper"
     assert [each.length for each in uniform] == solve(load_catenary("re250")).dropper_length.tolist()
+
+
+def random_sequence(random):
+    """Spans of any length, height and dropper table, few of which repeat."""
+
+    def span():
+        length = float(random.uniform(25.0, 75.0))
+        first = float(random.uniform(2.0, 6.0))
+        inner = np.sort(random.uniform(first + 2, length - first - 2, int(random.integers(2, 8))))
+        table = {
+            "positions": [first, *inner.tolist(), length - first],
+            "pre_sag": float(random.uniform(0, 0.05)),
+        }
+        rule = {"spacing": float(random.uniform(4, 9)), "pre_sag": float(random.uniform(-0.02, 0.06))}
+        return {
+            "span_length": length,
+            "encumbrance": float(random.uniform(0.9, 2.0)),
+            "contact_height": float(random.uniform(-0.05, 0.05)),
+            "droppers": table if random.random() < 0.3 else rule,
+            "support": {"stiffness": float(10 ** random.uniform(4.5, 7))},
+            "steady_arm": {"holds_wire": bool(random.random() < 0.3)},
+        }
+
+    spans = [span() for _ in range(int(random.integers(3, 8)))]
+    # Its own mirror image, which the judge adds, is level at both ends.
+    for near, outer in ((1, 0), (-2, -1)):
+        spans[outer] |= {key: spans[near][key] for key in ("contact_height", "encumbrance")}
+    return {"sequence": spans}
+
+
+def test_any_sequence_is_refused_in_one_sentence_or_hangs_as_finite_elements_do():
+    hung, messages = 0, []
+    for seed in range(60):
+        random = np.random.default_rng(seed)
+        name = str(random.choice(["re250", "benchmark-2015", "ln2"]))
+        try:
+            line = line_of(name, random_sequence(random))
+            shape = hang(line)
+        except ValidationError as error:
+            messages.append(explain(error, FlexibleCatenaryData))
+            continue
+        except InputError as error:
+            messages.append(str(error))
+            continue
+        hung += 1
+        other = judge.designed(judged(line, 0.1))
+        np.testing.assert_allclose(shape.contact.height(other.x), other.contact, atol=5e-4)
+        np.testing.assert_allclose(shape.messenger.height(other.x), other.messenger, atol=5e-4)
+        np.testing.assert_allclose(shape.dropper_tension, other.dropper_tension, atol=1.0)
+    assert hung >= 10
+    assert len(messages) >= 10
+    assert not [each for each in messages if re.search(r"[.?!]\s|\n", each)]

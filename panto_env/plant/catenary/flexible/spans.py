@@ -82,10 +82,11 @@ def laid_out(droppers: Any, span_length: Any) -> Any:
     if "positions" in kept:
         if rule.keys() != {"pre_sag"}:
             raise InputError("Give the droppers either positions or a spacing, not both.")
-        usable = isinstance(kept["positions"], list | tuple) and len(kept["positions"]) > 1
-        found = _valid(Spacing, {"spacing": span_length} | rule, "droppers")
-        x = np.array(kept["positions"], dtype=float) if usable else np.zeros(0)
-        return kept | {"sag": parabola(x, found.pre_sag).tolist() if usable else [found.pre_sag]}
+        depth = _valid(Spacing, {"spacing": span_length} | rule, "droppers").pre_sag
+        given = kept["positions"] if isinstance(kept["positions"], list | tuple) else []
+        if len(given) > 1 and all(isinstance(x, int | float) for x in given) and given[0] < given[-1]:
+            return kept | {"sag": parabola(np.array(given), depth).tolist()}
+        return kept | {"sag": [depth] * len(given)}  # of one dropper, or of positions that the schema refuses
     found = _valid(Spacing, rule, "droppers")
     first = found.spacing / 2 if found.first is None else found.first
     if 2 * first >= span_length:
@@ -135,7 +136,7 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
 def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, Span]) -> Span:
     changes = {"type": item} if isinstance(item, str) else dict(item)
     name = changes.pop("type", None)
-    if name is not None and name not in types:
+    if name is not None and (not isinstance(name, str) or name not in types):
         known = suggest(str(name), list(types)) if types else "it has none"
         raise InputError(f"The type '{name}' of {where} is not in span_types: {known}.")
     if name is not None and not changes:
@@ -170,19 +171,21 @@ def _droppers(own: Table, changes: Any, span_length: Any) -> Any:
         kept = {key: value for key, value in kept.items() if key not in ("stiffness", "axial_stiffness")}
     table = kept | dict(changes)
     placed = changes.keys() & {"positions", "sag", *Spacing.model_fields}
+    x, sag = old["positions"], old["sag"]
+    edge = min(sag[0], sag[-1])
+    pre_sag = (max(sag, key=lambda each: abs(each - edge)) - edge) * span_length / length
     if "positions" not in placed and (span_length != length or placed & {"spacing", "first"}):
-        x, sag = old["positions"], old["sag"]
         usual = {
             "spacing": (x[-1] - x[0]) / (len(x) - 1) if len(x) > 1 else length,
             "first": min(x[0], span_length / 4),
-            "pre_sag": max(0.0, (max(sag) - min(sag[0], sag[-1])) * span_length / length),
+            "pre_sag": pre_sag,
         }
         for key in {"positions", "sag"} - placed:
             del table[key]
         table = usual | table
     elif "positions" in placed and "sag" not in placed:
         del table["sag"]
-        table = {"pre_sag": max(old["sag"]) * span_length / length} | table
+        table = {"pre_sag": pre_sag} | table
     elif "pre_sag" in placed:
         del table["sag"]
     return laid_out(table, span_length)
