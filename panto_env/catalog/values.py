@@ -42,7 +42,7 @@ def _source(sources: Mapping[str, str], key: str, given: bool) -> str:
 def by_value(entry: Any) -> dict[str, Any]:
     """A line or a pantograph as plain data; its sources also report which values are defaults."""
     sources = {each.key: each.source for each in values_of(entry) if each.source}
-    return {**entry.model_dump(mode="json"), "sources": sources}
+    return {**entry.model_dump(mode="json"), "sources": {**entry.sources, **sources}}
 
 
 def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[tuple[str, Any, str, bool]]:

@@ -10,11 +10,13 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import available, load_catenary
+from panto_env.catalog.values import by_value, values_of
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.rig import RigData
+from panto_env.plant.catenary.schema import BY_DEFAULT
 
 FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
 FILE = """
@@ -65,6 +67,30 @@ def test_equal_spans_written_out_are_the_uniform_line(name):
         assert written.model_dump() == line.model_dump()
         assert solve(written) is solve(line)
     assert FlexibleCatenaryData(**spelt_out(name)) == line
+
+
+def test_equal_spans_written_out_name_sources_only_of_values_that_the_line_gives(tmp_path):
+    own = 'encumbrance = {value = 1.8, source = "drawing 1"}'
+    file = FILE.replace("encumbrance = 1.8", own) + DROPPERS
+    usual = read(file + 'sequence = ["a", "a", "a"]\n[span_types.a]\n', tmp_path)
+    found = {each.key: each.source for each in values_of(usual)}
+    assert found["encumbrance"] == "drawing 1"
+    assert found["droppers.mass"] == found["system"] == BY_DEFAULT
+    assert not found.keys() & {"sequence", "span_types", "sequence.1", "span_types.a"}
+    lower = read(file + 'sequence = ["a", "a", "a"]\n[span_types.a]\nencumbrance = 1.2\n', tmp_path)
+    assert lower.encumbrance == 1.2
+    assert {each.key: each.source for each in values_of(lower)}["encumbrance"] == ""
+
+
+def test_values_of_a_sequence_have_the_source_of_their_table(tmp_path):
+    line = read(FILE + DROPPERS + SPANS, tmp_path)
+    assert by_value(line)["sources"]["span_types.short.span_length"] == "drawing 4711"
+    sequence = 'sequence = {value = ["a", "a", {type = "a", span_length = 40.0}], source = "masts.csv"}\n'
+    line = read(FILE + DROPPERS + sequence + "[span_types.a]\n", tmp_path)
+    found = {each.key: each.source for each in values_of(line)}
+    assert [found[f"sequence.{number}"] for number in (1, 2, 3)] == 3 * ["masts.csv"]
+    assert found["droppers.mass"] == BY_DEFAULT
+    assert found["droppers.stiffness"] == ""
 
 
 def test_equal_spans_written_out_run_as_the_uniform_line():

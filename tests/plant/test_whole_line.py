@@ -142,6 +142,18 @@ def test_a_gradient_from_end_to_end_is_the_level_line_tilted():
             ],
             r"At rest dropper 2 of span 3 of line 're250', at 4.5 m, would carry -109",
         ),
+        (
+            ["a", "a", {"type": "a", "support": {"stiffness": 2e3}}, "a"],
+            r"At rest the messenger's support 3 of line 're250' would yield by 0\.\d+ m, more than 0\.3 m",
+        ),
+        (
+            ["a", "a", {"type": "a", "support": {"stiffness": 1e3}}],
+            r"At rest the messenger's support [34] of line 're250' would yield by",
+        ),
+        (
+            ["a", {"type": "a", "droppers": {"stiffness": 300.0}}, "a"],
+            r"At rest dropper 1 of span 2 of line 're250', at 5 m, would be stretched by 0\.\d+ m, \d+ % of",
+        ),
     ],
 )
 def test_a_line_that_cannot_hang_so_is_refused_with_span_and_dropper(sequence, message):

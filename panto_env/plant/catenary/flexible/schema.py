@@ -29,6 +29,9 @@ __all__ = [
     "Support",
 ]
 
+SEQUENCE = {"span_types", "sequence", "end_support"}
+"""Values of a line whose spans differ."""
+
 
 class Rayleigh(Settings):
     """Damping matrix alpha M + beta K."""
@@ -98,8 +101,14 @@ class FlexibleCatenaryData(CatenaryData):
         alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
         if not alike or len(set(found.encumbrances)) > 1:
             return line
-        one = {name: getattr(found.each[0], name) for name in Span.model_fields if name != "contact_height"}
-        return handler(table | one | {"span_types": {}, "sequence": (), "end_support": None})
+        names = (name for name in Span.model_fields if name != "contact_height")
+        one = {name: getattr(found.each[0], name) for name in names}
+        one = {name: value for name, value in one.items() if value != getattr(line, name)}
+        kept = {name: value for name, value in table.items() if name not in SEQUENCE}
+        kept["sources"] = {
+            key: text for key, text in line.sources.items() if key.split(".")[0] not in one.keys() | SEQUENCE
+        }
+        return handler(kept | one)
 
     @model_validator(mode="after")
     def _droppers_in_span(self) -> Self:
