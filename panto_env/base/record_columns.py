@@ -51,7 +51,7 @@ def read_columns(
     lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
     places = _places(path, header, columns, dict(units or {}))
-    used = {place for place, _ in places.values()}
+    used = {place for name, (place, _) in places.items() if not columns[name].text}
     points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
     decimal = "." if separator == "," or points else ","
     values: dict[str, Any] = {

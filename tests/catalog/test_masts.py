@@ -20,8 +20,8 @@ from ..command import panto
 POSITIONS = [0, 65, 130, 190, 245, 290, 345, 410]
 CONTACT = [5.3, 5.3, 5.3, 5.3, 5.25, 5.15, 5.25, 5.3]
 MESSENGER = [7.1, 7.1, 7.1, 7.1, 6.85, 6.45, 6.85, 7.1]
-LOW = "[span_types.low]\nsupport = {stiffness = 1e6}\n"
-"""A type of spans to add to a line."""
+LOW = "[span_types.low]\nsupport = {stiffness = 1e6}\n[span_types.'v.1']\nsupport = {stiffness = 1e6}\n"
+"""Types of spans to add to a line."""
 
 
 def table(separator=",", decimal="."):
@@ -62,7 +62,7 @@ def test_equal_spans_between_masts_are_the_line_itself(tmp_path):
 def test_masts_name_types_of_the_base_line(tmp_path):
     base = tmp_path / "base.toml"
     base.write_text(text_of("re250").replace("[support]", f"{LOW}[support]"))
-    text = "span;type;encumbrance\n65;;1,8\n60;low;1,5\n45;low;1,4\n50;;1,6\n;;1,8\n"
+    text = "span;type;encumbrance\n65;;1,8\n60;low;1,5\n45;v.1;1,4\n50;;1,6\n;;1,8\n"
     spans, _, encumbrances = spans_of(made(text, tmp_path, base))
     assert [span.support.stiffness for span in spans] == [500e3, 1e6, 1e6, 500e3]
     assert [span.span_length for span in spans] == [65.0, 60.0, 45.0, 50.0]
