@@ -31,7 +31,7 @@ SHELLS = ("", "sh", "bash", "shell", "console")
 """Languages of blocks that hold commands: a block without a language does, too."""
 SETTINGS = ("simulate", "sweep", "benchmark", "tune", "oracle", "evaluate")
 """Commands whose options are settings of a run."""
-UNFINISHED = ("MissingParameter", "BadOptionUsage")
+UNFINISHED = ("MissingParameter", "BadOptionUsage", "NoArgsIsHelpError")
 """What the parser says of a command in a sentence that names an option, or itself, and not the rest."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -13,6 +14,9 @@ from ..base.names import hint
 from ..base.ranges import ranges_of
 from ..base.settings import Settings
 from ..plant.catenary import CatenaryData, check_line
+from ..plant.catenary.flexible.parts import Span
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.flexible.spans import spans_of
 
 S = TypeVar("S", bound=Settings)
 
@@ -72,7 +76,7 @@ def change(entry: S, name: str, value: float) -> S:
     check_name(name, entry)
     path = name.split(".")[1:]
     try:
-        return _checked(entry, _put(entry.model_dump(), path, value))
+        return _checked(entry, _put(entry.model_dump(), path, value), {path[0]})
     except ValidationError as error:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found if c)
@@ -91,16 +95,26 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
         check_name(name, entry)
         table = _put(table, name.split(".")[1:], value)
     try:
-        return _checked(entry, table)
+        return _checked(entry, table, {name.split(".")[1] for name in values})
     except ValidationError as error:
         raise InputError(f"These values do not go together: {explain(error, type(entry))}.") from error
     except InputError as error:
         raise InputError(f"These values do not go together: {error}") from error
 
 
-def _checked(entry: S, table: Mapping[str, Any]) -> S:
-    """An entry of the same class with the values of a table. Raises InputError where it cannot exist."""
+def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
+    """An entry of the same class with the values of a table, in which these keys have changed.
+
+    Raises InputError where it cannot exist, or where a value of a line is one that all its spans replace.
+    """
     changed = type(entry).model_validate(table)
+    if isinstance(entry, FlexibleCatenaryData) and entry.sequence and changed != entry:
+        assert isinstance(changed, FlexibleCatenaryData)
+        if spans_of(changed) == spans_of(entry) and keys <= Span.model_fields.keys():
+            raise InputError(
+                f"Each span in the sequence of line '{entry.name}' has values of its own in the place of "
+                f"{', '.join(sorted(keys))}, so nothing would change; change them in its file."
+            )
     if isinstance(changed, CatenaryData):
         check_line(changed)
     return changed

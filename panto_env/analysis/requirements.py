@@ -10,6 +10,8 @@ from ..terminal import console, print_table
 
 def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
     """Print the table of criteria with limits, then notes and values without limits."""
-    print_table(criteria_table(criteria, title))
+    table = criteria_table(criteria, title)
+    if table.rows:
+        print_table(table)
     for line in remarks(criteria):
         console.print(line, soft_wrap=True)

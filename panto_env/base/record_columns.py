@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,9 @@ class Column:
     units: Mapping[str, float]  # scale to SI by unit
     example: str  # unit for messages
     required: bool = True
+    blank: bool = False  # whether cells may be empty, which are nan
+    usual: str = ""  # unit where the header names none
+    text: bool = False  # whether cells are texts, which have no unit
 
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}
@@ -36,8 +40,8 @@ TIME = Column(("time", "t"), {"s": 1.0, "ms": 1e-3}, "s")
 
 def read_columns(
     path: str | Path, columns: Mapping[str, Column], units: Mapping[str, str] | None = None
-) -> dict[str, Array]:
-    """Columns by name, (n,) each, in SI units.
+) -> dict[str, Any]:
+    """Columns by name, (n,) each, in SI units; lists of texts.
 
     Units are given in the header, as in ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which has
     priority. Other columns are ignored, and so are lines that are empty or begin with #. The separator is a
@@ -47,14 +51,21 @@ def read_columns(
     lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
     places = _places(path, header, columns, dict(units or {}))
-    used = {place for place, _ in places.values()}
+    used = {place for name, (place, _) in places.items() if not columns[name].text}
     points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
     decimal = "." if separator == "," or points else ","
-    values: dict[str, Array] = {name: np.empty(len(body)) for name in places}
+    values: dict[str, Any] = {
+        name: [""] * len(body) if columns[name].text else np.empty(len(body)) for name in places
+    }
     for row, (number, cells) in enumerate(body):
         for name, (place, scale) in places.items():
             text = cells[place].strip() if place < len(cells) else ""
-            values[name][row] = scale * _number(text, decimal, path, number, name)
+            if columns[name].text:
+                values[name][row] = text
+            elif columns[name].blank and not text:
+                values[name][row] = np.nan
+            else:
+                values[name][row] = scale * _number(text, decimal, path, number, name)
     return values
 
 
@@ -132,7 +143,8 @@ def _places(
             continue
         if name in places:
             raise InputError(f"{path} has column {name} twice; keep one.")
-        places[name] = (place, _scale(path, name, columns[name], units.get(name) or (match[2] or "").strip()))
+        unit = units.get(name) or (match[2] or "").strip() or columns[name].usual
+        places[name] = (place, 1.0 if columns[name].text else _scale(path, name, columns[name], unit))
     missing = [name for name, column in columns.items() if column.required and name not in places]
     if missing:
         names = ", ".join(f"{name} ({column.example})" for name, column in columns.items())

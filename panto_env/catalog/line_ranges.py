@@ -13,9 +13,9 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from ..base.arrays import Array
 from ..base.ranges import Between
 from ..base.settings import Settings
+from ..plant.catenary.flexible.spans import evenly, parabola
 from ..plant.catenary.schema import LONGEST_SPAN
 
 N = TypeVar("N")
@@ -77,22 +77,16 @@ class DropperRanges(Settings):
     def draw(self, random: np.random.Generator, span: float, pre_sag: float) -> dict[str, Any]:
         """Values of ``Droppers``. span: m. pre_sag: of the contact wire in the middle of the span (m)."""
         first, distance = span * random.uniform(*self.first), random.uniform(*self.distance)
-        gaps = max(1, round((span - 2 * first) / distance))
-        x = np.linspace(first, span - first, gaps + 1)
+        x = evenly(span, first, distance)
         clamp = random.uniform(*self.clamp_mass)
         return {
             "positions": x.tolist(),
-            "sag": _parabola(x, pre_sag).tolist(),
+            "sag": parabola(x, pre_sag).tolist(),
             "stiffness": random.uniform(*self.stiffness),
             "mass": random.uniform(*self.mass),
             "messenger_clamp_mass": clamp,
             "contact_clamp_mass": clamp,
         }
-
-
-def _parabola(x: Array, depth: float) -> Array:
-    """Depth (m) of a parabola at places (m), 0 at the first and the last one."""
-    return np.asarray(depth * 4 * (x - x[0]) * (x[-1] - x) / (x[-1] - x[0]) ** 2)
 
 
 class PreSagRange(Settings):

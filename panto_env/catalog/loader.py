@@ -157,11 +157,29 @@ def _find(family: str, source: str | Path) -> Path:
     )
 
 
+def parse_catenary(table: Mapping[str, Any], path: Path) -> CatenaryData:
+    """Line from the table of a TOML file that need not be written yet; path: for its name and messages.
+
+    Raises InputError, and warns, as ``load_catenary`` does.
+    """
+    line: CatenaryData = _entry("catenary", table, path)
+    return _checked(line, path)
+
+
+def file_of(source: str | Path) -> Path:
+    """TOML file of a line by its name in the catalogue or its path. Raises InputError where there is none."""
+    return _find("catenary", source)
+
+
 @cache
 def _read(family: str, path: Path, _modified: int) -> Any:
+    return _entry(family, read_toml(path), path)
+
+
+def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
     sources: dict[str, str] = {}
     try:
-        table = {"name": path.stem, **_split(read_toml(path), "", sources), "sources": sources}
+        table = {"name": path.stem, **_split(given, "", sources), "sources": sources}
         schema = _schema(family, table)
         if "line" in schema.model_fields and isinstance(table.get("line"), str):
             table["line"] = _load("catenary", table["line"])  # a rig may name its computed line
@@ -201,7 +219,7 @@ class _TableError(Exception):
     """An error in a table: an unknown kind, or a table of value and source with other keys."""
 
 
-def _split(table: dict[str, Any], prefix: str, sources: dict[str, str]) -> dict[str, Any]:
+def _split(table: Mapping[str, Any], prefix: str, sources: dict[str, str]) -> dict[str, Any]:
     """Values without sources; the sources in ``{ value = ..., source = ... }`` go to ``sources``."""
     values: dict[str, Any] = {}
     for key, item in table.items():

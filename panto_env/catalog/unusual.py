@@ -7,8 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from ..plant.catenary import CatenaryData
+from ..plant.catenary.flexible.parts import Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from .values import values_of
+from ..plant.catenary.flexible.spans import spans_of
+from .values import leaves, values_of
 
 FACTOR = 30.0
 """How far beyond the catalogue's values a value is unusual (-). It is about the root of 1000: a value beyond
@@ -61,27 +63,42 @@ def remarks(entry: Any, usual: Ranges) -> list[str]:
 
 def _hogging(line: FlexibleCatenaryData) -> Iterator[str]:
     """A sentence where the contact wire stands above its supports, or above the outer droppers."""
-    sag = line.droppers.sag
-    outer = min(sag[0], sag[-1])
-    above, than = max((-min(sag), "at the supports"), (outer - min(sag), "at the outer droppers"))
-    if above > HOG:
-        yield (
-            f"Line '{line.name}': the contact wire stands {1e3 * above:.3g} mm higher within the span than "
-            f"{than}; droppers.sag counts downwards, so a pre-sag is positive: change its sign, unless the "
-            "wire is to hog."
-        )
+    each: Iterable[FlexibleCatenaryData | Span] = spans_of(line).each if line.sequence else (line,)
+    for number, span in enumerate(each, start=1):
+        sag = span.droppers.sag
+        outer = min(sag[0], sag[-1])
+        above, than = max((-min(sag), "at the supports"), (outer - min(sag), "at the outer droppers"))
+        if above > HOG:
+            yield (
+                f"Line '{line.name}': the contact wire stands {1e3 * above:.3g} mm higher within "
+                f"{f'span {number}' if line.sequence else 'the span'} than {than}; droppers.sag counts "
+                "downwards, so a pre-sag is positive: change its sign, unless the wire is to hog."
+            )
+            return
 
 
 def _numbers(entry: Any) -> Iterator[_Number]:
     """The numbers of an entry that have a size; whole numbers are counts."""
-    for key, given, meaning, _ in values_of(entry):
+    for key, of_span, given, meaning in _values(entry):
         named = re.search(r" \(([^-].*?)\)(?:[;,]|$)", meaning)
         unit = f" {named[1]}" if named else ""
         if isinstance(given, float):
-            yield _Number(key, key, unit, given)
+            yield _Number(key, key + of_span, unit, given)
         elif key == "droppers.sag":  # those near a support may be as small as can be
-            yield _Number(key, f"the largest of {key}", unit, max(given, key=abs))
+            yield _Number(key, f"the largest of {key}{of_span}", unit, max(given, key=abs))
         elif isinstance(given, tuple):
             for number, value in enumerate(given, start=1):
                 ground = " to the ground" if key in CHAINS and number == len(given) else ""
-                yield _Number(key + ground, f"number {number} of {key}", unit, value)
+                yield _Number(key + ground, f"number {number} of {key}{of_span}", unit, value)
+
+
+def _values(entry: Any) -> Iterator[tuple[str, str, Any, str]]:
+    """Key, span, value and meaning of all values; those of a sequence's spans in the place of the line's."""
+    sequence = isinstance(entry, FlexibleCatenaryData) and bool(entry.sequence)
+    for key, given, meaning, _ in values_of(entry):
+        if not (sequence and key.partition(".")[0] in Span.model_fields):
+            yield key, "", given, meaning
+    if sequence:
+        for number, span in enumerate(spans_of(entry).each, start=1):
+            for key, given, meaning, _ in leaves(span):
+                yield key, f" in span {number}", given, meaning

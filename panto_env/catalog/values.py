@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import chain, repeat
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -24,18 +25,27 @@ class Value(NamedTuple):
 def values_of(entry: Any) -> list[Value]:
     """All values of a line or a pantograph that are not None."""
     return [
-        Value(key, value, text, entry.sources.get(key, "" if given else BY_DEFAULT))
-        for key, value, text, given in _leaves(entry, "", True)
+        Value(key, value, text, _source(entry.sources, key, given))
+        for key, value, text, given in leaves(entry)
     ]
+
+
+def _source(sources: Mapping[str, str], key: str, given: bool) -> str:
+    """Source of a value, or else of the table or list in which it is given."""
+    if key in sources or not given:
+        return sources.get(key, BY_DEFAULT)
+    while key not in sources and "." in key:
+        key = key.rpartition(".")[0]
+    return sources.get(key, "")
 
 
 def by_value(entry: Any) -> dict[str, Any]:
     """A line or a pantograph as plain data; its sources also report which values are defaults."""
     sources = {each.key: each.source for each in values_of(entry) if each.source}
-    return {**entry.model_dump(mode="json"), "sources": sources}
+    return {**entry.model_dump(mode="json"), "sources": {**entry.sources, **sources}}
 
 
-def _leaves(entry: BaseModel, prefix: str, given: bool) -> Iterator[tuple[str, Any, str, bool]]:
+def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[tuple[str, Any, str, bool]]:
     """Keys, values and meanings of all values of an entry, including those in its tables.
 
     The last is whether the value was given; given: whether the entry itself was.
@@ -43,6 +53,21 @@ def _leaves(entry: BaseModel, prefix: str, given: bool) -> Iterator[tuple[str, A
     for key, field in type(entry).model_fields.items():
         value, own = getattr(entry, key), given and key in entry.model_fields_set
         if isinstance(value, BaseModel):
-            yield from _leaves(value, f"{prefix}{key}.", own)
+            yield from leaves(value, f"{prefix}{key}.", own)
+        elif key in ("span_types", "sequence"):
+            items = value.items() if isinstance(value, Mapping) else enumerate(value, start=1)
+            meanings = chain([field.description or ""], repeat(""))
+            for (name, item), meaning in zip(items, meanings, strict=False):
+                yield f"{prefix}{key}.{name}", _inline(item), meaning, own
         elif value is not None and key not in NOT_VALUES:
             yield prefix + key, value, field.description or "", own
+
+
+def _inline(value: Any) -> str:
+    """A span or a type of spans in one line."""
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{key} ({_inline(item)})" if isinstance(item, Mapping) else f"{key} {item}"
+            for key, item in value.items()
+        )
+    return str(value)

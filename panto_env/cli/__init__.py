@@ -100,6 +100,7 @@ def make_app() -> typer.Typer:
         family,
         film,
         identify,
+        line,
         reproduce,
         rig,
         simulate,
@@ -125,6 +126,7 @@ def make_app() -> typer.Typer:
     app.command()(film.film)
     app.command()(sweep.sweep)
     app.command()(family.family)
+    app.command()(line.line)
     app.command()(validate.validate)
     app.command()(identify.identify)
     app.command()(estimate.estimate)

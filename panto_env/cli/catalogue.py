@@ -11,7 +11,7 @@ from rich.table import Table
 from ..base.errors import InputError
 from ..base.table_file import TABLES, write_rows
 from ..catalog.loader import text_of
-from ..plant.catenary.flexible.dropper_table import HEADINGS, dropper_table
+from ..plant.catenary.flexible.dropper_table import HEADINGS, as_rows, dropper_table
 from ..terminal import Json, console, print_json, print_table, writable
 from .descriptions import LOADERS, POLICY, PRESETS, Description, described, everything
 
@@ -103,7 +103,7 @@ def _print(each: Description) -> None:
 
 
 def _write_droppers(found: list[Description], name: str, path: str) -> None:
-    rows = [dropper._asdict() for each in found for dropper in each.droppers]
+    rows = [row for each in found for row in as_rows(each.droppers)]
     if not rows:
         raise InputError(f"'{name}' is not a line with droppers, so there is no table of them.")
     write_rows(rows, path, HEADINGS)

@@ -17,7 +17,7 @@ from ..catalog.family import LineFamily
 from ..catalog.loader import SCHEMAS
 from ..catalog.values import by_value, values_of
 from ..plant.actuators import ACTUATOR_PRESETS
-from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
+from ..plant.catenary.flexible.dropper_table import RestingDropper, as_rows, droppers_at_rest
 from ..plant.catenary.schema import CatenaryData
 from ..plant.line_condition import LINE_CONDITIONS
 from ..plant.pantograph.schema import PantographData
@@ -90,7 +90,7 @@ def _entry(family: str, entry: Entry) -> Description:
     rows = [(each.key, str(each.value), each.meaning, each.source) for each in values_of(entry)]
     headings = ("key", "value", "meaning", "source")
     droppers = droppers_at_rest(entry)
-    data = by_value(entry) | ({"droppers_at_rest": [each._asdict() for each in droppers]} if droppers else {})
+    data = by_value(entry) | ({"droppers_at_rest": as_rows(droppers)} if droppers else {})
     return Description(family, entry.name, entry.description, headings, rows, data, droppers)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from typer.core import TyperGroup
 
 PANELS = {
-    "Simulate": ("list", "simulate", "sweep", "family", "film"),
+    "Simulate": ("list", "line", "simulate", "sweep", "family", "film"),
     "Judge": ("report", "validate", "reproduce", "speed"),
     "Identify": ("identify", "estimate", "diagnose", "rig"),
     "Control": ("benchmark", "tune", "oracle", "replay", "returns", "submission"),

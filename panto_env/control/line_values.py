@@ -41,7 +41,7 @@ def line_values(line: CatenaryData) -> Array:
     contact, messenger = line.contact_wire, line.messenger_wire
     return np.array(
         [
-            line.span_length,
+            line.alignment().mean_length,
             contact.wave_speed,
             contact.tension,
             messenger.tension,

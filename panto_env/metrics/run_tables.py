@@ -11,7 +11,7 @@ from ..base.table_file import WORKBOOKS, Sheet, write_table, write_workbook
 from ..base.version import __version__
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
-from ..plant.catenary.flexible.dropper_table import droppers_at_rest
+from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
 from .droppers import HEADINGS as MOVING
 from .droppers import moving_droppers
 from .labels import HEADINGS, LABELS
@@ -166,4 +166,4 @@ def _at_rest(design: Mapping[str, Any]) -> list[dict[str, Any]]:
     if "catenary" not in design:
         return []
     line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
-    return [each._asdict() for each in droppers_at_rest(line)]
+    return as_rows(droppers_at_rest(line))

@@ -191,6 +191,52 @@ def test_a_wire_that_hogs_is_warned_of(sag, sentence):
     assert sentence is None or (sentence in found[0] and "a pre-sag is positive" in found[0])
 
 
+def of_spans(sequence, **types):
+    """A line of the catalogue with spans of its own."""
+    table = load_catenary("re250").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    return table | {"span_types": types, "sequence": sequence}
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        (
+            {"droppers": {"stiffness": 100e6}},
+            r"droppers\.stiffness in span 2 is 1e\+08 N/m, more than 30 times beyond",
+        ),
+        (
+            {"support": {"damping": 1.0}},
+            r"support\.damping in span 2 is 1 N s/m, more than 30 times beyond",
+        ),
+        (
+            {"droppers": {"sag": [0.0, 0.0, 0.0, -0.006, -0.006, -0.006, 0.0, 0.0, 0.0]}},
+            "6 mm higher within span 2 than at the supports; droppers.sag counts downwards",
+        ),
+    ],
+)
+def test_a_value_of_one_span_is_warned_of_with_its_number(changes, sentence):
+    line = load_catenary("re250")
+    found = unusual(type(line).model_validate(of_spans(["a", "b", "a", "a"], a={}, b=changes)))
+    assert len(found) == 1
+    assert re.search(sentence, found[0])
+    assert not unusual(type(line).model_validate(of_spans(["a", {"span_length": 60.0}, "a"], a={})))
+
+
+def test_a_value_that_every_span_replaces_is_not_unusual():
+    table = of_spans(["a", "a", {"type": "a", "span_length": 60.0}], a={"droppers": {"stiffness": 100e3}})
+    table["droppers"]["stiffness"] = 100e6
+    assert not unusual(type(load_catenary("re250")).model_validate(table))
+
+
+def test_a_line_made_from_masts_is_warned_of_like_any_other(tmp_path):
+    base, masts = tmp_path / "base.toml", tmp_path / "masts.csv"
+    base.write_text(text_of("re250").replace("value = 137.5", "value = 0.1375"), encoding="utf-8")
+    masts.write_text("position\n0\n65\n125\n190\n")
+    result = panto("line", str(base), "--masts", str(masts))
+    assert result.returncode == 0, result.stderr
+    assert "warning: Line 'masts': contact_wire.bending_stiffness is 0.1375 N m^2" in result.stderr
+
+
 @pytest.fixture
 def slipped(tmp_path):
     """A file of a line whose bending stiffness is in kN m^2."""

@@ -7,7 +7,8 @@ import pandas
 import pytest
 
 from panto_env.catalog import available, load_catenary
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 from ..command import panto
 from ..finite_element.static import GRAVITY, static_shape
@@ -91,3 +92,12 @@ def test_what_has_no_droppers_has_no_table(name, tmp_path):
 
 def test_a_rig_has_those_of_its_line():
     assert droppers_at_rest(load_catenary("rig-flexible")) == droppers_at_rest(load_catenary("en50318-2002"))
+
+
+def test_the_table_numbers_spans_only_where_they_differ():
+    table = load_catenary("re250").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    given = {"sequence": ["a", "a", {"span_length": 60.0}], "span_types": {"a": {}}}
+    differ = as_rows(droppers_at_rest(FlexibleCatenaryData.model_validate(table | given)))
+    assert [row["span"] for row in differ] == [1] * 9 + [2] * 9 + [3] * 8  # 60 m
+    alike = as_rows(droppers_at_rest(load_catenary("re250")))
+    assert alike[0].keys() == differ[0].keys() - {"span"}

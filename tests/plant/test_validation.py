@@ -5,7 +5,8 @@ import pytest
 from panto_env import simulate
 from panto_env.cli import validate
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318 import convergence, reference, wear
+from panto_env.studies.en50318 import convergence, reference, tables, wear
+from panto_env.studies.en50318.lines import LineCheck
 
 from ..finite_element import __main__ as comparison
 
@@ -73,3 +74,24 @@ def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_
             assert other.min[0] == pytest.approx(true.min[0], abs=1.5)
         assert ours.contact_loss[0] == pytest.approx(true.contact_loss[0], abs=0.1)
         assert ours.steps >= 8
+
+
+def test_errors_of_lines_are_shown_with_the_largest_by_warning():
+    def check(name, drawn, warned, std):
+        errors = {} if std is None else dict.fromkeys(("max", "min", "contact_loss"), 0.1)
+        figures = {} if std is None else {"mean": 100.0, "converged": 30.0, "std": std} | errors
+        return LineCheck(name, "dsa380", 200.0, 0.5, drawn, "full", 0.3, 1e-3, warned, **figures)
+
+    checks = [
+        check("re250", False, False, -0.7),
+        check("re250", False, False, 0.2),
+        check("seed 4", True, True, 3.0),
+        check("seed 5", True, False, None),
+    ]
+    rows = tables.lines_table(checks).rows
+    assert [row[2] for row in rows] == ["full", "full", "full, warned", "full"]
+    assert [row[5] for row in rows] == ["30.00", "30.00", "30.00", "ended early"]
+    assert tables.largest_table(checks).rows == [
+        ("catalogue", "full", "no", "2", "0", "0.70", "0.10", "0.10", "0.10"),
+        ("drawn", "full", "yes", "1", "1", "3.00", "0.10", "0.10", "0.10"),
+    ]

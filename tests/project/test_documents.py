@@ -122,6 +122,7 @@ def folder(tmp_path, monkeypatch):
         shutil.copytree(ROOT / "docs" / name, tmp_path / "docs" / name)
     shutil.copytree(ROOT / "examples" / "submission", tmp_path / "my-policy")
     (tmp_path / "docs" / "figures").mkdir()
+    shutil.copy(ROOT / "examples" / "masts.csv", tmp_path)
     truth = parameters_of(load_pantograph("identified-2dof"))
     write_record(
         add_noise(clean_record(FREQUENCY_SWEEP, truth), np.random.default_rng(0)), tmp_path / "rig.csv"
@@ -133,13 +134,20 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def with_options(text, options):
+    """A command with other options, in the place of its own ones of these names: none may be given twice."""
+    for option, values in re.findall(r"(--[a-z-]+)((?: (?!--)\S+)*)", options):
+        text = re.sub(rf" {option}{r'(?: [^ ]+)' * len(values.split())}(?= |$)", "", text)
+    return f"{text} {options}"
+
+
 def run(page, folder):
     """Run the commands of a page in order."""
     for command in commands(page):
         rule = rule_of(command)
         if not (command.whole and command.words[0] == "panto") or (rule and rule.with_options is None):
             continue
-        line = f"{command.text} {rule.with_options}" if rule else command.text
+        line = with_options(command.text, rule.with_options) if rule else command.text
         if set(line) & set(SHELL):
             done = subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True)
         else:

@@ -12,6 +12,12 @@ from . import conditions, convergence, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
 ERRORS = ("std", "max", "min", "contact_loss")
+ERROR_HEADINGS = (
+    f"{LABELS['std'].short}\n(%)",
+    *(f"{LABELS[name].short}\n(% of {LABELS['mean'].short})" for name in ("max", "min")),
+    f"{LABELS['contact_loss'].short}\n(points)",
+)
+"""Of errors: of sigma, of maximum and minimum, of contact loss."""
 
 
 def checks_table(checks: Sequence[reference.Check]) -> Table:
@@ -155,12 +161,12 @@ def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
     rows: list[Row] = []
     section_ends = []
     for k, check in enumerate(checks):
-        case = (check.catenary, check.pantograph, f"{check.speed_kmh:.0f}", f"{check.share:.2f}")
-        used = (check.accuracy, f"{check.spacing:.3g}", f"{1e3 * check.time_step:.3g}")
+        accuracy = f"{check.accuracy}, warned" if check.warned else check.accuracy
+        used = (f"{check.spacing:.3g}", f"{1e3 * check.time_step:.3g}")
         figures = ["ended early", *("" for _ in ERRORS)]
         if check.converged is not None:
             figures = [number(check.converged, 2), *(f"{getattr(check, name):+.2f}" for name in ERRORS)]
-        rows.append((*case, *used, *figures, "yes" if check.warned else ""))
+        rows.append((check.catenary, f"{check.speed_kmh:.0f}", accuracy, *used, *figures))
         if k + 1 == len(checks) or checks[k + 1].catenary != check.catenary:
             section_ends.append(k)
     first, last = lines.SPANS
@@ -168,14 +174,11 @@ def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
         f"Every flexible line beside a grid of {lines.GRID:g} m and a step of at most "
         f"{1e3 * lines.LONGEST_STEP:g} ms, spans {first} to {last}",
         (
-            *("line", "pantograph", "km/h", "v / c", "accuracy", "grid\n(m)", "step\n(ms)"),
+            *("line", "km/h", "accuracy", "grid\n(m)", "step\n(ms)"),
             f"converged\n{LABELS['std'].column}",
-            *(_in_percent(name) for name in ("std", "max", "min")),
-            f"{LABELS['contact_loss'].short}\n(points)",
-            "warned",
+            *ERROR_HEADINGS,
         ),
         rows,
-        text_columns=2,
         section_ends=tuple(section_ends),
     )
 
@@ -205,8 +208,7 @@ def largest_table(checks: Sequence[lines.LineCheck]) -> Table:
         "Largest errors",
         (
             *("lines", "accuracy", "warned", "runs", "ended\nearly"),
-            *(_in_percent(name) for name in ("std", "max", "min")),
-            f"{LABELS['contact_loss'].short}\n(points)",
+            *ERROR_HEADINGS,
         ),
         rows,
         text_columns=2,

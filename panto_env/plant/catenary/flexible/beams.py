@@ -8,7 +8,7 @@ long they are, and nodes are needed only where a force or a spring acts on the w
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ....base.arrays import Array, Index
 from ..schema import Wire
 
 GRAVITY = 9.81  # m/s^2
+HELD = 1e18  # N/m, that holds a wire, in a banded matrix
 SHARPEST = 1e-12  # m over which a wire without bending stiffness rounds a kink, as elements need one
 
 
@@ -25,11 +26,12 @@ class Profile(NamedTuple):
     breaks: Array  # (pieces of a span + 1,): where pieces begin and end in a span (m)
     pieces: Array  # (pieces, 5): a, b, c, d, e of each piece, span after span
     decay: float  # kappa (1/m)
+    repeats: bool = True  # whether the line goes on likewise beyond its end
 
     def height(self, x: Array) -> Array:
-        """Height (m) at positions x (m), (n,), along the line, which begins anew beyond its end."""
+        """Height (m) at positions x (m), (n,), along the line; one that repeats begins anew at its end."""
         per_span = len(self.breaks) - 1
-        span, local = np.divmod(x, self.breaks[-1])
+        span, local = np.divmod(x, self.breaks[-1]) if self.repeats else (0 * x, x)
         k = np.clip(np.searchsorted(self.breaks, local, side="right") - 1, 0, per_span - 1)
         a, b, c, d, e = self.pieces[(span.astype(int) * per_span + k) % len(self.pieces)].T
         left, right = local - self.breaks[k], self.breaks[k + 1] - local
@@ -84,6 +86,16 @@ class Beams:
         return np.outer(self.lengths, [0, 1, 0, -1])
 
 
+def add_to_band(band: Array, unknowns: Any, stiffness: Array) -> None:
+    """Add the elements' stiffness matrices, (elements, 4, 4), to a matrix.
+
+    band: the matrix's lower diagonals, (diagonals, n). unknowns: (elements, 4), numbers of its rows.
+    """
+    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+    lower = row >= column
+    np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])
+
+
 class PeriodicWire:
     """A wire under its weight along a line on which everything repeats, held at some of its nodes."""
 
@@ -115,3 +127,50 @@ class PeriodicWire:
     def profile(self, state: Array) -> Profile:
         """Height along the wire, by its unknowns."""
         return Profile(self.breaks, self.beams.pieces(state[self._unknowns], self._bulge), self.beams.decay)
+
+
+class LongWire:
+    """A wire under its weight from end to end, where it goes on at given slopes and carries half as much.
+
+    Such an end is where the wire would be mirrored, on the straight line of that slope.
+    """
+
+    def __init__(self, wire: Wire, breaks: Array, slopes: tuple[float, float], springs: Array) -> None:
+        """breaks: nodes (m), (n,); slopes: at both ends (-); springs: to the ground at nodes (N/m), (n,)."""
+        self.breaks, nodes = breaks, len(breaks)
+        self.beams = Beams(wire, np.diff(breaks))
+        self._bulge = self.beams.bulge(np.full(nodes - 1, -GRAVITY * wire.mass))
+        self._unknowns = 2 * np.arange(nodes - 1)[:, None] + np.arange(4)
+        self._band, self._load, self._springs = np.zeros((4, 2 * nodes)), np.zeros(2 * nodes), springs
+        add_to_band(self._band, self._unknowns, self.beams.stiffness)
+        self._band[0, ::2] += springs
+        self._band[0, [1, -1]] += HELD
+        np.add.at(self._load, self._unknowns, self.beams.end_loads(self._bulge))
+        self._load[[0, -2]] += wire.tension * np.array([-1.0, 1.0]) * slopes
+        self._slopes = HELD * np.array(slopes)
+
+    def hang(self, held: Index, heights: Array, forces: Array) -> tuple[Array, Array]:
+        """Unknowns of the wire with nodes ``held`` at ``heights`` (m), and the upward forces (N) on these.
+
+        forces: further upward forces at all nodes (N), (n,).
+        """
+        from scipy.linalg import solveh_banded  # slow to import
+
+        band, load = self._band.copy(), self._load.copy()
+        load[::2] += forces
+        right = load.copy()
+        band[0, 2 * held] += HELD
+        right[2 * held] += HELD * heights
+        right[[1, -1]] += self._slopes
+        state = np.asarray(solveh_banded(band, right, lower=True))
+        pulled = np.zeros(len(state))
+        np.add.at(
+            pulled, self._unknowns, np.einsum("eij,ej->ei", self.beams.stiffness, state[self._unknowns])
+        )
+        pulled[::2] += self._springs * state[::2]
+        return state, (pulled - load)[2 * held]
+
+    def profile(self, state: Array) -> Profile:
+        """Height along the wire, by its unknowns."""
+        pieces = self.beams.pieces(state[self._unknowns], self._bulge)
+        return Profile(self.breaks, pieces, self.beams.decay, repeats=False)

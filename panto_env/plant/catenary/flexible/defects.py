@@ -10,21 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ....base.arrays import Array
+from ....base.arrays import Array, Index
 from ....base.errors import InputError
+from ...alignment import Alignment
 from ...line_condition import LineCondition
 from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, Beams
-from .schema import FlexibleCatenaryData
+from .beams import GRAVITY, HELD, Beams, Profile, add_to_band
+from .schema import FlexibleCatenaryData, Span
+from .spans import spans_of
 from .static import solve
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 
-HELD = 1e18  # N/m, that holds a wire at the anchor
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
@@ -52,58 +54,78 @@ class DefectiveLine:
         tensions: tuple[float, float] = (1.0, 1.0),
         nodes: Sequence[float] = (),
     ) -> None:
-        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further places in each span
-        at which a force may act (m).
+        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further positions at which
+        a force may act (m); where spans are alike, in each of them.
 
-        Raises InputError for what a line of so many spans has not.
+        Raises InputError for what a line of so many spans has not, and for defects where its spans differ.
         """
+        if data.sequence and condition.defective:
+            raise InputError(
+                f"Defects are not computed on line '{data.name}' yet, as its spans differ; use a "
+                "line_condition without them, such as 'new'."
+            )
+        each: Sequence[FlexibleCatenaryData | Span] = spans_of(data).each if data.sequence else [data] * spans
+        alignment = data.alignment(spans)
         left = with_tension_left(data, condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
-        self._static = np.tile(shape.dropper_tension, spans)
-        self._stiffness = np.tile(shape.dropper_stiffness, spans)
-        self._broken, self._error, height = _locate(data, spans, condition)
+        repeats = spans // shape.spans
+        self._static = np.tile(shape.dropper_tension, repeats)
+        self._stiffness = np.tile(shape.dropper_stiffness, repeats)
+        self._broken, self._error, height = _locate(
+            data, [len(span.droppers.sag) for span in each], condition
+        )
         own = locate(data, spans, condition)
 
-        self.breaks = own.breaks(data.span_length, [0.0, *data.droppers.positions, data.span_length], nodes)
-        pieces = len(self.breaks) - 1
-        number = np.arange(spans * pieces + 1)
-        hung = np.isin(number % pieces, np.searchsorted(self.breaks, data.droppers.positions))
-        self._ends = UNKNOWNS * number[hung][:, None] + [0, 2]  # of the droppers
-        masts = UNKNOWNS * number[number % pieces == 0][1:-1]
+        divided = [_divided(each[0], own, nodes)] * spans
+        if data.sequence:
+            divided = [
+                _divided(span, own, [x - begin for x in nodes if begin <= x < end])
+                for span, (begin, end) in zip(each, pairwise(alignment.supports), strict=True)
+            ]
+        firsts = np.cumsum(
+            [0, *(len(lengths) for _, lengths, _ in divided)]
+        )  # numbers of the supports' nodes
+        number = np.arange(firsts[-1] + 1)
+        hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
+        self._ends = UNKNOWNS * hung[:, None] + [0, 2]  # of the droppers
+        self._masts = masts = UNKNOWNS * firsts[1:-1]
         self._band = np.zeros((BAND, UNKNOWNS * len(number)))
         self._load = np.zeros(UNKNOWNS * len(number))
-        lengths = np.tile(np.diff(self.breaks), spans)
+        lengths = np.concatenate([lengths for _, lengths, _ in divided])
+        self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
+        self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
+        """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
+        self._repeats = not data.sequence
         self._unknowns: Any = UNKNOWNS * number[:-1, None] + 2 * CONTACT + [0, 1, 4, 5]
         self._beams = Beams(left.contact_wire, lengths)
-        _add(self._band, self._unknowns, self._beams.stiffness)
+        add_to_band(self._band, self._unknowns, self._beams.stiffness)
         above = Beams(left.messenger_wire, lengths)
-        _add(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
-        self._band[0, masts] += data.steady_arm.stiffness
-        self._band[0, masts + 2] += data.support.stiffness
-        self._load[masts + 2] = data.support.stiffness * height
-        self._lifted, self._support_stiffness = masts + 2, data.support.stiffness
+        add_to_band(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
+        self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
+        self._band[0, masts] += [span.steady_arm.stiffness for span in each[1:]]
+        self._band[0, masts + 2] += self._support_stiffness
+        self._load[masts + 2] = self._support_stiffness * height
+        self._lifted = masts + 2
         self._band[0, [0, 2, -4, -2]] = HELD
         self.decay = self._beams.decay
-        self._carry(data, left, own, spans)
+        self._carry(data, left, own, alignment)
 
     def _carry(
-        self, data: FlexibleCatenaryData, left: FlexibleCatenaryData, own: WireDefects, spans: int
+        self, data: FlexibleCatenaryData, left: FlexibleCatenaryData, own: WireDefects, alignment: Alignment
     ) -> None:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
-        pieces, wire, span = len(self.breaks) - 1, left.contact_wire, data.span_length
-        self._places = ends = np.add.outer(np.arange(spans) * span, self.breaks[:-1]).ravel()
-        length = self._beams.lengths
+        wire, ends, length = left.contact_wire, self._places, self._beams.lengths
         self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
         np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in own.spots:
             self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
-        surface = own.surface(np.append(ends, spans * span))
+        surface = own.surface(np.append(ends, alignment.length))
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
         if left is not data:
             fit = misfit(data, left)
-            self._error = self._error + np.tile(fit.too_long, spans)
-            self._load[self._ends] += np.tile(fit.lighter, spans)[:, None]
-            self._load[UNKNOWNS * pieces * np.arange(1, spans)] += fit.lift
+            self._error = self._error + np.tile(fit.too_long, alignment.spans)
+            self._load[self._ends] += np.tile(fit.lighter, alignment.spans)[:, None]
+            self._load[self._masts] += fit.lift
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
         """The line with tables for ``rows`` defective ones, which ``write`` fills."""
@@ -166,6 +188,10 @@ class DefectiveLine:
         rise[:, :2] += self._surface
         return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
 
+    def rise(self, state: StaticState) -> Profile:
+        """Change of the running surface's height in a state."""
+        return Profile(self.breaks, state.rise, self.decay, self._repeats)
+
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
         """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""
         from scipy.linalg import solveh_banded  # slow to import
@@ -182,20 +208,33 @@ class DefectiveLine:
         return np.asarray(solveh_banded(band, load, lower=True, overwrite_ab=True, overwrite_b=True))
 
 
-def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> tuple[Any, Array, Array]:
-    """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m)."""
-    each = len(data.droppers.positions)
+def _divided(
+    span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float]
+) -> tuple[Array, Array, Index]:
+    """Limits and lengths of the pieces of a span (m), and at which limits its droppers hang."""
+    breaks = own.breaks(span.span_length, [0.0, *span.droppers.positions, span.span_length], nodes)
+    return breaks, np.diff(breaks), np.searchsorted(breaks, span.droppers.positions)
+
+
+def _locate(
+    data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
+) -> tuple[Any, Array, Array]:
+    """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m).
+
+    counts: of the droppers of each span.
+    """
+    spans, firsts = len(counts), np.cumsum([0, *counts])
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
         for span, number in places:
-            if span > spans or number > each:
+            if span > spans or number > counts[span - 1]:
                 raise InputError(
                     f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans "
-                    f"of {each} droppers."
+                    f"of {counts[0]} droppers."
                 )
-        return [(span - 1) * each + number - 1 for span, number in places]
+        return [int(firsts[span - 1]) + number - 1 for span, number in places]
 
-    broken, error, height = np.zeros(spans * each, dtype=bool), np.zeros(spans * each), np.zeros(spans - 1)
+    broken, error, height = np.zeros(firsts[-1], dtype=bool), np.zeros(firsts[-1]), np.zeros(spans - 1)
     broken[droppers(condition.broken_droppers)] = True
     cut = condition.miscut_droppers
     error[droppers([(span, number) for span, number, _ in cut])] = [wrong for _, _, wrong in cut]
@@ -207,10 +246,3 @@ def _locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) ->
             )
         height[support - 1] = wrong
     return broken, error, height
-
-
-def _add(band: Array, unknowns: Any, stiffness: Array) -> None:
-    """Add the elements' stiffness matrices, (elements, 4, 4), to the lower diagonals of the line's matrix."""
-    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-    lower = row >= column
-    np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])

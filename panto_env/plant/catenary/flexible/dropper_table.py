@@ -1,4 +1,4 @@
-"""The droppers of one span at rest: force, length to cut and stretch."""
+"""The droppers of one span at rest, or of all spans where they differ: force, length to cut and stretch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ....base.table import Table
+from .parts import Span
 from .schema import FlexibleCatenaryData
+from .spans import spans_of
 from .static import hang
 
 HEADINGS = {
@@ -24,18 +26,21 @@ class RestingDropper(NamedTuple):
 
     number: int  # from the support, from 1
     position: float  # from the support (m)
-    sag: float  # of the contact wire below its height at the support (m)
+    sag: float  # of the contact wire below the line from its height at one support to that at the next (m)
     length: float  # unloaded: to which it is cut (m)
     static_force: float  # at the contact wire, clamp and half its own weight included (N)
     stretch: float  # under the static force (m)
+    span: int = 1  # number of its span, from 1; 1 where all are alike
 
 
 def dropper_table(droppers: Sequence[RestingDropper]) -> Table:
     """The droppers as a table to print, with sag and stretch in millimetres."""
+    differ = any(each.span > 1 for each in droppers)
     rows = [
         (
+            *([str(each.span)] if differ else []),
             str(each.number),
-            f"{each.position:g}",
+            f"{each.position:g}" if not differ else f"{each.position:.3f}",
             f"{1e3 * each.sag:.1f}",
             f"{each.length:.4f}",
             f"{each.static_force:.1f}",
@@ -44,27 +49,37 @@ def dropper_table(droppers: Sequence[RestingDropper]) -> Table:
         for each in droppers
     ]
     in_mm = HEADINGS | {"sag": "sag (mm)", "stretch": "stretch at rest (mm)"}
-    headings = ("dropper", *in_mm.values())
-    return Table("Droppers of a span at rest, as designed", headings, rows, text_columns=0)
+    headings = (*(["span"] if differ else []), "dropper", *in_mm.values())
+    title = f"Droppers of {'all spans' if differ else 'a span'} at rest, as designed"
+    last = [k for k, each in enumerate(droppers[1:]) if each.span != droppers[k].span]
+    return Table(title, headings, rows, text_columns=0, section_ends=tuple(last))
+
+
+def as_rows(droppers: Sequence[RestingDropper]) -> list[dict[str, Any]]:
+    """The droppers as rows of a table to write; numbers of spans are among them only where spans differ."""
+    rows = [each._asdict() for each in droppers]
+    if not any(each.span > 1 for each in droppers):
+        for row in rows:
+            del row["span"]
+    return rows
 
 
 def droppers_at_rest(line: Any) -> list[RestingDropper]:
-    """The droppers of a span, in order; none for lines without. Raises InputError where it cannot hang."""
+    """The droppers of a span, in order, or of all spans where they differ; none for lines without.
+
+    Raises InputError where the line cannot hang.
+    """
     line = getattr(line, "line", line)  # of a rig
     if not isinstance(line, FlexibleCatenaryData):
         return []
     shape = hang(line)
     stretch = shape.dropper_tension / shape.dropper_stiffness
-    columns = (shape.dropper_length, shape.dropper_tension, stretch)
+    rows = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
+    each: Sequence[FlexibleCatenaryData | Span] = spans_of(line).each if line.sequence else [line]
     return [
-        RestingDropper(number, position, sag, *values)
-        for number, (position, sag, *values) in enumerate(
-            zip(
-                line.droppers.positions,
-                line.droppers.sag,
-                *(each.tolist() for each in columns),
-                strict=True,
-            ),
-            start=1,
+        RestingDropper(number, position, sag, *next(rows), number_of_span)
+        for number_of_span, span in enumerate(each, start=1)
+        for number, (position, sag) in enumerate(
+            zip(span.droppers.positions, span.droppers.sag, strict=True), start=1
         )
     ]

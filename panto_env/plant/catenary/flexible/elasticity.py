@@ -1,16 +1,17 @@
 """Elasticity of a line along a span (EN 50119): static uplift of the contact wire per newton.
 
-A line of a few spans is solved at rest for a force at many places of its middle span. Droppers that the force
-would compress go slack.
+A line of a few spans is solved at rest for a force at many places of its middle span; a line whose spans
+differ is solved as a whole, for each of them. Droppers that the force would compress go slack.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
 from ....base.arrays import Array
 from ...line_condition import NEW
-from .beams import Profile
 from .defects import DefectiveLine
 from .schema import FlexibleCatenaryData
 
@@ -23,15 +24,27 @@ PLACES = 48
 def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
     """Places in a span (m) and the uplift of the contact wire there per newton (m/N), (places,) each.
 
-    force: at the place (N). The larger it is, the more droppers go slack.
+    force: at the place (N). The larger it is, the more droppers go slack. Where spans differ, places are
+    along the line, in all spans but the first and the last, at whose ends anchors hold the wires.
     """
-    places = line.span_length / PLACES * np.arange(PLACES + 1)
-    whole = DefectiveLine(line, SPANS, NEW, nodes=places.tolist())
-    lifts = []
-    for x in places + SPANS // 2 * line.span_length:
-        state = whole.solve(pushed=(float(x), force))
-        lifts.append(Profile(whole.breaks, state.rise, whole.decay).height(np.array([x]))[0] / force)
-    return places, np.array(lifts)
+    if not line.sequence:
+        places = line.span_length / PLACES * np.arange(PLACES + 1)
+        whole = DefectiveLine(line, SPANS, NEW, nodes=places.tolist())
+        return places, _lifts(whole, places + SPANS // 2 * line.span_length, force)
+    supports, spans = line.alignment().supports, len(line.sequence)
+    found: list[tuple[Array, Array]] = []
+    for begin, end in pairwise(supports[1:-1]):
+        places = begin + (end - begin) / PLACES * np.arange(PLACES + 1)
+        whole = DefectiveLine(line, spans, NEW, nodes=places.tolist())
+        found.append((places, _lifts(whole, places, force)))
+    return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
+
+
+def _lifts(whole: DefectiveLine, places: Array, force: float) -> Array:
+    """Uplift per newton (m/N) at nodes of a line under a force there (N)."""
+    return np.array(
+        [whole.rise(whole.solve(pushed=(float(x), force))).height(np.array([x]))[0] / force for x in places]
+    )
 
 
 def non_uniformity(elasticities: Array) -> float:

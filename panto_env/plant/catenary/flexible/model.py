@@ -51,8 +51,14 @@ class FlexibleCatenary:
         """Build the line.
 
         Raises InputError where the line cannot hang with its values, grid and time step are not stable
-        together, or a condition has a defect at a dropper, support or place that the line does not have.
+        together, its spans differ, or a condition has a defect at a dropper, support or place that the line
+        does not have.
         """
+        if data.sequence:
+            raise InputError(
+                f"Trains do not run on line '{data.name}' yet, as its spans differ: only its static shape, "
+                "droppers and elasticity are computed (panto line); leave out its sequence for a run."
+            )
         designed, condition = data, of_wires(runs.conditions)
         data = with_tension_left(designed, condition)
         shape = hang(designed)

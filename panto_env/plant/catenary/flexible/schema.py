@@ -3,72 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ....base.explanation import comma_hint
+from ....base.errors import InputError
 from ....base.ranges import Between
 from ....base.settings import Settings
+from ...alignment import Alignment
 from ...numerics import Numerics, Runs
-from ..schema import LONGEST_SPAN, CatenaryData, Wire
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
+from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Span, SteadyArm, Support, check_inside
+from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 
-CLOSEST = 0.1
-"""Least distance between two droppers, or between one and a support (m)."""
-Clamp = Annotated[float, Between(0, 10, "kg")]
+__all__ = [
+    "CLOSEST",
+    "Droppers",
+    "EndSupport",
+    "FlexibleCatenaryData",
+    "Rayleigh",
+    "Span",
+    "SteadyArm",
+    "Support",
+]
 
-
-class Droppers(Settings):
-    """The droppers of one span: springs that carry tension and go slack in compression."""
-
-    positions: tuple[Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")], ...] = Field(
-        min_length=1, max_length=100, description="distance from support (m)"
-    )
-    sag: tuple[Annotated[float, Between(-0.2, 0.5, "m")], ...] = Field(
-        description="how far the contact wire hangs at the dropper below height 0 (m)"
-    )
-    stiffness: Annotated[float, Between(100, 1e8, "N/m")] | None = Field(
-        None, description="stiffness in tension (N/m)"
-    )
-    axial_stiffness: Annotated[float, Between(100, 1e8, "N")] | None = Field(
-        None, description="EA in tension (N); the stiffness is EA over the dropper's length"
-    )
-    mass: Annotated[float, Between(0, 5, "kg/m")] = Field(0.0, description="mass per length (kg/m)")
-    messenger_clamp_mass: Clamp = Field(0.0, description="clamp on the messenger (kg)")
-    contact_clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire (kg)")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if len(self.sag) != len(self.positions):
-            raise ValueError(
-                f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
-                f"but {len(self.sag)} sags{comma_hint(len(self.positions), len(self.sag))}"
-            )
-        if any(b - a < CLOSEST for a, b in zip(self.positions, self.positions[1:], strict=False)):
-            raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")
-        if (self.stiffness is None) == (self.axial_stiffness is None):
-            raise ValueError("give either stiffness or axial_stiffness, and only one of them")
-        return self
-
-
-class Support(Settings):
-    """What holds the messenger wire at a mast."""
-
-    stiffness: Annotated[float, Between(100, 1e8, "N/m")] = Field(description="vertical stiffness (N/m)")
-    damping: Annotated[float, Between(0, 1e6, "N s/m")] = Field(description="vertical damping (N s/m)")
-
-
-class SteadyArm(Settings):
-    """What holds the contact wire sideways at a mast; it balances its own weight."""
-
-    mass: Annotated[float, Between(0, 50, "kg")] = Field(
-        description="mass that moves with the contact wire (kg)"
-    )
-    stiffness: Annotated[float, Between(0, 1e6, "N/m")] = Field(description="vertical stiffness (N/m)")
-    holds_wire: bool = Field(
-        False, description="whether it carries the wire's weight, so that the wire is at height 0"
-    )
+SEQUENCE = {"span_types", "sequence", "end_support"}
+"""Values of a line whose spans differ."""
 
 
 class Rayleigh(Settings):
@@ -79,18 +41,90 @@ class Rayleigh(Settings):
 
 
 class FlexibleCatenaryData(CatenaryData):
-    """Contact and messenger wire, droppers, supports and steady arms."""
+    """Contact and messenger wire, droppers, supports and steady arms.
+
+    One span repeated, or a ``sequence`` of spans of any kind. A sequence of spans that are all alike becomes
+    the one span that is repeated, and so the same line.
+    """
 
     kind: Literal["flexible"] = "flexible"
-    encumbrance: Annotated[float, Between(0.05, 10, "m")] = Field(
-        description="height of messenger over contact wire at support (m)"
-    )
+    encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
     contact_wire: Wire
     messenger_wire: Wire
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
     damping: Rayleigh
+    span_types: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="types of spans by name: tables of what differs from the line's own span_length, "
+        "encumbrance, droppers, support and steady_arm, and contact_height at the span's first support",
+    )
+    sequence: tuple[str | dict[str, Any], ...] = Field(
+        (),
+        description="spans in the order of travel, where they are not all alike: names of span_types, or "
+        "tables of a type and of what differs from it",
+    )
+    end_support: EndSupport | None = Field(
+        None, description="heights at the last support of a sequence, by default those of its last span"
+    )
+
+    def __hash__(self) -> int:
+        """Hash of all values that have one, by which results for a line are cached."""
+        unhashed = ("sources", "span_types", "sequence")
+        return hash(tuple(getattr(self, name) for name in type(self).model_fields if name not in unhashed))
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_spans(cls, values: Any, handler: Callable[[Any], Self]) -> Self:
+        """Lay out droppers at a spacing, and make a sequence of spans that are all alike a uniform line."""
+        if not isinstance(values, Mapping):
+            return handler(values)
+        table, sequence = dict(values), values.get("sequence", ())
+        if "droppers" in table:
+            table["droppers"] = laid_out(table["droppers"], table.get("span_length"))
+        if isinstance(sequence, list | tuple) and sequence:
+            if not FEWEST_SPANS <= len(sequence) <= MOST_SPANS:
+                raise InputError(
+                    f"The sequence must have from {FEWEST_SPANS} to {MOST_SPANS} spans, not {len(sequence)}."
+                )
+            if table.setdefault("spans", len(sequence)) != len(sequence):
+                raise InputError(
+                    f"The sequence has {len(sequence)} spans, but spans is {table['spans']}; leave spans out."
+                )
+        line = handler(table)
+        if not line.sequence:
+            if line.span_types or line.end_support is not None:
+                raise InputError("A line with span_types or an end_support needs a sequence of its spans.")
+            return line
+        found = spans_of(line)
+        alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
+        if not alike or len(set(found.encumbrances)) > 1:
+            return line
+        names = (name for name in Span.model_fields if name != "contact_height")
+        one = {name: getattr(found.each[0], name) for name in names}
+        one = {name: value for name, value in one.items() if value != getattr(line, name)}
+        kept = {name: value for name, value in table.items() if name not in SEQUENCE}
+        kept["sources"] = {
+            key: text for key, text in line.sources.items() if key.split(".")[0] not in one.keys() | SEQUENCE
+        }
+        return handler(kept | one)
+
+    @model_validator(mode="after")
+    def _droppers_in_span(self) -> Self:
+        check_inside(self.droppers.positions, self.span_length)
+        return self
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans lie; spans: their number, by default the line's own.
+
+        Beyond a sequence, spans are as long as its last one.
+        """
+        if not self.sequence:
+            return super().alignment(spans)
+        lengths = [span.span_length for span in spans_of(self).each]
+        count = len(lengths) if spans is None else spans
+        return Alignment.of_spans((lengths + lengths[-1:] * (count - len(lengths)))[:count])
 
     @property
     def wires(self) -> tuple[Wire, Wire]:
@@ -115,12 +149,3 @@ class FlexibleCatenaryData(CatenaryData):
         omega = 2 * math.pi * frequency
         arm = self.steady_arm.stiffness - omega**2 * self.steady_arm.mass
         return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)
-
-    @model_validator(mode="after")
-    def _droppers_in_span(self) -> Self:
-        last = self.droppers.positions[-1]
-        if last >= self.span_length:
-            raise ValueError(f"dropper at {last} m lies outside the span of {self.span_length} m")
-        if self.span_length - last < CLOSEST:
-            raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")
-        return self

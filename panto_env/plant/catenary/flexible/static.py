@@ -1,4 +1,4 @@
-"""Static shape of the two-wire catenary as it is designed: one span of a periodic line.
+"""Static shape of the two-wire catenary as it is designed: one span that repeats, or a whole line of spans.
 
 The contact wire is held at the catalogue's sags by droppers, which are cut so; the messenger wire hangs
 between its supports under the droppers' pull. Both are solved by exact beam elements (``beams``).
@@ -6,7 +6,8 @@ between its supports under the droppers' pull. Both are solved by exact beam ele
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,36 +15,26 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ....base.shown import beside
-from .beams import GRAVITY, PeriodicWire, Profile
+from .beams import GRAVITY, PeriodicWire
+from .parts import Span
 from .schema import FlexibleCatenaryData
+from .shape import StaticShape, settled, stiffness_of, unloaded
+from .spans import spans_of
+from .whole_line import settle_line
 
-MOST_ROUNDS = 200
-"""Rounds in which the droppers' weight, which depends on their length, must settle; usual lines take ten."""
+__all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
+
 HEIGHT_RANGE = 0.5
-"""Maximum difference of the contact wire's heights along a span (m); pantographs follow 0.3 m."""
+"""Maximum difference of the contact wire's heights along a span (m), beside the span's gradient; pantographs
+follow 0.3 m."""
 STEEPEST = 0.2
 """Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
 MOST_STRETCH = 0.1
 """Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
 MOST_YIELD = 0.3
 """Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
-SETTLED, USABLE = 1e-12, 1e-9
-"""Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
 POINTS = 401
 """Number of points of a span at which heights are checked."""
-
-
-@dataclass(frozen=True, eq=False)
-class StaticShape:
-    """One span in equilibrium; dropper arrays are in the order of the catalogue."""
-
-    contact: Profile
-    messenger: Profile
-    arm_force: float  # of the steady arm where that holds the wire, upward (N)
-    dropper_tension: Array  # at the contact wire (N)
-    dropper_length: Array  # unloaded (m)
-    dropper_stiffness: Array  # N/m
-    dropper_mass: Array  # kg, without clamps
 
 
 @remembered
@@ -56,7 +47,7 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
     no line can have, such as with a dropper that pushes; ``hang`` refuses that.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        return _settle(line)
+        return settle_line(line) if line.sequence else _settle(line)
 
 
 @remembered
@@ -67,52 +58,94 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
     the support, where it can't.
     """
     shape = solve(line)
-    yielded = line.encumbrance - float(shape.messenger.height(np.zeros(1))[0])
-    if yielded > MOST_YIELD:
+    _check_supports(line, shape)
+    for each in _each(line):
+        _check_droppers(each, shape)
+    for each in _each(line):
+        _check_wires(each, shape)
+    return shape
+
+
+class _Placed(NamedTuple):
+    """A span of a line in its place; all of a uniform line's spans are one."""
+
+    span: FlexibleCatenaryData | Span
+    where: str
+    begin: float  # m
+    rise: float  # of the contact wire from support to support (m)
+    first: int  # number of its first dropper along the line, from 0
+
+
+def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
+    name = f"line '{line.name}'"
+    if not line.sequence:
+        yield _Placed(line, name, 0.0, 0.0, 0)
+        return
+    spans, heights, _ = spans_of(line)
+    supports, first = line.alignment().supports, 0
+    for k, span in enumerate(spans):
+        where = f"span {k + 1} of {name}"
+        yield _Placed(span, where, supports[k], heights[k + 1] - heights[k], first)
+        first += len(span.droppers.positions)
+
+
+def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
+    """Raise InputError for a support of the messenger that gives way, the one that yields most."""
+    places, tops = np.zeros(1), np.full(1, line.encumbrance)
+    if line.sequence:
+        _, heights, encumbrances = spans_of(line)
+        places, tops = np.array(line.alignment().supports), np.add(heights, encumbrances)
+    yields = tops - shape.messenger.height(places)
+    most = int(yields.argmax())
+    if yields[most] > MOST_YIELD:
+        which = f"support {most + 1}" if line.sequence else "supports"
         raise InputError(
-            f"At rest the messenger's supports of line '{line.name}' would yield by "
-            f"{beside(yielded, MOST_YIELD, '.2g')} m, more than {MOST_YIELD} m; give support.stiffness in "
-            "N/m (500 N/mm are 500e3)."
+            f"At rest the messenger's {which} of line '{line.name}' would yield by "
+            f"{beside(float(yields[most]), MOST_YIELD, '.2g')} m, more than {MOST_YIELD} m; give "
+            "support.stiffness in N/m (500 N/mm are 500e3)."
         )
-    _check_droppers(line, shape)
-    x = np.linspace(0.0, line.span_length, POINTS)
-    contact, messenger = shape.contact.height(x), shape.messenger.height(x)
+
+
+def _check_wires(each: _Placed, shape: StaticShape) -> None:
+    """Raise InputError for wires that cross or are too steep, or a contact wire of too many heights."""
+    x = np.linspace(0.0, each.span.span_length, POINTS)
+    contact, messenger = shape.contact.height(each.begin + x), shape.messenger.height(each.begin + x)
     below = contact - messenger
     if below.max() >= 0:
         raise InputError(
-            f"At rest the messenger wire of line '{line.name}' would hang {below.max():.2g} m below "
+            f"At rest the messenger wire of {each.where} would hang {below.max():.2g} m below "
             f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
         )
-    if np.ptp(contact) > HEIGHT_RANGE:
+    heights = float(np.ptp(contact - each.rise / each.span.span_length * x))
+    if heights > HEIGHT_RANGE:
         raise InputError(
-            f"At rest the contact wire of line '{line.name}' would differ by "
-            f"{beside(float(np.ptp(contact)), HEIGHT_RANGE, '.2g')} m in height along a span, more than "
+            f"At rest the contact wire of {each.where} would differ by "
+            f"{beside(heights, HEIGHT_RANGE, '.2g')} m in height along a span, more than "
             f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
         )
     for name, height in (("contact", contact), ("messenger", messenger)):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
             raise InputError(
-                f"At rest the {name} wire of line '{line.name}' would have a slope of "
+                f"At rest the {name} wire of {each.where} would have a slope of "
                 f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
                 "level wires; give it more tension, or shorter spans."
             )
-    return shape
 
 
-def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
-    """Raise InputError for a dropper without tension or without length."""
-    places = [
-        f"dropper {k} of line '{line.name}', at {x:g} m," for k, x in enumerate(line.droppers.positions, 1)
-    ]
-    for place, tension in zip(places, shape.dropper_tension, strict=True):
+def _check_droppers(each: _Placed, shape: StaticShape) -> None:
+    """Raise InputError for a dropper without tension or without length, or one that gives way."""
+    positions = each.span.droppers.positions
+    places = [f"dropper {k} of {each.where}, at {x:g} m," for k, x in enumerate(positions, 1)]
+    own = slice(each.first, each.first + len(positions))
+    for place, tension in zip(places, shape.dropper_tension[own], strict=True):
         if tension <= 0:
             raise InputError(
                 f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
                 "position, or the sags."
             )
-    stretch = shape.dropper_tension / shape.dropper_stiffness
-    for place, length, longer in zip(places, shape.dropper_length, stretch, strict=True):
+    stretch = (shape.dropper_tension / shape.dropper_stiffness)[own]
+    for place, length, longer in zip(places, shape.dropper_length[own], stretch, strict=True):
         if 0 < MOST_STRETCH * (length + longer) < longer:
             share = beside(100 * longer / (length + longer), 100 * MOST_STRETCH, ".2g")
             raise InputError(
@@ -128,7 +161,7 @@ def _check_droppers(line: FlexibleCatenaryData, shape: StaticShape) -> None:
 
 
 def _settle(line: FlexibleCatenaryData) -> StaticShape:
-    """The static shape, by rounds in which the lengths of the droppers, and so their weights, settle."""
+    """The static shape of a span that repeats."""
     droppers, messenger = line.droppers, line.messenger_wire
     x, sag = np.array(droppers.positions), np.array(droppers.sag)
     breaks = np.concatenate([[0.0], x, [line.span_length]])
@@ -139,42 +172,18 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
     lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
     contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
     lift, arm_force = lifts[: len(x)], float(lifts[len(x) :].sum())
-    length = np.full(len(x), line.encumbrance)
-    for _ in range(MOST_ROUNDS):
+
+    def cut(length: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         dropper_mass = droppers.mass * length
         tension = lift + GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
         pulled = tension + GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
         carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
         top = np.array([line.encumbrance - carried / line.support.stiffness])
         above, _ = upper.hang(top, np.append(0.0, -pulled))
-        loaded_length = above[2 * hung] + sag
-        new_length = _unloaded(line, loaded_length, tension)
-        change = np.abs(new_length - length).max()
-        length = new_length
-        if change < SETTLED:
-            break
-    if not change < USABLE:  # nor where it is nan
-        raise InputError(
-            f"The static shape of line '{line.name}' does not settle in {MOST_ROUNDS} rounds: its droppers "
-            "or clamps are too heavy for its wires; give less mass, or more tension."
-        )
-    stiffness = _stiffness(line, length)
+        return unloaded(droppers, above[2 * hung] + sag, tension), (above, tension, dropper_mass)
+
+    length, (above, tension, mass) = settled(line.name, np.full(len(x), line.encumbrance), cut)
+    stiffness = stiffness_of(droppers, length)
     return StaticShape(
-        lower.profile(contact), upper.profile(above), arm_force, tension, length, stiffness, dropper_mass
+        lower.profile(contact), upper.profile(above), arm_force, tension, length, stiffness, mass
     )
-
-
-def _stiffness(line: FlexibleCatenaryData, length: Array) -> Array:
-    """Stiffness of each dropper in tension (N/m)."""
-    droppers = line.droppers
-    if droppers.stiffness is not None:
-        return np.full(len(length), droppers.stiffness)
-    assert droppers.axial_stiffness is not None  # the schema asks for one of the two
-    return droppers.axial_stiffness / length
-
-
-def _unloaded(line: FlexibleCatenaryData, loaded: Array, tension: Array) -> Array:
-    """Length (m) of each dropper without load, from its length under tension (m) and that tension (N)."""
-    if line.droppers.axial_stiffness is not None:
-        return loaded / (1 + tension / line.droppers.axial_stiffness)
-    return loaded - tension / _stiffness(line, loaded)

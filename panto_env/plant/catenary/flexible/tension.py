@@ -7,7 +7,7 @@ tension would have other droppers: the real ones are too long or too short by th
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
     """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
     was, now, arm, support = solve(designed), solve(left), designed.steady_arm, np.zeros(1)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
-    lift = arm.stiffness * float((was.contact.height(support) - now.contact.height(support))[0])
+    lift: Any = arm.stiffness * float((was.contact.height(support) - now.contact.height(support))[0])
     if arm.holds_wire:
         lift += was.arm_force - now.arm_force
     return Misfit(

@@ -40,16 +40,14 @@ class Wave(NamedTuple):
 
 def wave_ahead(wire: Wire, speed: float, frequency: float) -> Wave:
     """The wave that a train below the wave speed sends ahead at a frequency (Hz); speed: m/s."""
-    from scipy.optimize import brentq  # slow to import
-
-    def omega(k: float) -> float:
-        return math.sqrt((wire.tension * k**2 + wire.bending_stiffness * k**4) / wire.mass)
-
-    # Without bending the wave would be shorter.
-    shortest = 2 * math.pi * frequency / (wire.wave_speed - speed)
-    number = float(brentq(lambda k: omega(k) - k * speed - 2 * math.pi * frequency, 0.0, 1.001 * shortest))
+    # (2 pi f + k v)^2 = (T k^2 + EI k^4) / mass, whose coefficients change sign once: one root is positive.
+    mass, shaken = wire.mass, 2 * math.pi * frequency
+    squared = wire.tension - mass * speed**2
+    roots = np.roots([wire.bending_stiffness, 0.0, squared, -2 * mass * speed * shaken, -mass * shaken**2])
+    number = float(roots.real[(roots.real > 0) & (np.abs(roots.imag) < 1e-6 * np.abs(roots.real))].max())
     slope = wire.tension * number + 2 * wire.bending_stiffness * number**3
-    return Wave(number, omega(number), slope / (wire.mass * omega(number)))
+    omega = shaken + speed * number
+    return Wave(number, omega, slope / (mass * omega))
 
 
 def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ....base.ranges import Between
 from ....base.settings import Settings
+from ...alignment import Alignment
 from ..flexible import FlexibleCatenaryData
 from ..schema import CatenaryData
 from ..three_span import ThreeSpanData
@@ -117,3 +118,7 @@ class RigData(CatenaryData):
     def source_of(self, name: str) -> str:
         """Source of a value that lines of every kind have, by default that of ``line``."""
         return self.sources.get(name) or self.line.source_of(name)
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans of the computed line lie."""
+        return self.line.alignment(spans)

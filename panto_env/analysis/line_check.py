@@ -1,0 +1,170 @@
+"""A line at rest, span by span: gradients, pre-sag, droppers and elasticity, with the limits of EN 50119."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.table import Table
+from ..metrics.criterion import Criterion
+from ..metrics.en50119 import SOURCE, gradient_limits, highest_speed
+from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
+from ..plant.catenary.flexible.elasticity import PLACES, elasticity, non_uniformity
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.flexible.spans import spans_of
+from ..plant.catenary.flexible.static import hang
+
+
+class SpanCheck(NamedTuple):
+    """One span at rest; heights are those at its first support. One stands for all where all are alike."""
+
+    number: int  # from 1
+    begin: float  # position of its first support (m)
+    length: float  # m
+    encumbrance: float  # m
+    contact_height: float  # over the nominal one (m)
+    gradient: float  # from support to support (‰)
+    change: float  # of gradient at its first support (‰), 0 at the line's first
+    pre_sag: float  # maximum sag of the droppers (m)
+    smallest_force: float  # in a dropper at rest (N)
+    largest_force: float  # N
+    smallest_elasticity: float  # m/N; nan in the first and the last of unlike spans
+    largest_elasticity: float  # m/N
+    non_uniformity: float  # of the elasticity (%)
+
+
+@dataclass(frozen=True)
+class LineCheck:
+    """A line at rest."""
+
+    line: FlexibleCatenaryData
+    spans: list[SpanCheck]
+    droppers: list[RestingDropper]
+    places: Array  # of the elasticities, along the line or, where spans are alike, in one (m), (n,)
+    elasticities: Array  # m/N, (n,)
+    force: float  # with which they are computed (N)
+
+    @property
+    def largest_gradient(self) -> float:
+        """Maximum gradient, up or down (‰)."""
+        return max(abs(span.gradient) for span in self.spans)
+
+    @property
+    def largest_change(self) -> float:
+        """Maximum change of gradient at a support (‰)."""
+        return max(abs(span.change) for span in self.spans)
+
+    def criteria(self, speed_kmh: float | None = None) -> list[Criterion]:
+        """Gradients with their limits for a speed (km/h), if one is given; then values without limits."""
+        steepest, change = self.largest_gradient, self.largest_change
+        limits = (None, None) if speed_kmh is None else gradient_limits(speed_kmh)
+        fastest = highest_speed(steepest, change)
+        allowed = {0.0: "at no speed", np.inf: "at any speed"}.get(fastest, f"up to {fastest:g} km/h")
+        forces = [each.static_force for each in self.droppers]
+        yields = 1e3 * self.elasticities
+        return [
+            Criterion("gradient", "maximum gradient", "‰", _shown(steepest), None, limits[0], SOURCE),
+            Criterion(
+                "gradient_change",
+                "maximum change of gradient",
+                "‰",
+                _shown(change),
+                None,
+                limits[1],
+                SOURCE,
+                f"{SOURCE}, allows these gradients {allowed}",
+            ),
+            Criterion("pre_sag", "maximum pre-sag", "mm", 1e3 * max(each.pre_sag for each in self.spans)),
+            Criterion("smallest_dropper_force", "minimum force of a dropper", "N", min(forces)),
+            Criterion("largest_dropper_force", "maximum force of a dropper", "N", max(forces)),
+            Criterion("largest_elasticity", "maximum elasticity", "mm/N", float(yields.max())),
+            Criterion("smallest_elasticity", "minimum elasticity", "mm/N", float(yields.min())),
+            Criterion(
+                "non_uniformity", "non-uniformity of the elasticity", "%", non_uniformity(self.elasticities)
+            ),
+        ]
+
+
+def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
+    """A line at rest, and its elasticity under a force (N). Raises InputError where it cannot hang."""
+    hang(line)
+    droppers = droppers_at_rest(line)
+    places, elasticities = elasticity(line, force)
+    spans, heights, _ = spans_of(line)
+    supports = np.array(line.alignment().supports)
+    gradients = 1e3 * np.diff(heights) / np.diff(supports)
+    changes = np.diff(gradients, prepend=gradients[:1])
+    per_span = elasticities.reshape(-1, PLACES + 1)
+    inner = range(len(spans)) if not line.sequence else range(1, len(spans) - 1)
+    yields = {k: per_span[n if line.sequence else 0] for n, k in enumerate(inner)}
+    found = []
+    for k, span in enumerate(spans if line.sequence else spans[:1]):
+        forces = [each.static_force for each in droppers if each.span == k + 1]
+        own = yields.get(k)
+        found.append(
+            SpanCheck(
+                k + 1,
+                float(supports[k]),
+                span.span_length,
+                span.encumbrance,
+                span.contact_height,
+                float(gradients[k]),
+                float(changes[k]),
+                max(span.droppers.sag),
+                min(forces),
+                max(forces),
+                np.nan if own is None else float(own.min()),
+                np.nan if own is None else float(own.max()),
+                np.nan if own is None else non_uniformity(own),
+            )
+        )
+    return LineCheck(line, found, droppers, places, elasticities, force)
+
+
+def span_tables(spans: Sequence[SpanCheck]) -> list[Table]:
+    """Two tables to print: where the spans' supports stand, and the spans at rest."""
+    alike = "" if len(spans) > 1 else "; all spans are alike"
+    placed = [
+        (
+            str(each.number),
+            f"{each.begin:g}",
+            f"{each.length:g}",
+            f"{each.contact_height:+.3f}",
+            f"{each.encumbrance:.3f}",
+            f"{_shown(each.gradient):.2f}",
+            f"{_shown(each.change):.2f}",
+        )
+        for each in spans
+    ]
+    at_rest = [
+        (
+            str(each.number),
+            f"{1e3 * each.pre_sag:.0f}",
+            f"{each.smallest_force:.0f} to {each.largest_force:.0f}",
+            *_yields(each),
+        )
+        for each in spans
+    ]
+    headings = ("span", "from (m)", "length (m)", "contact height (m)", "encumbrance (m)", "gradient (‰)")
+    at_first = (*headings, "change of gradient (‰)")
+    below = ("span", "pre-sag (mm)", "droppers (N)", "elasticity (mm/N)", "its non-uniformity (%)")
+    return [
+        Table(f"Spans, and heights at the support where each begins{alike}", at_first, placed, 0),
+        Table(f"Spans at rest{alike}", below, at_rest, 0),
+    ]
+
+
+def _yields(span: SpanCheck) -> tuple[str, str]:
+    if np.isnan(span.non_uniformity):
+        return "–", "–"
+    lowest, highest = 1e3 * span.smallest_elasticity, 1e3 * span.largest_elasticity
+    return f"{lowest:.3f} to {highest:.3f}", f"{span.non_uniformity:.1f}"
+
+
+def _shown(value: float) -> float:
+    """A gradient (‰) without the rounding of heights and lengths."""
+    return round(value, 6) + 0.0

@@ -1,0 +1,102 @@
+"""``panto line``: a line at rest, from the catalogue, a TOML file, or a table of its masts."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..analysis.requirements import print_criteria
+from ..base.errors import InputError
+from ..base.files import write_whole
+from ..catalog import load_catenary
+from ..catalog.loader import parse_catenary
+from ..plant.catenary.flexible.dropper_table import dropper_table
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
+
+FORCE = 100.0
+
+
+def line(
+    name: Annotated[str, typer.Argument(help="Line: a name of the catalogue or a TOML file.")],
+    masts: Annotated[
+        str | None,
+        typer.Option(
+            help="CSV file with a row per mast: position or span (m); contact_height, messenger_height or "
+            "encumbrance (m); type, a name in span_types. Wires, droppers and supports are the line's."
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
+    ] = None,
+    force: Annotated[float, typer.Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            help="Write the line between the masts to this TOML file (.toml).", callback=writable((".toml",))
+        ),
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Show a line at rest: spans, droppers, gradients and elasticity; make one from a table of masts.
+
+    Exits with 1 if a limit of EN 50119 is broken.
+    """
+    from ..analysis.line_check import check, span_tables
+
+    if output is not None and masts is None:
+        raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
+    chosen, text = _line(name, masts, output)
+    if not isinstance(chosen, FlexibleCatenaryData):
+        raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
+    found = check(chosen, force)
+    criteria = found.criteria(speed)
+    broken = [each for each in criteria if each.kept is False]
+    with written_last() as later:
+        if output is not None and text is not None:
+            later(_write, text, output)
+        if plot is not None:
+            from ..analysis.line_plot import plot_line
+            from ..analysis.plots import save
+
+            later(save, plot_line(found), plot)
+        if json:
+            print_json(
+                {
+                    "line": chosen.model_dump(mode="json"),
+                    "spans": [each._asdict() for each in found.spans],
+                    "droppers": [each._asdict() for each in found.droppers],
+                    "criteria": [each.as_dict() for each in criteria],
+                }
+            )
+        else:
+            for table in (*span_tables(found.spans), dropper_table(found.droppers)):
+                print_table(table)
+            print_criteria(criteria, f"Line {chosen.name} at rest")
+            if chosen.sequence:
+                console.print(
+                    "Elasticity is left out in the first and the last span, where anchors hold the wires."
+                )
+            for each in broken:
+                alert(f"{each.name} is not kept.")
+    if broken:
+        raise typer.Exit(1)
+
+
+def _line(name: str, masts: str | None, output: str | None) -> tuple[Any, str | None]:
+    """The line, and the text of its TOML file where it is made from masts."""
+    if masts is None:
+        return load_catenary(name), None
+    from ..catalog.masts import line_from_masts
+
+    text = line_from_masts(name, masts)
+    return parse_catenary(tomllib.loads(text), Path(output or f"{Path(masts).stem}.toml")), text
+
+
+def _write(text: str, path: str) -> None:
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

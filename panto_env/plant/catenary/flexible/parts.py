@@ -1,0 +1,115 @@
+"""One span of a flexible catenary, and what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Self, TypeAlias
+
+from pydantic import Field, model_validator
+
+from ....base.explanation import comma_hint
+from ....base.ranges import Between
+from ....base.settings import Settings
+from ..schema import LONGEST_SPAN, SpanLength
+
+CLOSEST = 0.1
+"""Least distance between two droppers, or between one and a support (m)."""
+Clamp = Annotated[float, Between(0, 10, "kg")]
+
+
+class Droppers(Settings):
+    """The droppers of one span: springs that carry tension and go slack in compression."""
+
+    positions: tuple[Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")], ...] = Field(
+        min_length=1, max_length=100, description="distance from support (m)"
+    )
+    sag: tuple[Annotated[float, Between(-0.2, 0.5, "m")], ...] = Field(
+        description="how far the contact wire hangs at the dropper below height 0, or below the straight "
+        "line between contact heights at the span's two supports (m)"
+    )
+    stiffness: Annotated[float, Between(100, 1e8, "N/m")] | None = Field(
+        None, description="stiffness in tension (N/m)"
+    )
+    axial_stiffness: Annotated[float, Between(100, 1e8, "N")] | None = Field(
+        None, description="EA in tension (N); the stiffness is EA over the dropper's length"
+    )
+    mass: Annotated[float, Between(0, 5, "kg/m")] = Field(0.0, description="mass per length (kg/m)")
+    messenger_clamp_mass: Clamp = Field(0.0, description="clamp on the messenger (kg)")
+    contact_clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire (kg)")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.sag) != len(self.positions):
+            raise ValueError(
+                f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
+                f"but {len(self.sag)} sags{comma_hint(len(self.positions), len(self.sag))}"
+            )
+        if any(b - a < CLOSEST for a, b in zip(self.positions, self.positions[1:], strict=False)):
+            raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")
+        if (self.stiffness is None) == (self.axial_stiffness is None):
+            raise ValueError("give either stiffness or axial_stiffness, and only one of them")
+        return self
+
+
+class Support(Settings):
+    """What holds the messenger wire at a mast."""
+
+    stiffness: Annotated[float, Between(100, 1e8, "N/m")] = Field(description="vertical stiffness (N/m)")
+    damping: Annotated[float, Between(0, 1e6, "N s/m")] = Field(description="vertical damping (N s/m)")
+
+
+class SteadyArm(Settings):
+    """What holds the contact wire sideways at a mast; it balances its own weight."""
+
+    mass: Annotated[float, Between(0, 50, "kg")] = Field(
+        description="mass that moves with the contact wire (kg)"
+    )
+    stiffness: Annotated[float, Between(0, 1e6, "N/m")] = Field(description="vertical stiffness (N/m)")
+    holds_wire: bool = Field(
+        False, description="whether it carries the wire's weight, so that the wire is at height 0"
+    )
+
+
+Encumbrance: TypeAlias = Annotated[float, Between(0.05, 10, "m")]
+ContactHeight: TypeAlias = Annotated[float, Between(-2, 2, "m")]
+
+
+class Span(Settings):
+    """A span, and what stands at the support where it begins."""
+
+    span_length: SpanLength = Field(description="distance between supports (m)")
+    encumbrance: Encumbrance = Field(
+        description="height of messenger over contact wire at the span's first support (m)"
+    )
+    contact_height: ContactHeight = Field(
+        0.0,
+        description="height of the contact wire at the span's first support over the nominal one (m)",
+    )
+    droppers: Droppers
+    support: Support
+    steady_arm: SteadyArm
+
+    @model_validator(mode="after")
+    def _droppers_in_span(self) -> Self:
+        check_inside(self.droppers.positions, self.span_length)
+        return self
+
+
+class EndSupport(Settings):
+    """Heights at the last support of a sequence of spans, where no span begins."""
+
+    encumbrance: Encumbrance | None = Field(
+        None, description="height of messenger over contact wire (m), by default that of the last span"
+    )
+    contact_height: ContactHeight | None = Field(
+        None, description="height of the contact wire (m), by default that of the last span"
+    )
+
+
+def check_inside(positions: Sequence[float], span_length: float) -> None:
+    """Raise ValueError unless droppers at rising positions (m) hang within a span of a length (m)."""
+    last = positions[-1]
+    if last >= span_length:
+        raise ValueError(f"dropper at {last} m lies outside the span of {span_length} m")
+    if span_length - last < CLOSEST:
+        raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")
