@@ -56,7 +56,7 @@ def fingerprint(given: Mapping[str, Any]) -> str:
         mode="json", include=set(MATTER), serialize_as_any=True, exclude_defaults=True
     )
     for name in ("catenary", "pantograph"):
-        for words in ("description", "sources"):
+        for words in ("description", "sources", "system", "uplift_stop"):  # no force depends on these
             plain[name].pop(words, None)
     plain["kinds"] = [type(one).__name__ for one in (settings.catenary, settings.actuator)]
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()

@@ -103,7 +103,8 @@ def test_twenty_samples_are_the_fewest_of_a_record(motion, tmp_path):
         read_motion(tmp_path / "19.csv", 120.0)
 
 
-def test_the_command_prints_compares_and_writes(record, tmp_path):
+def test_the_command_prints_compares_and_writes(record, tmp_path, monkeypatch):
+    monkeypatch.setattr("panto_env.terminal.console._width", 200)
     output, picture = tmp_path / "force.parquet", tmp_path / "force.png"
     shown = panto(
         "estimate", record, "--pantograph", "own-two-mass", "--output", output, "--plot", picture, "--json"

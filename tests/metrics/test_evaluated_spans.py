@@ -37,7 +37,7 @@ def test_what_was_asked_for_is_kept():
 def test_the_default_is_near_what_a_long_run_comes_to(speed):
     """With the start in it σ is much farther off."""
     (all_spans, default) = start.check_start(speed, (1, FIRST_SETTLED))
-    assert default.rms < 1.0
+    assert default.rms < 1.2  # as docs/validation.md says
     assert default.worst < 2.5
     assert all_spans.rms > 2 * default.rms
     assert (default.first, default.last) == USUAL
