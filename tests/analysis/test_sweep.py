@@ -266,8 +266,8 @@ def test_a_plot_names_parameters_in_words_with_their_units():
     wanted = {
         "pantograph.masses.1": "pantograph: masses, head first, 1st (kg)",
         "catenary.contact_wire.tension": "catenary: contact wire: tension (N)",
-        "catenary.droppers.sag.11": "catenary: droppers: how far the contact wire hangs at the dropper "
-        "below height 0, 11th (m)",
+        "catenary.droppers.stiffness": "catenary: droppers: stiffness in tension (N/m)",
+        "catenary.droppers.positions.11": "catenary: droppers: distance from support, 11th (m)",
         "speed_kmh": "speed of the train (km/h)",
         "policy.gain": "policy: gain",
     }

@@ -26,6 +26,13 @@ OUTPUTS = {
     "diagnose --plot": (["diagnose", "a.parquet", "--healthy", "b.parquet"], FILE, ".png"),
     "speed --plot": (["speed"], FILE, ".png"),
     "rig --plot": (["rig"], FILE, ".png"),
+    "line --output": (["line", "re250"], FILE, ".toml"),
+    "line --plot": (["line", "re250"], FILE, ".png"),
+    "list --droppers": (["list", "re250"], FILE, ".csv"),
+    "simulate --figures": (["simulate"], FILE, ".csv"),
+    "simulate --droppers": (["simulate"], FILE, ".xlsx"),
+    "report --figures": (["report", "a.parquet"], FILE, ".csv"),
+    "report --droppers": (["report", "a.parquet"], FILE, ".csv"),
     "benchmark --output": (["benchmark", "passive"], FILE, ".json"),
     "benchmark --plot": (["benchmark", "passive"], FILE, ".png"),
     "benchmark --html": (["benchmark", "passive"], FILE, ".html"),
@@ -123,7 +130,7 @@ def outputs(command, words=()):
             yield from outputs(command.get_command(None, name), (*words, name))
         return
     for parameter in command.params:
-        if parameter.name in ("output", "plot", "html"):
+        if parameter.name in ("output", "plot", "html", "figures", "droppers"):
             yield f"{' '.join(words)} {parameter.opts[0]}"
 
 

@@ -36,6 +36,7 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
         "film.gif",
     ),
     ("sweep",): ("catenary.mean_stiffness=3000,4000", "--workers", "1", *SHORT),
+    ("line",): ("re250",),
     ("family",): ("high-speed", "--seeds", "1"),
     ("validate",): (),
     ("identify",): ("rig.csv", "--measured", "k1T=32992,m2=5,k2=14544"),

@@ -20,7 +20,7 @@ from ...backend import operation
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.shown import beside
-from ...base.units import to_kmh
+from ...base.units import from_kmh, to_kmh
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from ..valid_range import ENDING
@@ -29,6 +29,8 @@ from .view import LineView
 
 SLOWEST = 1e-9
 """Minimum speed of a train (m/s); below it the train counts as at rest."""
+FASTEST = from_kmh(1000)
+"""Speed that no train reaches (m/s), for lines on which no wave runs."""
 
 
 class StartPoint(NamedTuple):
@@ -97,15 +99,15 @@ class CatenaryKind(NamedTuple):
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
-    """Raise InputError unless all speeds (m/s) are below the wave speed (m/s) of a line."""
+    """Raise InputError unless all speeds (m/s) are below the wave speed (m/s) of a line, and a train's."""
+    limit = min(wave_speed, FASTEST)
     for speed in speeds:
-        if not (math.isfinite(speed) and SLOWEST <= speed < wave_speed):
-            bound = ""
-            if math.isfinite(wave_speed):
-                highest = beside(to_kmh(wave_speed), to_kmh(speed), ".0f")
-                bound = f" and below the wave speed of the contact wire, {highest} km/h"
+        if not (math.isfinite(speed) and SLOWEST <= speed < limit):
+            highest = beside(to_kmh(limit), to_kmh(speed), ".0f")
+            of_wire = "the wave speed of the contact wire, " if wave_speed <= FASTEST else ""
             raise InputError(
-                f"The speed must lie above 0{bound} on line '{line}', not at {to_kmh(speed):g} km/h."
+                f"The speed must lie above 0 and below {of_wire}{highest} km/h on line '{line}', "
+                f"not at {to_kmh(speed):g} km/h."
             )
 
 
