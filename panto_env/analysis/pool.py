@@ -81,14 +81,18 @@ def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> l
     return results
 
 
+MOST_PER_CORE = 4
+"""Maximum number of workers per core; more would only take their time to start."""
+
+
 def workers_for(jobs: int, workers: int | None) -> int:
-    """Number of workers for a number of jobs, by default one per core.
+    """Number of workers for a number of jobs, by default one per core, never more than a few per core.
 
     Raises InputError for less than one.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
-    return max(1, min(cores() if workers is None else workers, jobs))
+    return max(1, min(cores() if workers is None else workers, MOST_PER_CORE * cores(), jobs))
 
 
 def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[T] | None = None) -> list[T]:

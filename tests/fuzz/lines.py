@@ -58,7 +58,7 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("oracle",): (*QUICK, "--spans", "1-1", "--hops", "0"),
     ("replay",): ("result.json", "--workers", "1"),
     ("report",): ("benchmark.json",),
-    ("returns",): ("benchmark.json", "--episodes", "2", "--workers", "1"),
+    ("returns",): ("result.json", "--id", "PantographStiffness-v0", "--episodes", "2", "--workers", "1"),
     ("submission", "check"): ("mine", "--config", "small.toml", "--seeds", "1", "--workers", "1"),
     ("train",): ("training.toml", "--output", "run"),
     ("trainings",): ("training.toml", "--workers", "1"),
