@@ -125,9 +125,16 @@ def test_a_grid_that_does_not_carry_the_waves_ahead_is_warned_of():
         simulate(line, pantograph, 0.5 * quick, distance=60.0, record_droppers=False)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "case", list(lines.every_case()), ids=lambda case: f"{case.name}, {case.speed_kmh:.0f}"
+    "case",
+    [
+        pytest.param(
+            case,
+            id=f"{case.name}, {case.speed_kmh:.0f}",
+            marks=pytest.mark.study if number % 6 else pytest.mark.slow,
+        )
+        for number, case in enumerate(lines.every_case())
+    ],
 )
 def test_figures_are_within_one_per_cent_of_converged(case):
     check = lines.check_case(case)[0]
