@@ -8,6 +8,7 @@ import runpy
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -62,33 +63,34 @@ def find_policy(source: Any) -> Policy:
             f"A policy must have the methods reset and act, or be a name; {shown(source)} is neither."
         )
     name, _, parameters = str(source).partition(":")
-    path, loaders = Path(source), plugins.installed(plugins.LOADERS)
-    match _kind(str(source)):
-        case "installed":
-            return _make(maker_of(name), str(source), parameters)
-        case "code":
-            return _policy_from_file(str(source), Path(name), parameters)
-        case "model":
-            if not os.path.isfile(path):
-                raise InputError(f"The model file {path} does not exist; check the path.")
-            loader = loaders[path.suffix[1:]]
-            with plugins.blamed(loader):
-                loaded: Policy = plugins.load(loader)(path)
-            return loaded
-    raise InputError(
-        f"Unknown policy '{source}': {suggest(name, policy_names())}; or give the path of a model file "
-        f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
-    )
+    path = Path(source)
+    kind, point = _kind(str(source))
+    if kind == "code":
+        return _policy_from_file(str(source), Path(name), parameters)
+    if point is None:
+        loaders = plugins.installed(plugins.LOADERS)
+        raise InputError(
+            f"Unknown policy '{source}': {suggest(name, policy_names())}; or give the path of a model file "
+            f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
+        )
+    if kind == "installed":
+        return _make(_maker(point), str(source), parameters)
+    if not os.path.isfile(path):
+        raise InputError(f"The model file {path} does not exist; check the path.")
+    with plugins.blamed(point):
+        loaded: Policy = plugins.load(point)(path)
+    return loaded
 
 
-def _kind(source: str) -> Literal["installed", "code", "model", "unknown"]:
-    """What a policy's name stands for."""
+def _kind(source: str) -> tuple[Literal["installed", "code", "model", "unknown"], EntryPoint | None]:
+    """What a policy's name stands for, and the plug-in that makes or loads it, if any."""
     name = source.partition(":")[0]
-    if name in plugins.installed(plugins.POLICIES):
-        return "installed"
+    if point := plugins.installed(plugins.POLICIES).get(name):
+        return "installed", point
     if name.endswith(".py"):
-        return "code"
-    return "model" if Path(source).suffix[1:] in plugins.installed(plugins.LOADERS) else "unknown"
+        return "code", None
+    loader = plugins.installed(plugins.LOADERS).get(Path(source).suffix[1:])
+    return ("model" if loader else "unknown"), loader
 
 
 def check_named(policy: str, where: str | Path) -> None:
@@ -97,7 +99,7 @@ def check_named(policy: str, where: str | Path) -> None:
     Anyone may have written the file, and the code would have all rights of the user, who has not named it.
     Our own model files hold no code; those of other loaders may. where: the file, for the message.
     """
-    kind = _kind(policy)
+    kind, _ = _kind(policy)
     if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
         raise InputError(
             f"{where} names the policy {shown(policy)}, but a file may name only installed policies and "
@@ -133,7 +135,10 @@ def maker_of(name: str) -> Callable[..., Policy]:
 
     Raises InputError, which names its package, where it can't be loaded or is neither.
     """
-    point = plugins.installed(plugins.POLICIES)[name]
+    return _maker(plugins.installed(plugins.POLICIES)[name])
+
+
+def _maker(point: EntryPoint) -> Callable[..., Policy]:
     with plugins.blamed(point):
         maker: Callable[..., Policy] = plugins.load(point)
         parameters_of(maker)

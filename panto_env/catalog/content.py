@@ -6,6 +6,7 @@ import hashlib
 import json
 from typing import Any
 
+from ..base.remember import remembered
 from ..plant.catenary import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from .loader import available, load_catenary, load_pantograph
@@ -14,6 +15,7 @@ WORDS = ("name", "description", "sources")
 """Keys that say nothing of the values."""
 
 
+@remembered
 def content_of(entry: CatenaryData | PantographData) -> str:
     """SHA-256 of a line's or a pantograph's values, in hexadecimal.
 
@@ -27,21 +29,21 @@ def content_of(entry: CatenaryData | PantographData) -> str:
 def content_unless_catalogue(entry: CatenaryData | PantographData) -> str | None:
     """``content_of`` an entry, or None where the catalogue has it by its name, with the same values."""
     found = content_of(entry)
-    line = isinstance(entry, CatenaryData)
-    if entry.name not in available("catenary" if line else "pantograph"):
-        return found
-    known = load_catenary(entry.name) if line else load_pantograph(entry.name)
-    return None if content_of(known) == found else found
+    return None if _content_in_catalogue(entry, entry.name) == found else found
 
 
 def is_entry(entry: CatenaryData | PantographData, name: str, content: str | None) -> bool:
     """Whether a line or a pantograph is the one stored by its name and ``content_unless_catalogue``."""
-    if content is not None:
-        return content_of(entry) == content
+    known = _content_in_catalogue(entry, name) if content is None else content
+    return known == content_of(entry)  # None where it was a file's: there is nothing to know its values by
+
+
+def _content_in_catalogue(entry: CatenaryData | PantographData, name: str) -> str | None:
+    """``content_of`` the catalogue's entry of a name, of the kind of ``entry``; None where it has none."""
     line = isinstance(entry, CatenaryData)
     if name not in available("catenary" if line else "pantograph"):
-        return False  # it was a file's, and there is nothing to know its values by
-    return content_of(load_catenary(name) if line else load_pantograph(name)) == content_of(entry)
+        return None
+    return content_of(load_catenary(name) if line else load_pantograph(name))
 
 
 def _without_words(values: Any) -> Any:
