@@ -14,7 +14,7 @@ PLAIN = {
     "’": "'", "“": '"', "”": '"', "°": " deg", "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta",
     "Δ": "Delta", "ε": "epsilon", "ζ": "zeta", "η": "eta", "θ": "theta", "λ": "lambda", "μ": "u",
     "µ": "u", "ν": "nu", "π": "pi", "ρ": "rho", "σ": "sigma", "Σ": "Sigma", "τ": "tau", "φ": "phi",
-    "ω": "omega", "Ω": "Ohm", "ß": "ss", "ø": "o", "Ø": "O", "æ": "ae",
+    "ω": "omega", "Ω": "Ohm", "ß": "ss", "ø": "o", "Ø": "O", "æ": "ae", "‰": "per mille",
 }  # fmt: skip
 """Replacements of characters without a plain form in Unicode's tables."""
 BOXES, BLOCKS = range(0x2500, 0x2580), range(0x2580, 0x25A0)
