@@ -15,7 +15,7 @@ from .mathematics import NOT_NEGATIVE, any_of, choose, larger, root, smaller
 from .memory import CACHE_LINE, aligned_zeros, copy_whole
 from .packed import bind, open_packed, pack
 from .threads import LaneThreads
-from .vectors import WIDTH, load_row, shift_down, shift_up, store_row
+from .vectors import WIDTH, gather, load_row, scatter_add, shift_down, shift_up, store_row
 
 __all__ = [
     "CACHE_LINE",
@@ -30,6 +30,7 @@ __all__ = [
     "choose",
     "constants",
     "copy_whole",
+    "gather",
     "implements",
     "inlined",
     "kernel",
@@ -40,6 +41,7 @@ __all__ = [
     "pack",
     "python_function",
     "root",
+    "scatter_add",
     "shift_down",
     "shift_up",
     "smaller",

@@ -206,3 +206,60 @@ shift_up: Any = _shift(up=True)
 """``shift_up(vector, end)``: each number one element further; the first element is that of ``end``."""
 shift_down: Any = _shift(up=False)
 """``shift_down(vector, end)``: each number one element back; the last element is that of ``end``."""
+
+
+def _gather_plain(rows: Any, places: Any, i: int) -> Any:
+    return rows.reshape(-1)[places[i]]
+
+
+def _scatter_plain(rows: Any, places: Any, i: int, vector: Any) -> None:
+    np.add.at(rows.reshape(-1), places[i], vector)
+
+
+def _are_places(array: Any) -> bool:
+    return _is_table(array) and isinstance(array.dtype, types.Integer)
+
+
+def _addresses(context: Any, builder: Any, kinds: Any, rows: Any, places: Any, i: Any) -> list[Any]:
+    """Addresses of the numbers of a table ``rows`` at row ``i`` of ``places``."""
+    data = make_array(kinds[0])(context, builder, rows).data
+    row = builder.load(
+        _row(context, builder, kinds[1], (places, i), WIDTH), align=kinds[1].dtype.bitwidth // 8
+    )
+    return [builder.gep(data, [builder.extract_element(row, _number(k))]) for k in range(WIDTH)]
+
+
+def _number(k: int) -> Any:
+    return ir.Constant(ir.IntType(32), k)
+
+
+@in_python(_gather_plain)
+def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
+    """``gather(rows, places, i)``: the numbers of a table (rows, WIDTH), counted row by row, at the places in
+    row i of ``places``, (n, WIDTH), as a vector.
+    """
+    if not (_is_table(rows) and _are_places(places) and isinstance(i, types.Integer)):
+        return None
+
+    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        vector = ir.Constant(ir.VectorType(context.get_value_type(rows.dtype), WIDTH), ir.Undefined)
+        for k, address in enumerate(_addresses(context, builder, sig.args, *values)):
+            vector = builder.insert_element(vector, builder.load(address), _number(k))
+        return vector
+
+    return VectorType(rows.dtype)(rows, places, types.intp), build
+
+
+@in_python(_scatter_plain)
+def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any:
+    """``scatter_add(rows, places, i, vector)``: add a vector to the numbers that ``gather`` reads."""
+    if not (_is_table(rows) and _are_places(places) and isinstance(i, types.Integer)):
+        return None
+
+    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        for k, address in enumerate(_addresses(context, builder, sig.args, *values[:3])):
+            item = builder.extract_element(values[3], _number(k))
+            builder.store(builder.fadd(builder.load(address), item, flags=FLAGS), address)
+        return context.get_dummy_value()
+
+    return types.void(rows, places, types.intp, VectorType(rows.dtype)), build

@@ -18,12 +18,16 @@ def spans(settings: RunSettings) -> int | None:
     line = settings.line
     if settings.spans is not None or settings.distance is None:
         more = math.ceil(settings.settle)
+        more = min(more, line.most_spans - line.spans)
         return line.spans + more if settings.spans is None and more else settings.spans
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
-    clear = line.clear_spans(settings.numerics, settings.runs, last) if last >= line.spans else 1
+    most = line.most_spans
+    clear = line.clear_spans(settings.numerics, settings.runs, last) if line.spans <= last < most else 1
+    if most < MOST_SPANS:
+        clear = 0  # the train may run up to the anchor of a line that has one
     needed = last + clear
-    if needed > MOST_SPANS:
-        longest = line.alignment().support(MOST_SPANS - clear)
+    if needed > most:
+        longest = line.alignment().support(most - clear)
         raise InputError(
             f"distance must be at most {longest:,g} m on line '{line.name}', not "
             f"{beside(settings.distance, longest, ',.6g')} m."

@@ -294,6 +294,8 @@ def far_enough(settings: RunSettings) -> RunSettings:
     if settings.distance is not None or settings.spans is not None:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
+    if last >= line.most_spans:
+        return settings
     spans = last + line.clear_spans(settings.numerics, settings.runs, last)
     return settings.model_copy(update={"distance": line.alignment(last).length, "spans": spans})
 

@@ -68,6 +68,11 @@ class CatenaryData(Settings):
         """Source of a value that lines of every kind have; reports whether it is the default."""
         return self.sources.get(name, NO_SOURCE if name in self.model_fields_set else BY_DEFAULT)
 
+    @property
+    def most_spans(self) -> int:
+        """Maximum number of spans of a run."""
+        return MOST_SPANS
+
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)

@@ -3,6 +3,11 @@
 Wires lie in segments abreast: the window is cut into ``WIDTH`` equal segments, and row r of a wire holds node
 r of each. So one vector computes a node of all segments at once, along the wires as at the droppers. Rows
 beyond a segment's ends hold nodes of its neighbours.
+
+What is attached to the wires is computed eight at a time too. Where spans are alike, droppers of different
+segments are in the same rows: they form sets whose nodes are read row by row, and which are the same for each
+position of the window (``FlexibleLine``). Where spans differ, each dropper and support has rows of its own
+(``scattered``), and the window's nodes have masses of their own.
 """
 
 from __future__ import annotations
@@ -11,6 +16,7 @@ from typing import NamedTuple
 
 from ....base.arrays import Array, Index
 from ...alignment import AlignmentArrays
+from .scattered_arrays import Scattered, ScatteredWindow
 
 PAD = 2  # rows beyond each end of the segments, for the five-point stencil
 CONTACT, MESSENGER = 0, 1
@@ -31,19 +37,20 @@ class FlexibleLine(NamedTuple):
     """
 
     spacing: float  # of the grid (m)
-    alignment: AlignmentArrays  # of the whole line, whose spans have one length
-    window: int  # spans that the grid covers
+    alignment: AlignmentArrays  # of the whole line
+    stride: float  # by which the window moves (m): a span, or their mean length where spans differ
+    strides: int  # of the whole line
+    window: int  # strides that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
-    shape: Array  # (rows, n): static height of the contact wire over a span, every span/(n - 1) m (m)
+    shape: Array  # (rows, n): static height of the contact wire, at even distances (m)
+    shape_length: float  # that ``shape`` covers (m): a span that repeats, or the whole line
     rise: Array  # (rows, pieces, 5): its change by defects: a, b, c, d, e of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
     rise_decay: Array  # (rows,): kappa: of exponentials along a piece (1/m)
     stencil: Array  # (rows, wires, 5): weights of nearest and second nearest nodes; b; lag; tiny load (m)
     absorbing: Array  # (rows, wires): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
-    inertia: (
-        Array  # (wires, rows, WIDTH): mass of the bare wire over that of the node; no rows where all are 1
-    )
-    mobility: Array  # (wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N at the node (m/N)
+    inertia: Array  # (wires, rows, WIDTH): of the first window, as ``FlexibleWire`` has it
+    mobility: Array  # (wires, rows + 2 PAD, WIDTH): likewise
     mast_row: Index  # (supports,): row of the node where uplift is recorded
     mast_segment: Index  # (supports,): its segment
     free_uplift: float  # room for it at a support (m)
@@ -65,6 +72,7 @@ class FlexibleLine(NamedTuple):
     link_segment: Index  # (links,): its segment
     link_static: Array  # (rows, links of the window or the line): static tension (N)
     link_gap: Array  # (rows, links of the window or the line): extension before a slack one pulls (m)
+    scattered: Scattered  # what has rows of its own, of the whole line
 
 
 class FlexibleWire(NamedTuple):
@@ -72,15 +80,21 @@ class FlexibleWire(NamedTuple):
 
     displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, about the static shape (m)
     increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
-    first_span: Index  # (lanes,): spans that the window has travelled
+    travelled: Index  # (lanes,): strides that the window has travelled
+    # Of the window's nodes; one for all lanes where the window's masses are the same all along the line.
+    inertia: (
+        Array  # (1 or lanes, wires, rows, WIDTH): bare wire's mass over the node's; no rows where all are 1
+    )
+    mobility: Array  # (1 or lanes, wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N (m/N)
     contact_row: Index  # (lanes, collectors): row of the first of the four nodes about a contact point
     contact_segment: Index  # (lanes, collectors): its segment
     contact_weight: Array  # (lanes, collectors, 4): of the four
     unmoved_height: Array  # (lanes, collectors): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
-    # Extensions are relative to the static ones, minus the gap of a link that is slack there.
+    # Links in equal rows come first, then scattered ones. Extensions are relative to the static ones, minus the gap of a link that is slack there.
     past_extension: Array  # (lanes, sets, WIDTH): before the step (m)
     extension: Array  # (lanes, sets, WIDTH): at its start (m)
     change: Array  # (lanes, sets, WIDTH): tension minus the static one, mean over the last step (N)
     static: Array  # (lanes, sets, WIDTH): ``link_static`` of the window's links (N)
     gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of the window's links (m)
+    scattered: ScatteredWindow

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ....backend import WIDTH
 from ....base.arrays import Array, Index
-from .arrays import CONTACT, MESSENGER
+from ...interpolation import stencil
+from .arrays import CONTACT, MESSENGER, PAD
 from .grid import spring_levels
+from .parts import Span
 from .schema import FlexibleCatenaryData
-from .segments import places
+from .spans import spans_of
 from .static import StaticShape
 
 
@@ -20,7 +21,7 @@ class Springs(NamedTuple):
     """Springs and dampers between wires and the ground."""
 
     wire: Index  # (springs,)
-    node: Index  # (springs,): of that wire
+    place: Array  # (springs,): along the line, in nodes
     levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
     mass: Array  # (springs,): that moves with the wire (kg)
 
@@ -34,62 +35,78 @@ class Links(NamedTuple):
     mass: Array  # (links, 2): mass that moves with the lower and the upper end (kg)
 
 
-class Sets:
-    """Things attached to the wires, in sets: at most one per segment, all on the same wires and rows."""
+class Nodes(NamedTuple):
+    """The four nodes about each of some places."""
 
-    def __init__(self, wires: Index, node: Index, rows: int) -> None:
-        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
-        row, self.segment = places(node, rows)
-        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
-        self.number = np.zeros(len(node), dtype=np.int64)
-        there: Counter[tuple[int, ...]] = Counter()
-        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
-            own = (*place, int(self.segment[k]))
-            self.number[k] = found.setdefault((*place, there[own]), len(found))
-            there[own] += 1
-        keys = np.array(list(found), dtype=np.int64).reshape(len(found), -1)
-        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
+    first: Index  # (places,): number of the first one
+    weights: Array  # (places, 4): for forces and displacements
+    shares: Array  # (places, 4): for masses
 
-    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
-        """Values, (things, ...), as (sets, ..., WIDTH), ``empty`` where a segment has none of a set."""
-        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
-        array[self.number, self.segment] = values
-        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
+    @classmethod
+    def about(cls, places: Array) -> Nodes:
+        """places: along the line, in nodes.
+
+        Masses hang on the two nearest nodes: with cubic weights some nodes would be lighter than bare wire,
+        or have negative mass, and be unstable.
+        """
+        first, weights = stencil(places, 1.0)
+        right = (places - (first + 1))[:, None]
+        return cls(first, weights, np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1))
+
+    @property
+    def four(self) -> Index:
+        """Index of each node, (places, 4), in arrays that begin at node -PAD."""
+        return np.asarray((self.first + PAD)[:, None] + np.arange(4))
 
 
 def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     """Positions (m), (droppers,), of the droppers of a line with this number of spans."""
-    offsets = np.array(data.droppers.positions)
-    return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
+    if not data.sequence:
+        offsets = np.array(data.droppers.positions)
+        return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
+    supports = data.alignment(spans).supports
+    hung = zip(supports, spans_of(data).each, strict=False)
+    return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung][:spans])
 
 
-def springs_of(data: FlexibleCatenaryData, masts: Index, step: float, spots: Array) -> Springs:
+def springs_of(
+    each: Sequence[FlexibleCatenaryData | Span], places: Array, step: float, spots: Array
+) -> Springs:
     """At each mast the contact wire's steady arm, then the messenger's support; after all masts, hard spots.
 
-    masts: numbers of their nodes. step: s. spots: stiffness of hard spots at each node of the contact wire
-    (N/m), (nodes,).
+    each: the span that begins at each mast. places: of the masts, in nodes. step: s. spots: stiffness of hard
+    spots at each node of the contact wire from node -PAD on (N/m), (nodes,).
     """
-    arm, support = data.steady_arm, data.support
     levels = [
-        spring_levels(arm.stiffness, 0.0, step),
-        spring_levels(support.stiffness, support.damping, step),
+        level
+        for span in each
+        for level in (
+            spring_levels(span.steady_arm.stiffness, 0.0, step),
+            spring_levels(span.support.stiffness, span.support.damping, step),
+        )
     ]
     hard = np.flatnonzero(spots)
     held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
+    arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
     return Springs(
-        wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(masts)), 0 * hard + CONTACT),
-        node=np.append(np.repeat(masts.astype(np.int64), 2), hard),
-        levels=np.concatenate([np.tile(levels, (len(masts), 1)), np.array(held).reshape(-1, 3)]),
-        mass=np.append(np.tile([arm.mass, 0.0], len(masts)), np.zeros(len(hard))),
+        wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
+        place=np.append(np.repeat(places, 2), hard - PAD),
+        levels=np.array([*levels, *held]).reshape(-1, 3),
+        mass=np.append(arms, np.zeros(len(hard))),
     )
 
 
-def links_of(data: FlexibleCatenaryData, shape: StaticShape, spans: int) -> Links:
-    """The droppers of a line with this number of spans."""
-    droppers, half = data.droppers, np.tile(shape.dropper_mass / 2, spans)
+def links_of(
+    data: FlexibleCatenaryData, each: Sequence[FlexibleCatenaryData | Span], shape: StaticShape
+) -> Links:
+    """The droppers of these spans, whose static shape is ``shape``, or repeats it."""
+    droppers = [span.droppers for span in each]
+    counts = [len(own.positions) for own in droppers]
+    half = np.tile(shape.dropper_mass / 2, len(each) // shape.spans)
+    clamps = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
     return Links(
         wires=np.tile(np.array([CONTACT, MESSENGER], dtype=np.int64), (len(half), 1)),
-        position=dropper_positions(data, spans),
-        stiffness=np.tile(shape.dropper_stiffness, spans),
-        mass=np.stack([half + droppers.contact_clamp_mass, half + droppers.messenger_clamp_mass], axis=1),
+        position=dropper_positions(data, len(each)),
+        stiffness=np.tile(shape.dropper_stiffness, len(each) // shape.spans),
+        mass=half[:, None] + np.repeat(np.array(clamps), counts, axis=0),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,21 +11,22 @@ from ....backend import CACHE_LINE, WIDTH, aligned_zeros
 from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.remember import remembered
-from ...interpolation import stencil
 from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
-from .arrays import CONTACT, LOWER, PAD, UPPER, FlexibleLine, FlexibleWire
-from .attached import Sets, links_of, springs_of
-from .grid import missing_yield, nodes_per_span, stencil_weights
+from .arrays import PAD, FlexibleLine, FlexibleWire
+from .attached import links_of, springs_of
+from .grid import nodes_per_span, stencil_weights
+from .on_grid import in_equal_rows, on_grid
+from .parts import Span
 from .resolution import Resolution
+from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
+from .spans import spans_of
 from .static import StaticShape
 from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
-STIFFEST = 1e8
-"""Maximum stiffness of a link on the grid (N/m), in tension."""
 MOST_NODES = 1_000_000
 """Maximum number of nodes of a wire: more would fill the memory, and a run would take days."""
 QUIET = 1e-25
@@ -41,98 +43,67 @@ def constants(
     resolution: Resolution,
     own: WireDefects = NO_DEFECTS,
 ) -> FlexibleLine:
-    """Constants of a line of ``spans`` spans with the same static shape, at a stable resolution.
+    """A line of ``spans`` spans, or with a sequence of its own, with its static shape, at a stable resolution.
 
     own: defects of the contact wire itself, at positions along the whole line; a travelling window cannot
     have any. Raises InputError for more nodes than ``MOST_NODES``.
     """
-    window = min(resolution.window or spans, spans)
-    step, damping = resolution.time_step, data.damping
-    per_span = nodes_per_span(data, resolution.spacing)
-    dx = data.span_length / per_span
-    nodes = window * per_span + 1 + 2 * PAD
-    if nodes > MOST_NODES:
+    differ = bool(data.sequence)
+    strides = data.spans if differ else spans
+    window = min(resolution.window or strides, strides)
+    per_stride = nodes_per_span(data, resolution.spacing)
+    dx = data.stride / per_stride
+    # Where spans are alike, all windows have the same nodes.
+    covered = strides if differ else window
+    count = covered * per_stride + 1 + 2 * PAD
+    if count > MOST_NODES:
         raise InputError(
-            f"A grid of {dx:g} m over {window} spans of line '{data.name}' has {nodes:,} nodes per wire; "
+            f"A grid of {dx:g} m over {covered} spans of line '{data.name}' has {count:,} nodes per wire; "
             f"the maximum is {MOST_NODES:,}, so take a coarser spacing or a smaller window."
         )
-    wires = (data.contact_wire, data.messenger_wire)
-    masts = PAD + per_span * np.arange(1, window)
-    x = dx * (np.arange(nodes) - PAD)
-    springs, links = springs_of(data, masts, step, own.springs_of_nodes(x, dx)), links_of(data, shape, window)
-    room = shape.messenger.height(links.position) - shape.contact.height(links.position)
-    first, weights = stencil(links.position, dx)
-    four = (first + PAD)[:, None] + np.arange(4)
-
-    # Masses hang on the two nearest nodes: with cubic weights some nodes would be lighter than bare wire, or
-    # have negative mass, and be unstable.
-    right = (links.position / dx - (first + 1))[:, None]
-    shares = np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1)
-    bare = np.array([[wire.mass * dx] for wire in wires])
-    added = np.zeros((len(wires), nodes))
-    for end in (LOWER, UPPER):
-        np.add.at(added, (links.wires[:, end, None], four), shares * links.mass[:, end, None])
-    np.add.at(added, (springs.wire, springs.node), springs.mass)
-    added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
-    mass = bare + added
-    settle = 1.0 + damping.alpha * step / 2
-    mobility = step**2 / mass / settle
-    mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
-    inertia = bare / mass
-
-    # The compliance that the wires lack on the grid is added to the links.
-    ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
-    missing = sum(
-        count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
+    x = dx * (np.arange(count) - PAD)
+    each: Sequence[FlexibleCatenaryData | Span] = spans_of(data).each if differ else (data,) * covered
+    masts = (
+        np.array(data.alignment(covered).supports[1:-1]) / dx
+        if differ
+        else 1.0 * per_stride * np.arange(1, covered)
     )
-    stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
-    move = np.stack([mobility[links.wires[:, end, None], four] * weights for end in (LOWER, UPPER)], axis=1)
-    relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
-    early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
-    linear = np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None]
-
+    springs = springs_of(each[1:], masts, resolution.time_step, own.springs_of_nodes(x, dx))
+    grid = on_grid(data, shape, springs, links_of(data, each, shape), x, resolution.time_step, own)
     real = np.float32 if numerics.precision == "single" else np.float64
-    tensioned = of_tension(data, shape, dx, step)
-    rows = per_span * window // WIDTH
-    mast_row, mast_segment = places(per_span * np.arange(1, window), rows)
-    held = Sets(springs.wire[:, None], springs.node - PAD, rows)
-    joined = Sets(links.wires, first, rows)
-    yielding = mobility[springs.wire, springs.node, None]
-    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
+    rows = per_stride * window // WIDTH
+    masts_of_window = per_stride * np.arange(1, window) if not differ else np.zeros(0, dtype=np.int64)
+    mast_row, mast_segment = places(masts_of_window, rows)
+    kept = rows * WIDTH + 1 + 2 * PAD  # nodes of the first window
+    inertia, mobility = grid.inertia[:, :kept], grid.mobility[:, :kept].copy()
+    mobility[:, -PAD - 1 :] = 0.0
+    tensioned = of_tension(data, shape, dx, resolution.time_step)
     return FlexibleLine(
         spacing=dx,
         alignment=data.alignment(spans).arrays,
+        stride=data.stride,
+        strides=strides,
         window=window,
         rows=rows,
         shape=tensioned.shape[None],
+        shape_length=data.alignment().length if differ else data.span_length,
         rise=np.zeros((1, 0, 5)),
         rise_breaks=np.zeros(0),
         rise_decay=np.zeros(1),
         stencil=tensioned.stencil[None].astype(real),
         absorbing=tensioned.absorbing[None],
         inertia=np.ascontiguousarray(
-            lay_out(inertia, rows, real)[:, PAD : -PAD if (inertia != 1).any() else PAD]
+            lay_out(inertia, rows, real)[:, PAD : -PAD if (grid.inertia != 1).any() else PAD]
         ),
         mobility=lay_out(mobility, rows, float),
         mast_row=mast_row,
         mast_segment=mast_segment,
         free_uplift=data.free_uplift,
-        largest_move=LARGEST_SPEED * step,
-        spring_wire=held.wires[:, 0],
-        spring_row=held.row,
-        spring_pull=held.of(pull, real),
-        link_wire=joined.wires,
-        link_row=joined.row,
-        link_weight=joined.of(weights, real),
-        link_move=joined.of(move.reshape(-1, 8), real),
-        link_linear=joined.of(linear, real),
-        link_yield=joined.of(relative, real, 1.0),
-        link_stiffness=joined.of(stiffness, real, 1.0),
-        link_room=joined.of(room, real, 1.0),
-        link_set=joined.number,
-        link_segment=joined.segment,
-        link_static=np.tile(shape.dropper_tension, (1, window)).astype(real),
-        link_gap=np.zeros((1, len(first)), dtype=real),
+        largest_move=LARGEST_SPEED * resolution.time_step,
+        link_static=np.tile(shape.dropper_tension, (1, len(each) // shape.spans)).astype(real),
+        link_gap=np.zeros((1, len(grid.links.position)), dtype=real),
+        scattered=scattered(grid if differ else None, real),
+        **in_equal_rows(grid.bare() if differ else grid, rows, real),
     )
 
 
@@ -153,35 +124,48 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
         [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
     ]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
-    table = int(np.ceil(data.span_length / SHAPE_SPACING)) + 1
+    length = data.alignment().length if data.sequence else data.span_length
+    table = int(np.ceil(length / SHAPE_SPACING)) + 1
     return Tensioned(
-        shape=shape.contact.height(np.linspace(0, data.span_length, table)),
+        shape=shape.contact.height(np.linspace(0, length, table)),
         stencil=np.array(stencil),
         absorbing=(courant - 1) / (courant + 1),
     )
 
 
 def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
-    """Wires of all lanes in their static shape."""
-    wires, real, sets = line.mobility.shape, line.stencil.dtype, line.link_yield.shape
+    """Wires of all lanes in their static shape, at the line's start."""
+    wires, real = line.mobility.shape, line.stencil.dtype
+    own = room_for(line, lanes)
+    apart = own.links.node.shape[1], 2 * own.masts.node.shape[1]  # sets
+    sets, springs = len(line.link_row) + apart[0], len(line.spring_row) + apart[1]
+    each = lanes if line.scattered.mobility.size else 1
+
+    def of_links(value: float) -> Array:
+        return np.full((lanes, sets, WIDTH), value, dtype=real)
+
     wire = FlexibleWire(
         # The leapfrog reads and writes both side by side. Were they at the same place of a page, a processor
         # would take a read of one for a read of what it has just written to the other, and wait.
         displacement=aligned_zeros((lanes, *wires), real, place=0),
         increment=aligned_zeros((lanes, *wires), real, place=21 * CACHE_LINE),
-        first_span=np.zeros(lanes, dtype=np.int64),
+        travelled=np.zeros(lanes, dtype=np.int64),
+        inertia=np.repeat(line.inertia[None], each, axis=0),
+        mobility=np.repeat(line.mobility[None], each, axis=0),
         contact_row=np.zeros((lanes, collectors), dtype=np.int64),
         contact_segment=np.zeros((lanes, collectors), dtype=np.int64),
         contact_weight=np.zeros((lanes, collectors, 4)),
         unmoved_height=np.zeros((lanes, collectors)),
-        spring_past=np.zeros((lanes, len(line.spring_row), WIDTH), dtype=real),
-        past_extension=np.zeros((lanes, *sets), dtype=real),
-        extension=np.zeros((lanes, *sets), dtype=real),
-        change=np.zeros((lanes, *sets), dtype=real),
-        static=np.ones((lanes, *sets), dtype=real),  # where there is no link, none is ever slack
-        gap=np.zeros((lanes, *sets), dtype=real),
+        spring_past=np.zeros((lanes, springs, WIDTH), dtype=real),
+        past_extension=of_links(0.0),
+        extension=of_links(0.0),
+        change=of_links(0.0),
+        static=of_links(1.0),  # where there is no link, none is ever slack
+        gap=of_links(0.0),
+        scattered=own,
     )
-    _take_links(line, wire, slice(None))
+    for lane in range(lanes):
+        settle(line, wire, lane)
     return wire
 
 
@@ -189,13 +173,10 @@ def settle(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
     """Put one lane's wires at rest at the line's start."""
     for array in (wire.displacement, wire.increment, wire.change):
         array[lane] = 0.0
-    _take_links(line, wire, slice(lane, lane + 1))
-    wire.first_span[lane] = 0
-
-
-def _take_links(line: FlexibleLine, wire: FlexibleWire, lanes: slice) -> None:
-    """Put the links of these lanes at rest, as they are in the line's first window."""
-    rows, links = lanes if len(line.link_static) > 1 else slice(None), len(line.link_set)
-    wire.static[lanes][:, line.link_set, line.link_segment] = line.link_static[rows, :links]
-    wire.gap[lanes][:, line.link_set, line.link_segment] = line.link_gap[rows, :links]
-    wire.extension[lanes] = 0.0 - wire.gap[lanes]
+    wire.travelled[lane] = 0
+    row, links = min(lane, len(line.link_static) - 1), len(line.link_set)
+    wire.static[lane, line.link_set, line.link_segment] = line.link_static[row, :links]
+    wire.gap[lane, line.link_set, line.link_segment] = line.link_gap[row, :links]
+    wire.extension[lane] = 0.0 - wire.gap[lane]
+    if line.scattered.mobility.size:
+        begin_window(line, wire, lane)

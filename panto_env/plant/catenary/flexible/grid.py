@@ -12,8 +12,8 @@ from .schema import FlexibleCatenaryData
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
-    """Nodes per span for a maximum spacing (m): a multiple of ``WIDTH``, for segments of equal size."""
-    return WIDTH * int(np.ceil(data.span_length / spacing / WIDTH - 1e-9))
+    """Nodes per span, of mean length where spans differ, for a maximum spacing (m): a multiple of ``WIDTH``, for segments of equal size."""
+    return WIDTH * int(np.ceil(data.stride / spacing / WIDTH - 1e-9))
 
 
 def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> bool:

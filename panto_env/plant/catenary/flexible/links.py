@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
-from .arrays import LOWER, UPPER
+from ...state import own_row
+from .arrays import CONTACT, LOWER, MESSENGER, UPPER
+from .scattered import move_nodes, stretch_at
+from .scattered_arrays import LINK
 from .segments import move, read
 
 
 @inlined
-def first_link(line, first_span):
+def first_link(line, travelled):
     """Index of the window's first link in the tables of static tension and gap."""
     count = line.link_set.size
-    return min(first_span * (count // line.window), line.link_static.shape[1] - count) & NOT_NEGATIVE
+    return min(travelled * (count // line.window), line.link_static.shape[1] - count) & NOT_NEGATIVE
 
 
 @inlined
@@ -24,13 +27,24 @@ def difference(lower, upper, row, weight, rows):
 
 
 @inlined
-def measure_extensions(line, u, past, now, gap):
+def measure_extensions(line, wire, lane):
     """Store extensions (m) of the previous step, and compute those at the step's start."""
+    u, past, now, gap = (
+        wire.displacement[lane],
+        wire.past_extension[lane],
+        wire.extension[lane],
+        wire.gap[lane],
+    )
     for s in range(line.link_row.size):
         lower, upper = u[line.link_wire[s, LOWER] & NOT_NEGATIVE], u[line.link_wire[s, UPPER] & NOT_NEGATIVE]
         apart = difference(lower, upper, line.link_row[s], line.link_weight[s], line.rows)
         store_row(past, s, load_row(now, s))
         store_row(now, s, apart - load_row(gap, s))
+    links, first = wire.scattered.links, line.link_row.size
+    for s in range(links.node.shape[1]):
+        apart = stretch_at(u, links.node[lane, s], links.constants[lane, s])
+        store_row(past, first + s, load_row(now, first + s))
+        store_row(now, first + s, apart - load_row(gap, first + s))
 
 
 @inlined
@@ -54,32 +68,71 @@ def slackening(stiffness, static, past, free, yielding):
 
 
 @inlined
-def pull_links(line, u, d, past, now, static, change):
-    """Apply the links: a scalar equation for the tension of each, which is never negative."""
-    rows = line.rows
+def pull_of(past, now, step, static, early, late, stiffness, yielding):
+    """Change of the links' tension (N), the mean over a step; the tension is never negative.
+
+    past, now: extension before the step and at its start. step: displacement of the upper ends relative to the
+    lower ones in the step, without the links (m).
+    """
+    before = 0.5 * (past + now)
+    free, minimum = now + 0.5 * step, -static
+    taut = early * before + late * free  # the mean spring force
+    pull = larger(taut, minimum)
+    slack = stiffness * smaller(before, free - yielding * taut) < minimum
+    if any_of(slack):
+        pull = choose(slack, slackening(stiffness, static, before, free, yielding), pull)
+    return pull
+
+
+@inlined
+def pull_links(line, wire, lane):
+    """Apply the links: a scalar equation for the tension of each."""
+    rows, u, d = line.rows, wire.displacement[lane], wire.increment[lane]
+    past, now = wire.past_extension[lane], wire.extension[lane]
+    static, change = wire.static[lane], wire.change[lane]
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
         row, move_by, linear = line.link_row[s], line.link_move[s], line.link_linear[s]
         step = difference(d[lower], d[upper], row, line.link_weight[s], rows)
-        stiffness, yielding = load_row(line.link_stiffness, s), load_row(line.link_yield, s)
-        before = 0.5 * (load_row(past, s) + load_row(now, s))
-        free, minimum = load_row(now, s) + 0.5 * step, -load_row(static, s)
-        taut = load_row(linear, 0) * before + load_row(linear, 1) * free  # the mean spring force
-        pull = larger(taut, minimum)
-        slack = stiffness * smaller(before, free - yielding * taut) < minimum
-        if any_of(slack):
-            pull = choose(slack, slackening(stiffness, load_row(static, s), before, free, yielding), pull)
+        pull = pull_of(
+            load_row(past, s),
+            load_row(now, s),
+            step,
+            load_row(static, s),
+            load_row(linear, 0),
+            load_row(linear, 1),
+            load_row(line.link_stiffness, s),
+            load_row(line.link_yield, s),
+        )
         store_row(change, s, pull)
         for k in range(4):
             move(u[lower], d[lower], row + k, rows, load_row(move_by, k) * pull)
             move(u[upper], d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))
+    links, first = wire.scattered.links, line.link_row.size
+    for s in range(links.node.shape[1]):
+        node, table, number = links.node[lane, s], links.constants[lane, s], first + s
+        pull = pull_of(
+            load_row(past, number),
+            load_row(now, number),
+            stretch_at(d, node, table),
+            load_row(static, number),
+            load_row(table, LINK.EARLY),
+            load_row(table, LINK.LATE),
+            load_row(table, LINK.STIFFNESS),
+            load_row(table, LINK.YIELD),
+        )
+        store_row(change, number, pull)
+        move_nodes(u[CONTACT], d[CONTACT], node, table, LINK.MOVE, pull)
+        move_nodes(u[MESSENGER], d[MESSENGER], node, table, LINK.MOVE + 4, -pull)
 
 
 @inlined
-def follow_links(line, row, first_span, now, static, gap):
-    """Move the links with the window by a span, to ``first_span``; those of the new span are at rest."""
+def follow_links(line, wire, lane):
+    """Move the links in equal rows with the window by a span; those of the new span are at rest."""
+    now, static, gap = wire.extension[lane], wire.static[lane], wire.gap[lane]
+    row = own_row(line.link_static, lane)
     links, number, segment = line.link_set.size, line.link_set, line.link_segment
-    per_span, first = links // line.window, first_link(line, first_span)
+    per_span, first = links // line.window, first_link(line, wire.travelled[lane])
     for k in range(links):
         static[number[k], segment[k]] = line.link_static[row, first + k]
         gap[number[k], segment[k]] = line.link_gap[row, first + k]

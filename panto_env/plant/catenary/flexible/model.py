@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ....base.arrays import Array
+from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
@@ -20,6 +20,7 @@ from .build import at_rest, constants, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
 from .resolution import resolution
+from .scattered_build import present
 from .schema import FlexibleCatenaryData
 from .segments import along
 from .static import StaticShape, hang
@@ -51,15 +52,16 @@ class FlexibleCatenary:
         """Build the line.
 
         Raises InputError where the line cannot hang with its values, grid and time step are not stable
-        together, its spans differ, or a condition has a defect at a dropper, support or place that the line
-        does not have.
+        together, it has another number of spans, or a condition has a defect at a dropper, support or place
+        that the line does not have.
         """
-        if data.sequence:
+        if data.sequence and spans != data.spans:
             raise InputError(
-                f"Trains do not run on line '{data.name}' yet, as its spans differ: only its static shape, "
-                "droppers and elasticity are computed (panto line); leave out its sequence for a run."
+                f"Line '{data.name}' is a sequence of {data.spans} spans, so it has no other number of them: "
+                "leave out spans, or give a shorter distance."
             )
-        designed, condition = data, of_wires(runs.conditions)
+        self.data, condition = data, of_wires(runs.conditions)
+        designed = data
         data = with_tension_left(designed, condition)
         shape = hang(designed)
         if data is not designed:
@@ -80,7 +82,7 @@ class FlexibleCatenary:
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
         self.supports = alignment.support(np.arange(1, spans))
         self.droppers = dropper_positions(data, spans)
-        self._tension = np.tile(shape.dropper_tension, (1, spans))
+        self._tension = np.tile(shape.dropper_tension, (1, spans // shape.spans))
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
@@ -148,22 +150,19 @@ class FlexibleCatenary:
         effect of defective droppers and supports.
         """
         line, wire = self.line, self.wire
-        first_span = int(wire.first_span[lane])
-        start, links = self._alignment.support(first_span), line.link_set.size
         moved = along(wire.displacement[lane] - 0.5 * wire.increment[lane])[:, PAD:-PAD]
-        x = start + line.spacing * np.arange(moved.shape[1])
+        x = wire.travelled[lane] * line.stride + line.spacing * np.arange(moved.shape[1])
         inside = (x >= begin) & (x <= end)
         x, moved = x[inside], moved[:, inside]
-        place, span = self._alignment.place(x), self._alignment.mean_length
-        of_span = np.linspace(0.0, span, line.shape.shape[1])
-        contact = np.interp(place, of_span, line.shape[min(lane, len(line.shape) - 1)])
+        place = x if self.data.sequence else self._alignment.place(x)
+        of_shape = np.linspace(0.0, line.shape_length, line.shape.shape[1])
+        contact = np.interp(place, of_shape, line.shape[min(lane, len(line.shape) - 1)])
         heights = messenger_heights(self._shapes.get(lane, self._shapes[DESIGNED]))
-        messenger = np.interp(place, np.linspace(0.0, span, VIEW_POINTS), heights)
+        messenger = np.interp(place, np.linspace(0.0, line.shape_length, len(heights)), heights)
         supports = self.supports[(self.supports >= begin) & (self.supports <= end)]
-        first = first_span * (links // line.window)
-        droppers = self.droppers[first : first + links]
+        number, tension = self._links(lane)
+        droppers = self.droppers[number]
         hanging = (droppers >= begin) & (droppers <= end)
-        tension = (wire.static[lane] + wire.change[lane])[line.link_set, line.link_segment]
         return LineView(
             x=x,
             contact=contact + self._rise(lane, x) + moved[CONTACT],
@@ -172,6 +171,16 @@ class FlexibleCatenary:
             droppers=droppers[hanging],
             slack=(tension <= 0)[hanging],
         )
+
+    def _links(self, lane: int) -> tuple[Index, Array]:
+        """Numbers of the droppers in a lane's window, (n,), in their order, and their tension (N)."""
+        line, wire = self.line, self.wire
+        if line.scattered.links.first.size:
+            return present(line, wire, lane)
+        links = line.link_set.size
+        first = int(wire.travelled[lane]) * (links // line.window)
+        tension = (wire.static[lane] + wire.change[lane])[line.link_set, line.link_segment]
+        return first + np.arange(links), tension
 
     def _rise(self, lane: int, x: Array) -> Array:
         """Static change of the contact wire's height by defects (m), (n,), as ``rise_by_defects``."""
@@ -184,8 +193,9 @@ class FlexibleCatenary:
 
 @lru_cache(maxsize=64)
 def messenger_heights(shape: StaticShape) -> Array:
-    """Height (m) of the messenger wire at ``VIEW_POINTS`` places over a span."""
-    return shape.messenger.height(np.linspace(0.0, shape.messenger.breaks[-1], VIEW_POINTS))
+    """Height (m) of the messenger wire at even distances, ``VIEW_POINTS`` of them over one span."""
+    points = (VIEW_POINTS - 1) * shape.spans + 1
+    return shape.messenger.height(np.linspace(0.0, shape.messenger.breaks[-1], points))
 
 
 def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:

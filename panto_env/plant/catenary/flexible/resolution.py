@@ -151,7 +151,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
     if deep:
         ahead = min(deep) * (wave_speed - quick) / quick
         spacing = min(spacing, max(ahead / NODES_PER_WAVE, DEEP_GRID))
-        if data.droppers.contact_clamp_mass > HEAVY_CLAMP:
+        if any(own.contact_clamp_mass > HEAVY_CLAMP for own in data.dropper_tables):
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
@@ -168,7 +168,9 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
     """Grid (m) and time step (s) that the heaviest of the droppers' clamps requires."""
-    heaviest = max(data.droppers.contact_clamp_mass, data.droppers.messenger_clamp_mass)
+    heaviest = max(
+        mass for own in data.dropper_tables for mass in (own.contact_clamp_mass, own.messenger_clamp_mass)
+    )
     grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
     return grid, step
 
@@ -182,7 +184,7 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
     if np.isfinite(runs.shortest_wave):
         spacing = min(spacing, FAST_GRIDS[-1][1])
     spacing = min(spacing, 2 * _by_clamps(data)[0])
-    grid = data.span_length / nodes_per_span(data, spacing)
+    grid = data.stride / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer, _lightest(runs)) else shorter
     return Required(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
 
@@ -195,7 +197,7 @@ def _lightest(runs: Runs) -> float:
 
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
-    span, given = data.span_length, numerics.spacing
+    span, given = data.stride, numerics.spacing
     window, lightest = window_of(data.wires, numerics, runs), _lightest(runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):

@@ -127,6 +127,21 @@ class FlexibleCatenaryData(CatenaryData):
         return Alignment.of_spans((lengths + lengths[-1:] * (count - len(lengths)))[:count])
 
     @property
+    def dropper_tables(self) -> tuple[Droppers, ...]:
+        """The droppers of each span that may differ from others; of a line with one span repeated, that one's."""
+        return tuple(span.droppers for span in spans_of(self).each) if self.sequence else (self.droppers,)
+
+    @property
+    def most_spans(self) -> int:
+        """Maximum number of spans of a run: where a sequence ends, no wire goes on."""
+        return self.spans if self.sequence else super().most_spans
+
+    @property
+    def stride(self) -> float:
+        """Length of a span (m), the mean where spans differ: by this a window travels."""
+        return self.alignment().mean_length
+
+    @property
     def wires(self) -> tuple[Wire, Wire]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire

@@ -11,7 +11,6 @@ acts on it. So the wire's displacement at the ends of a step is the mean of u be
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
-from ...alignment import span_index, spans_of
 from ...state import own_row
 from ...valid_range import ENDING
 from ..protocol import (
@@ -26,6 +25,15 @@ from ..protocol import (
 )
 from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
 from .links import difference, follow_links, measure_extensions, pull_links
+from .scattered import (
+    apply_masts,
+    displacement_at,
+    keep_past_of_masts,
+    record_scattered,
+    stretch_at,
+    take_window,
+)
+from .scattered_arrays import LINK
 from .segments import shift_nodes
 from .wires import (
     apply_springs,
@@ -44,29 +52,27 @@ from .wires import (
 @inlined
 def window_start(line, wire, lane):
     """Position (m) at which a lane's window begins."""
-    return line.alignment.supports[wire.first_span[lane] & NOT_NEGATIVE]
+    return wire.travelled[lane] * line.stride
 
 
 @inlined
 def follow(line, wire, lane, x):
-    """Move the window by a span once the contact point at x (m) is past its middle."""
-    ahead = span_index(line.alignment, x) - wire.first_span[lane]
-    if 2 * ahead > line.window - 1 and wire.first_span[lane] + line.window < spans_of(line.alignment):
-        wire.first_span[lane] += 1
-        per_span = line.rows * WIDTH // line.window
+    """Move the window by a stride once the contact point at x (m) is past its middle."""
+    ahead = int(x / line.stride) - wire.travelled[lane]
+    if 2 * ahead > line.window - 1 and wire.travelled[lane] + line.window < line.strides:
+        wire.travelled[lane] += 1
+        per_stride = line.rows * WIDTH // line.window
         for w in range(wire.displacement.shape[1]):
-            shift_nodes(wire.displacement[lane, w], line.rows, per_span)
-            shift_nodes(wire.increment[lane, w], line.rows, per_span)
-        row = own_row(line.link_static, lane)
-        follow_links(
-            line, row, wire.first_span[lane], wire.extension[lane], wire.static[lane], wire.gap[lane]
-        )
+            shift_nodes(wire.displacement[lane, w], line.rows, per_stride)
+            shift_nodes(wire.increment[lane, w], line.rows, per_stride)
+        follow_links(line, wire, lane)
+        take_window(line, wire, lane)
 
 
 @inlined
 def unmoved_height(line, lane, x):
     """Height (m) of the contact wire at rest at x (m)."""
-    height = static_height(line.shape[own_row(line.shape, lane)], line.alignment.mean_length, x)
+    height = static_height(line.shape[own_row(line.shape, lane)], line.shape_length, x)
     if line.rise.shape[1] > 0:
         row = own_row(line.rise, lane)
         height += rise_by_defects(line.rise[row], line.rise_breaks, line.rise_decay[row], x)
@@ -91,14 +97,16 @@ def _place(line, wire, lane, contact, x):
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
     u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
-    past, now = wire.past_extension[lane], wire.extension[lane]
+    masts, springs = wire.scattered.masts, line.spring_row.size
     keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
-    measure_extensions(line, u, past, now, wire.gap[lane])
-    stencil = line.stencil[own_row(line.stencil, lane)]
+    keep_past_of_masts(masts, lane, d, spring_past, springs)
+    measure_extensions(line, wire, lane)
+    stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], line.inertia[w], stencil[w])
+        leapfrog(u[w], d[w], inertia[w], stencil[w])
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
-    pull_links(line, u, d, past, now, wire.static[lane], wire.change[lane])
+    apply_masts(masts, lane, u, d, spring_past, springs)
+    pull_links(line, wire, lane)
 
 
 @implements(rise_at_contact, FlexibleLine)
@@ -117,7 +125,8 @@ def _look(line, wire, lane, contact, x):
     u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
     row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
     weight = wire.contact_weight[lane, contact]
-    compliance = 0.5 * yield_of_place(line.mobility[CONTACT], row, segment, weight)
+    mobility = wire.mobility[own_row(wire.mobility, lane), CONTACT]
+    compliance = 0.5 * yield_of_place(mobility, row, segment, weight)
     height = wire.unmoved_height[lane, contact] + deflection(u, d, row, segment, weight, 0.5)
     return height, compliance, 0.0, 0.0
 
@@ -127,13 +136,14 @@ def _apply(line, wire, lane, contact, x, force):
     u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
     row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
     weight = wire.contact_weight[lane, contact]
-    move_place(u, d, line.mobility[CONTACT], row, segment, weight, force)
+    mobility = wire.mobility[own_row(wire.mobility, lane), CONTACT]
+    move_place(u, d, mobility, row, segment, weight, force)
 
 
 @implements(end_step, FlexibleLine)
 def _end(line, wire, lane):
-    first_span = wire.first_span[lane]
-    at_start, at_end = first_span == 0, first_span + line.window >= spans_of(line.alignment)
+    travelled = wire.travelled[lane]
+    at_start, at_end = travelled == 0, travelled + line.window >= line.strides
     absorbing = line.absorbing[own_row(line.absorbing, lane)]
     for w in range(wire.displacement.shape[1]):
         u, d = wire.displacement[lane, w], wire.increment[lane, w]
@@ -147,6 +157,14 @@ def _ending(line, wire, lane):
         i, j = line.mast_row[s] & NOT_NEGATIVE, line.mast_segment[s] & NOT_NEGATIVE
         if u[CONTACT, i, j] > line.free_uplift:
             return ENDING.STOP if abs(d[CONTACT, i, j]) < line.largest_move else ENDING.DIVERGED
+    masts, links = wire.scattered.masts, wire.scattered.links
+    for s in range(masts.node.shape[1]):
+        node, table = masts.node[lane, s], masts.constants[lane, s]
+        over = displacement_at(u[CONTACT], node, table) > line.free_uplift
+        if any_of(over):
+            moving = displacement_at(d[CONTACT], node, table)
+            quickest = choose(over, larger(moving, -moving), 0.0 * moving)
+            return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.STOP
     # The wires are nearest to each other at a dropper: between two, the contact wire sags.
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
@@ -157,20 +175,28 @@ def _ending(line, wire, lane):
             closing = difference(d[lower], d[upper], row, weight, line.rows)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
+    for s in range(links.node.shape[1]):
+        node, table = links.node[lane, s], links.constants[lane, s]
+        touching = stretch_at(u, node, table) < -load_row(table, LINK.ROOM)
+        if any_of(touching):
+            closing = stretch_at(d, node, table)
+            quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
+            return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     return ENDING.NONE
 
 
 @implements(record_wire, FlexibleLine)
 def _record(line, wire, lane, uplift, tension):
-    first_span = wire.first_span[lane]
+    travelled = wire.travelled[lane]
     for s in range(line.mast_row.size):
-        if first_span + s < uplift.size:
+        if travelled + s < uplift.size:
             i, j = line.mast_row[s], line.mast_segment[s]
             u, d = wire.displacement[lane, CONTACT, i, j], wire.increment[lane, CONTACT, i, j]
-            uplift[first_span + s] = u - 0.5 * d
+            uplift[travelled + s] = u - 0.5 * d
     if tension.size > 0:
         links = line.link_set.size
-        first = first_span * (links // line.window)
+        first = travelled * (links // line.window)
         for k in range(links):
             i, j = line.link_set[k], line.link_segment[k]
             tension[first + k] = wire.static[lane, i, j] + wire.change[lane, i, j]
+    record_scattered(line, wire, lane, uplift, tension)

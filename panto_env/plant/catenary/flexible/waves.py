@@ -74,7 +74,7 @@ def _phase_grid(data: FlexibleCatenaryData, speed: float) -> float:
     leaving = group - speed
     lost = wire.bending_stiffness * k**6 / (12 * wire.mass * omega)  # of omega, per square of the spacing
     decay = (damping.alpha + damping.beta * omega**2) / (2 * leaving)  # 1/m
-    gaps = np.diff(data.droppers.positions)
+    gaps = np.concatenate([np.diff(own.positions) for own in data.dropper_tables])
     way = float(gaps.max()) if len(gaps) else data.span_length
     if decay * way > 1:
         way = 1 / decay
@@ -84,7 +84,7 @@ def _phase_grid(data: FlexibleCatenaryData, speed: float) -> float:
 
 def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
     """Spacing (m) on which a contact wire's clamp reflects waves well enough."""
-    wire, mass = data.contact_wire, data.droppers.contact_clamp_mass
+    wire, mass = data.contact_wire, max(own.contact_clamp_mass for own in data.dropper_tables)
     k, omega, _ = wave_ahead(wire, speed, CLAMP_HZ)
     share = omega * mass / (2 * wire.impedance)
     return math.sqrt(CLAMP_ERROR / share) / k if share > 0 else math.inf

@@ -1,0 +1,149 @@
+"""What is attached to the wires, on the nodes of a grid: masses of nodes, and constants of springs and links."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....backend import WIDTH
+from ....base.arrays import Array, Index
+from .arrays import CONTACT, LOWER, PAD, UPPER
+from .attached import Links, Nodes, Springs
+from .grid import missing_yield
+from .schema import FlexibleCatenaryData
+from .segments import places
+from .static import StaticShape
+from .wire_defects import WireDefects
+
+STIFFEST = 1e8
+"""Maximum stiffness of a link on the grid (N/m), in tension."""
+
+
+class OnGrid(NamedTuple):
+    """Constants of nodes, springs and links; nodes count from -PAD."""
+
+    inertia: Array  # (wires, nodes): bare wire's mass over the node's
+    mobility: Array  # (wires, nodes): displacement in one step by 1 N (m/N)
+    springs: Springs
+    at_springs: Nodes
+    spring_yield: Array  # (springs, 1): displacement of the spring in a step by 1 N there (m/N)
+    links: Links
+    at_links: Nodes
+    move: Array  # (links, 2, 4): displacement of the nodes of both ends in a step by 1 N (m/N)
+    linear: Array  # (links, 2): change of tension by mean extension before and after a step (N/m)
+    link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
+    stiffness: Array  # (links,): in tension, with the grid's missing compliance (N/m)
+    room: Array  # (links,): designed distance of the ends (m)
+
+    def bare(self) -> OnGrid:
+        """The same without springs and links."""
+        return OnGrid(
+            self.inertia,
+            self.mobility,
+            *(
+                type(each)(*(array[:0] for array in each)) if isinstance(each, tuple) else each[:0]
+                for each in self[2:]
+            ),
+        )
+
+
+def on_grid(
+    data: FlexibleCatenaryData,
+    shape: StaticShape,
+    springs: Springs,
+    links: Links,
+    x: Array,
+    step: float,
+    own: WireDefects,
+) -> OnGrid:
+    """x: positions of the nodes from node -PAD on (m). step: s. own: defects of the contact wire itself."""
+    damping, wires, dx = data.damping, data.wires, float(x[PAD + 1])
+    room = shape.messenger.height(links.position) - shape.contact.height(links.position)
+    at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
+    bare = np.array([[wire.mass * dx] for wire in wires])
+    added = np.zeros((len(wires), len(x)))
+    for end in (LOWER, UPPER):
+        np.add.at(
+            added, (links.wires[:, end, None], at_links.four), at_links.shares * links.mass[:, end, None]
+        )
+    np.add.at(added, (springs.wire[:, None], at_springs.four), at_springs.shares * springs.mass[:, None])
+    added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
+    mass = bare + added
+    mobility = step**2 / mass / (1.0 + damping.alpha * step / 2)
+    mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
+
+    # The compliance that the wires lack on the grid is added to the links.
+    weights = at_links.weights
+    ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
+    missing = sum(
+        count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
+    )
+    stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
+    move = np.stack(
+        [mobility[links.wires[:, end, None], at_links.four] * weights for end in (LOWER, UPPER)], axis=1
+    )
+    relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
+    early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
+    held = mobility[springs.wire[:, None], at_springs.four]
+    return OnGrid(
+        inertia=bare / mass,
+        mobility=mobility,
+        springs=springs,
+        at_springs=at_springs,
+        spring_yield=(at_springs.weights**2 * held).sum(axis=1)[:, None],
+        links=links,
+        at_links=at_links,
+        move=move,
+        linear=np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None],
+        link_yield=relative,
+        stiffness=stiffness,
+        room=room,
+    )
+
+
+class Sets:
+    """Things attached to the wires, in sets: at most one per segment, all on the same wires and rows."""
+
+    def __init__(self, wires: Index, node: Index, rows: int) -> None:
+        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
+        row, self.segment = places(node, rows)
+        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
+        self.number = np.zeros(len(node), dtype=np.int64)
+        there: Counter[tuple[int, ...]] = Counter()
+        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
+            own = (*place, int(self.segment[k]))
+            self.number[k] = found.setdefault((*place, there[own]), len(found))
+            there[own] += 1
+        keys = np.array(list(found), dtype=np.int64).reshape(len(found), 2 + wires.shape[1])
+        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
+
+    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
+        """Values, (things, ...), as (sets, ..., WIDTH), ``empty`` where a segment has none of a set."""
+        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
+        array[self.number, self.segment] = values
+        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
+
+
+def in_equal_rows(grid: OnGrid, rows: int, real: Any) -> dict[str, Any]:
+    """Fields of ``FlexibleLine`` with springs and links in sets of equal rows."""
+    springs, links, yielding = grid.springs, grid.links, grid.spring_yield
+    held = Sets(springs.wire[:, None], grid.at_springs.first + 1, rows)
+    joined = Sets(links.wires, grid.at_links.first, rows)
+    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
+    return {
+        "spring_wire": held.wires[:, 0],
+        "spring_row": held.row,
+        "spring_pull": held.of(pull, real),
+        "link_wire": joined.wires,
+        "link_row": joined.row,
+        "link_weight": joined.of(grid.at_links.weights, real),
+        "link_move": joined.of(grid.move.reshape(-1, 8), real),
+        "link_linear": joined.of(grid.linear, real),
+        "link_yield": joined.of(grid.link_yield, real, 1.0),
+        "link_stiffness": joined.of(grid.stiffness, real, 1.0),
+        "link_room": joined.of(grid.room, real, 1.0),
+        "link_set": joined.number,
+        "link_segment": joined.segment,
+    }

@@ -1,0 +1,194 @@
+"""What is attached to the wires of a line whose spans differ, in a kernel."""
+
+from __future__ import annotations
+
+from ....backend import (
+    NOT_NEGATIVE,
+    WIDTH,
+    gather,
+    inlined,
+    kernel,
+    load_row,
+    open_packed,
+    scatter_add,
+    store_row,
+)
+from ...state import own_row
+from .arrays import CONTACT, MESSENGER, PAD
+from .scattered_arrays import MAST, SPRING
+from .segments import row_of, segment_of
+
+
+@inlined
+def displacement_at(x, node, constants):
+    """Displacement or increment of a wire at the things of a set (m); their weights come first."""
+    total = load_row(constants, 0) * gather(x, node, 0)
+    for k in range(1, 4):
+        total += load_row(constants, k) * gather(x, node, k)
+    return total
+
+
+@inlined
+def stretch_at(x, node, constants):
+    """Displacement or increment of the upper wire minus that of the lower one at links of a set (m)."""
+    lower, upper = x[CONTACT], x[MESSENGER]
+    total = load_row(constants, 0) * (gather(upper, node, 0) - gather(lower, node, 0))
+    for k in range(1, 4):
+        total += load_row(constants, k) * (gather(upper, node, k) - gather(lower, node, k))
+    return total
+
+
+@inlined
+def move_nodes(u, d, node, constants, row, force):
+    """Apply forces (N) to the four nodes of each thing in a set; row: of ``constants``, the nodes' mobility."""
+    for k in range(4):
+        step = load_row(constants, row + k) * force
+        scatter_add(u, node, k, step)
+        scatter_add(d, node, k, step)
+
+
+@inlined
+def keep_past_of_masts(masts, lane, d, past, first):
+    """Save the increments at the masts, from set ``first`` of ``past`` on, which the leapfrog overwrites."""
+    sets = masts.node.shape[1]
+    for s in range(sets):
+        node, table = masts.node[lane, s], masts.constants[lane, s]
+        store_row(past, first + s, displacement_at(d[CONTACT], node, table))
+        store_row(past, first + sets + s, displacement_at(d[MESSENGER], node, table))
+
+
+@inlined
+def apply_masts(masts, lane, u, d, past, first):
+    """Steady arms and supports, each implicit at its place."""
+    sets = masts.node.shape[1]
+    for s in range(sets):
+        node, table = masts.node[lane, s], masts.constants[lane, s]
+        _apply_spring(u[CONTACT], d[CONTACT], node, table, MAST.ARM, load_row(past, first + s))
+        _apply_spring(u[MESSENGER], d[MESSENGER], node, table, MAST.SUPPORT, load_row(past, first + sets + s))
+
+
+@inlined
+def _apply_spring(u, d, node, table, row, past):
+    new = displacement_at(u, node, table)
+    now = new - displacement_at(d, node, table)
+    pull = row + SPRING.PULL
+    force = load_row(table, pull) * new + load_row(table, pull + 1) * now
+    force += load_row(table, pull + 2) * (now - past)
+    move_nodes(u, d, node, table, row + SPRING.MOVE, -force)
+
+
+@inlined
+def record_scattered(line, wire, lane, uplift, tension):
+    """Write uplift at masts (m) and tension of droppers (N), as ``record_wire`` does."""
+    masts, links = wire.scattered.masts, wire.scattered.links
+    sets = masts.node.shape[1]
+    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    for slot in range(masts.number.shape[1]):
+        n = masts.number[lane, slot]
+        if n >= 0 and n < uplift.size:
+            s, j = slot % sets, slot // sets
+            total = 0.0
+            for k in range(4):
+                place = masts.node[lane, s, k, j] & NOT_NEGATIVE
+                row, segment = place // WIDTH, place % WIDTH
+                total += masts.constants[lane, s, k, j] * (u[row, segment] - 0.5 * d[row, segment])
+            uplift[n] = total
+    sets, first = links.node.shape[1], line.link_row.size
+    for slot in range(links.number.shape[1]):
+        n = links.number[lane, slot]
+        if n >= 0 and n < tension.size:
+            s, j = first + slot % sets, slot // sets
+            tension[n] = wire.static[lane, s, j] + wire.change[lane, s, j]
+
+
+@inlined
+def take_window(line, wire, lane):
+    """Take in what is in a lane's window at its present place; what has entered is at rest."""
+    scattered, held = line.scattered, wire.scattered
+    if scattered.mobility.shape[1] > 0:
+        nodes = line.rows * WIDTH
+        travelled = wire.travelled[lane]
+        start = travelled * (nodes // line.window)
+        at_start, at_end = travelled == 0, travelled + line.window >= line.strides
+        _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
+        end = start + nodes
+        _leave(scattered.masts, held.masts, lane, start, at_start)
+        n = held.masts.begin[lane] & NOT_NEGATIVE
+        while n < scattered.masts.first.size and (at_end or scattered.masts.first[n] + 3 < end):
+            _enter(scattered.masts, held.masts, lane, n, start, line.rows)
+            n += 1
+        _leave(scattered.links, held.links, lane, start, at_start)
+        n = held.links.begin[lane] & NOT_NEGATIVE
+        while n < scattered.links.first.size and (at_end or scattered.links.first[n] + 3 < end):
+            if _enter(scattered.links, held.links, lane, n, start, line.rows):
+                _rest(line, wire, lane, n)
+            n += 1
+
+
+@kernel
+def take_start(packed, lane):
+    """Take in what is in the first window of a lane; packed: line and wire."""
+    line, wire = open_packed(packed)
+    take_window(line, wire, lane)
+
+
+@inlined
+def _take_nodes(scattered, inertia, mobility, start, rows):
+    """Masses of the window's nodes; no force moves its ends."""
+    last = rows * WIDTH
+    for w in range(mobility.shape[0]):
+        for i in range(mobility.shape[1]):
+            for j in range(WIDTH):
+                local = j * rows + i - PAD
+                inside = local > 0 and local < last
+                mobility[w, i, j] = scattered.mobility[w, start + local + PAD] if inside else 0.0
+        for i in range(inertia.shape[1]):
+            for j in range(WIDTH):
+                inertia[w, i, j] = scattered.inertia[w, start + j * rows + i + PAD]
+
+
+@inlined
+def _leave(along, held, lane, start, at_start):
+    """Empty the slots of things that the window has left behind."""
+    begin = held.begin[lane] & NOT_NEGATIVE
+    while begin < along.first.size and not at_start and along.first[begin] <= start:
+        begin += 1
+    held.begin[lane] = begin
+    sets = held.node.shape[1]
+    for slot in range(held.number.shape[1]):
+        if held.number[lane, slot] < begin:
+            s, j = slot % sets, slot // sets
+            held.number[lane, slot] = -1
+            for k in range(4):
+                held.node[lane, s, k, j] = 0
+            for r in range(along.empty.size):
+                held.constants[lane, s, r, j] = along.empty[r]
+
+
+@inlined
+def _enter(along, held, lane, n, start, rows):
+    """Put thing n into its slot, and renumber its nodes; whether it was not there before."""
+    sets, slot = held.node.shape[1], n % held.number.shape[1]
+    s, j = slot % sets, slot // sets
+    for k in range(4):
+        local = along.first[n] + k - start
+        segment = segment_of(local, rows)
+        held.node[lane, s, k, j] = row_of(local, segment, rows) * WIDTH + segment
+    new = held.number[lane, slot] != n
+    if new:
+        held.number[lane, slot] = n
+        for r in range(along.empty.size):
+            held.constants[lane, s, r, j] = along.constants[n, r]
+    return new
+
+
+@inlined
+def _rest(line, wire, lane, n):
+    """Put link n at rest in its slot."""
+    sets, first, row = wire.scattered.links.node.shape[1], line.link_row.size, own_row(line.link_static, lane)
+    slot = n % wire.scattered.links.number.shape[1]
+    s, j = first + slot % sets, slot // sets
+    wire.static[lane, s, j] = line.link_static[row, n]
+    wire.gap[lane, s, j] = line.link_gap[row, n]
+    wire.extension[lane, s, j] = 0.0 - line.link_gap[row, n]
+    wire.change[lane, s, j] = 0.0

@@ -1,0 +1,78 @@
+"""Arrays of what is attached to the wires of a line whose spans differ, each thing in rows of its own.
+
+Tables along the whole line never change. The window holds a part of them: a thing with number n is always in
+slot n modulo the number of slots, which lie in sets of ``WIDTH``; neighbours are in different sets, because
+things of a set are computed side by side and must not share nodes.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from ....backend import constants
+from ....base.arrays import Array, Index
+
+
+class LinkRow(IntEnum):
+    """Constants of a dropper."""
+
+    WEIGHT = 0  # of its four nodes, the same on both wires
+    MOVE = 4  # displacement of the lower wire's four nodes in a step by 1 N, then of the upper wire's (m/N)
+    EARLY = 12  # change of tension by the mean extension before a step (N/m)
+    LATE = 13  # and after it
+    YIELD = 14  # mean relative displacement of the ends over a step by 1 N (m/N)
+    STIFFNESS = 15  # in tension, with the grid's missing compliance (N/m)
+    ROOM = 16  # designed distance of its ends (m)
+
+
+class MastRow(IntEnum):
+    """Constants of the steady arm and the messenger's support at a mast."""
+
+    WEIGHT = 0  # of the four nodes, the same on both wires
+    ARM = 4  # of the steady arm on the contact wire, a spring
+    SUPPORT = 11  # of the support under the messenger, a spring
+
+
+class SpringRow(IntEnum):
+    """Constants of a spring to the ground, from its first one on."""
+
+    MOVE = 0  # displacement of the four nodes in a step by 1 N (m/N)
+    PULL = 4  # its force by displacement at three times, newest first (N/m)
+
+
+LINK, MAST, SPRING = constants(LinkRow), constants(MastRow), constants(SpringRow)
+LINK_ROWS, MAST_ROWS = 17, 18
+
+
+class AlongLine(NamedTuple):
+    """Things attached along the whole line, in their order."""
+
+    first: Index  # (things,): number of the first of four nodes, from the line's start
+    constants: Array  # (things, rows)
+    empty: Array  # (rows,): of a slot that holds none, which then has no effect
+
+
+class InWindow(NamedTuple):
+    """The things in each lane's window."""
+
+    begin: Index  # (lanes,): number of the first thing
+    number: Index  # (lanes, sets times WIDTH): of the thing in each slot; -1 for none
+    node: Index  # (lanes, sets, 4, WIDTH): its nodes, each as row times WIDTH plus segment
+    constants: Array  # (lanes, sets, rows, WIDTH)
+
+
+class Scattered(NamedTuple):
+    """Of the whole line; nothing where spans are alike."""
+
+    inertia: Array  # (wires, nodes): bare wire's mass over that of the node; no nodes where all are 1
+    mobility: Array  # (wires, nodes): displacement in a step by 1 N (m/N); the first node is -PAD
+    masts: AlongLine
+    links: AlongLine
+
+
+class ScatteredWindow(NamedTuple):
+    """Of the window in each lane."""
+
+    masts: InWindow
+    links: InWindow
