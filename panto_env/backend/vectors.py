@@ -212,21 +212,23 @@ def _gather_plain(rows: Any, places: Any, i: int) -> Any:
     return rows.reshape(-1)[places[i]]
 
 
-def _scatter_plain(rows: Any, places: Any, i: int, vector: Any) -> None:
-    np.add.at(rows.reshape(-1), places[i], vector)
+def _scatter_plain(first: Any, second: Any, places: Any, i: int, vector: Any) -> None:
+    for rows in (first, second):
+        np.add.at(rows.reshape(-1), places[i], vector)
 
 
 def _are_places(array: Any) -> bool:
     return _is_table(array) and isinstance(array.dtype, types.Integer)
 
 
-def _addresses(context: Any, builder: Any, kinds: Any, rows: Any, places: Any, i: Any) -> list[Any]:
-    """Addresses of the numbers of a table ``rows`` at row ``i`` of ``places``."""
-    data = make_array(kinds[0])(context, builder, rows).data
-    row = builder.load(
-        _row(context, builder, kinds[1], (places, i), WIDTH), align=kinds[1].dtype.bitwidth // 8
-    )
-    return [builder.gep(data, [builder.extract_element(row, _number(k))]) for k in range(WIDTH)]
+def _offsets(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> list[Any]:
+    """The numbers in row ``i`` of ``places``."""
+    table = make_array(kind)(context, builder, places).data
+    first = builder.mul(i, ir.Constant(i.type, WIDTH))
+    # Read one by one: taken from a vector they would cost a second instruction each.
+    return [
+        builder.load(builder.gep(table, [builder.add(first, ir.Constant(i.type, k))])) for k in range(WIDTH)
+    ]
 
 
 def _number(k: int) -> Any:
@@ -242,24 +244,33 @@ def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        data = make_array(sig.args[0])(context, builder, values[0]).data
         vector = ir.Constant(ir.VectorType(context.get_value_type(rows.dtype), WIDTH), ir.Undefined)
-        for k, address in enumerate(_addresses(context, builder, sig.args, *values)):
-            vector = builder.insert_element(vector, builder.load(address), _number(k))
+        for k, offset in enumerate(_offsets(context, builder, sig.args[1], *values[1:])):
+            item = builder.load(builder.gep(data, [offset]))
+            vector = builder.insert_element(vector, item, _number(k))
         return vector
 
     return VectorType(rows.dtype)(rows, places, types.intp), build
 
 
 @in_python(_scatter_plain)
-def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any:
-    """``scatter_add(rows, places, i, vector)``: add a vector to the numbers that ``gather`` reads."""
-    if not (_is_table(rows) and _are_places(places) and isinstance(i, types.Integer)):
+def scatter_add(typing: Any, first: Any, second: Any, places: Any, i: Any, vector: Any) -> Any:
+    """``scatter_add(first, second, places, i, vector)``: add a vector to the numbers of two tables that
+    ``gather`` reads at these places.
+    """
+    tables = _is_table(first) and _is_table(second) and _are_places(places)
+    if not (tables and isinstance(i, types.Integer)):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        for k, address in enumerate(_addresses(context, builder, sig.args, *values[:3])):
-            item = builder.extract_element(values[3], _number(k))
-            builder.store(builder.fadd(builder.load(address), item, flags=FLAGS), address)
+        both = [make_array(sig.args[k])(context, builder, values[k]).data for k in (0, 1)]
+        for k, offset in enumerate(_offsets(context, builder, sig.args[2], *values[2:4])):
+            item = builder.extract_element(values[4], _number(k))
+            addresses = [builder.gep(data, [offset]) for data in both]
+            sums = [builder.fadd(builder.load(address), item, flags=FLAGS) for address in addresses]
+            for total, address in zip(sums, addresses, strict=True):
+                builder.store(total, address)
         return context.get_dummy_value()
 
-    return types.void(rows, places, types.intp, VectorType(rows.dtype)), build
+    return types.void(first, second, places, types.intp, VectorType(first.dtype)), build

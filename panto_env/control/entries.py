@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from ..backend import inlined
 from ..plant.actuators import ActuatorSettings
+from ..plant.alignment import mean_over_own_length
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
@@ -168,8 +169,13 @@ def _speed(episode, own, task, now, number):
     return now[NOW.SPEED]
 
 
+@entries(MEASURED, lambda options: [(*LINE_ENTRIES[0], 0)] if options.line_values else [])
+def _span_length(episode, own, task, now, number):
+    return episode.alignment.mean_length / mean_over_own_length(episode.alignment, now[NOW.SPANS])
+
+
 def _line_values(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    return [(*each, row) for row, each in enumerate(LINE_ENTRIES)] if options.line_values else []
+    return [(*each, row) for row, each in enumerate(LINE_ENTRIES) if row > 0] if options.line_values else []
 
 
 @entries(MEASURED, _line_values)

@@ -18,7 +18,7 @@ LINE_ENTRIES = (
     ("messenger wire mass", 1.0, "kg/m"),
     ("droppers of a span", 10.0, "-"),
 )
-"""Name, scale and unit of each value."""
+"""Name, scale and unit of each value. The span length is that of the span that the train is in."""
 LINE_CENTRES = {
     "span length": (55.0, 8.0),
     "wave speed": (140.0, 14.0),

@@ -81,8 +81,12 @@ class Workbench:
     def keep_kernels(self) -> None:
         """Let compiled kernels serve the sources as they are now: only files without kernels are mutated."""
         name = "from panto_env.backend.cache import kernel_hash; print(kernel_hash())"
-        for folder in self.kernels.glob("*"):
-            folder.rename(self.kernels / self._python("-c", name).stdout.strip())
+        # A test that changes sources has left another folder, with less in it.
+        folder = max(self.kernels.glob("*"), key=lambda each: len(list(each.iterdir())), default=None)
+        target = self.kernels / self._python("-c", name).stdout.strip()
+        if folder is not None and folder != target:
+            shutil.rmtree(target, ignore_errors=True)
+            folder.rename(target)
 
     def tests_of(self, mutant: Mutant) -> list[str]:
         """The tests that reach a mutant, and all of the room where a fixture does."""

@@ -5,8 +5,9 @@ import pytest
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.build import STIFFEST, constants
+from panto_env.plant.catenary.flexible.build import constants
 from panto_env.plant.catenary.flexible.grid import missing_yield, stencil_weights
+from panto_env.plant.catenary.flexible.on_grid import STIFFEST
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.interpolation import stencil

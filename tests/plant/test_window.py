@@ -53,7 +53,7 @@ def test_ends_let_waves_out(precision):
     assert chosen.time_step == STEP
     built = constants(bare, solve(bare), 30, numerics, chosen)
     wire = at_rest(built, 1, 1)
-    wire.first_span[0] = 10
+    wire.travelled[0] = 10
     pulse = 0.05 * np.exp(-(((built.spacing * window_nodes(built.rows) - 210) / 5) ** 2))
     wire.displacement[0, CONTACT] = lay_out(pulse, built.rows, float)
     middle = 13.5 * line.span_length

@@ -91,7 +91,8 @@ class FlexibleWire(NamedTuple):
     contact_weight: Array  # (lanes, collectors, 4): of the four
     unmoved_height: Array  # (lanes, collectors): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
-    # Links in equal rows come first, then scattered ones. Extensions are relative to the static ones, minus the gap of a link that is slack there.
+    # Links in equal rows come first, then scattered ones. Extensions are relative to the static ones, minus
+    # the gap of a link that is slack there.
     past_extension: Array  # (lanes, sets, WIDTH): before the step (m)
     extension: Array  # (lanes, sets, WIDTH): at its start (m)
     change: Array  # (lanes, sets, WIDTH): tension minus the static one, mean over the last step (N)

@@ -43,7 +43,7 @@ def constants(
     resolution: Resolution,
     own: WireDefects = NO_DEFECTS,
 ) -> FlexibleLine:
-    """A line of ``spans`` spans, or with a sequence of its own, with its static shape, at a stable resolution.
+    """A line of ``spans`` spans, or of its own sequence, with its static shape, at a stable resolution.
 
     own: defects of the contact wire itself, at positions along the whole line; a travelling window cannot
     have any. Raises InputError for more nodes than ``MOST_NODES``.
@@ -103,7 +103,7 @@ def constants(
         link_static=np.tile(shape.dropper_tension, (1, len(each) // shape.spans)).astype(real),
         link_gap=np.zeros((1, len(grid.links.position)), dtype=real),
         scattered=scattered(grid if differ else None, real),
-        **in_equal_rows(grid.bare() if differ else grid, rows, real),
+        **in_equal_rows(grid, slice(0, 0 if differ else None), rows, real),
     )
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -57,18 +56,13 @@ class DefectiveLine:
         """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further positions at which
         a force may act (m); where spans are alike, in each of them.
 
-        Raises InputError for what a line of so many spans has not, and for defects where its spans differ.
+        Raises InputError for what a line of so many spans has not.
         """
-        if data.sequence and condition.defective:
-            raise InputError(
-                f"Defects are not computed on line '{data.name}' yet, as its spans differ; use a "
-                "line_condition without them, such as 'new'."
-            )
         each: Sequence[FlexibleCatenaryData | Span] = spans_of(data).each if data.sequence else [data] * spans
         alignment = data.alignment(spans)
         left = with_tension_left(data, condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
-        repeats = spans // shape.spans
+        self._times = repeats = spans // shape.spans
         self._static = np.tile(shape.dropper_tension, repeats)
         self._stiffness = np.tile(shape.dropper_stiffness, repeats)
         self._broken, self._error, height = _locate(
@@ -76,12 +70,11 @@ class DefectiveLine:
         )
         own = locate(data, spans, condition)
 
-        divided = [_divided(each[0], own, nodes)] * spans
         if data.sequence:
-            divided = [
-                _divided(span, own, [x - begin for x in nodes if begin <= x < end])
-                for span, (begin, end) in zip(each, pairwise(alignment.supports), strict=True)
-            ]
+            begins = zip(each, alignment.supports, strict=False)
+            divided = [_divided(span, own, nodes, begin) for span, begin in begins]
+        else:
+            divided = [_divided(each[0], own, nodes)] * spans
         firsts = np.cumsum(
             [0, *(len(lengths) for _, lengths, _ in divided)]
         )  # numbers of the supports' nodes
@@ -123,8 +116,8 @@ class DefectiveLine:
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
         if left is not data:
             fit = misfit(data, left)
-            self._error = self._error + np.tile(fit.too_long, alignment.spans)
-            self._load[self._ends] += np.tile(fit.lighter, alignment.spans)[:, None]
+            self._error = self._error + np.tile(fit.too_long, self._times)
+            self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
             self._load[self._masts] += fit.lift
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
@@ -209,11 +202,19 @@ class DefectiveLine:
 
 
 def _divided(
-    span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float]
+    span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float], begin: float | None = None
 ) -> tuple[Array, Array, Index]:
-    """Limits and lengths of the pieces of a span (m), and at which limits its droppers hang."""
-    breaks = own.breaks(span.span_length, [0.0, *span.droppers.positions, span.span_length], nodes)
+    """Limits and lengths of the pieces of a span (m), and at which limits its droppers hang.
+
+    begin: where the span begins (m); None where spans are alike, and all are divided in the same way.
+    """
+    breaks = own.breaks([0.0, *span.droppers.positions, span.span_length], nodes, begin)
     return breaks, np.diff(breaks), np.searchsorted(breaks, span.droppers.positions)
+
+
+def _own(counts: Sequence[int], span: int) -> str:
+    last = min(span, len(counts))
+    return f"and span {last} has {counts[last - 1]} droppers"
 
 
 def _locate(
@@ -229,8 +230,8 @@ def _locate(
         for span, number in places:
             if span > spans or number > counts[span - 1]:
                 raise InputError(
-                    f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans "
-                    f"of {counts[0]} droppers."
+                    f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans"
+                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else f", {_own(counts, span)}.")
                 )
         return [int(firsts[span - 1]) + number - 1 for span, number in places]
 

@@ -12,7 +12,10 @@ from .schema import FlexibleCatenaryData
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
-    """Nodes per span, of mean length where spans differ, for a maximum spacing (m): a multiple of ``WIDTH``, for segments of equal size."""
+    """Nodes per span for a maximum spacing (m): a multiple of ``WIDTH``, for segments of equal size.
+
+    Where spans differ, a span of mean length.
+    """
     return WIDTH * int(np.ceil(data.stride / spacing / WIDTH - 1e-9))
 
 

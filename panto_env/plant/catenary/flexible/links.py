@@ -71,8 +71,8 @@ def slackening(stiffness, static, past, free, yielding):
 def pull_of(past, now, step, static, early, late, stiffness, yielding):
     """Change of the links' tension (N), the mean over a step; the tension is never negative.
 
-    past, now: extension before the step and at its start. step: displacement of the upper ends relative to the
-    lower ones in the step, without the links (m).
+    past, now: extension before the step and at its start. step: displacement in the step of the upper ends
+    relative to the lower ones, without the links (m).
     """
     before = 0.5 * (past + now)
     free, minimum = now + 0.5 * step, -static

@@ -1,4 +1,4 @@
-"""What is attached to the wires, on the nodes of a grid: masses of nodes, and constants of springs and links."""
+"""Masses of the nodes of a grid, and constants of the springs and links that are attached there."""
 
 from __future__ import annotations
 
@@ -36,17 +36,6 @@ class OnGrid(NamedTuple):
     link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
     stiffness: Array  # (links,): in tension, with the grid's missing compliance (N/m)
     room: Array  # (links,): designed distance of the ends (m)
-
-    def bare(self) -> OnGrid:
-        """The same without springs and links."""
-        return OnGrid(
-            self.inertia,
-            self.mobility,
-            *(
-                type(each)(*(array[:0] for array in each)) if isinstance(each, tuple) else each[:0]
-                for each in self[2:]
-            ),
-        )
 
 
 def on_grid(
@@ -126,24 +115,28 @@ class Sets:
         return np.ascontiguousarray(np.moveaxis(array, 1, -1))
 
 
-def in_equal_rows(grid: OnGrid, rows: int, real: Any) -> dict[str, Any]:
-    """Fields of ``FlexibleLine`` with springs and links in sets of equal rows."""
+def in_equal_rows(grid: OnGrid, those: slice, rows: int, real: Any) -> dict[str, Any]:
+    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows; those: all, or none."""
     springs, links, yielding = grid.springs, grid.links, grid.spring_yield
-    held = Sets(springs.wire[:, None], grid.at_springs.first + 1, rows)
-    joined = Sets(links.wires, grid.at_links.first, rows)
+    held = Sets(springs.wire[those, None], grid.at_springs.first[those] + 1, rows)
+    joined = Sets(links.wires[those], grid.at_links.first[those], rows)
     pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
+
+    def of_links(values: Array, empty: float = 0.0) -> Array:
+        return joined.of(values[those], real, empty)
+
     return {
         "spring_wire": held.wires[:, 0],
         "spring_row": held.row,
-        "spring_pull": held.of(pull, real),
+        "spring_pull": held.of(pull[those], real),
         "link_wire": joined.wires,
         "link_row": joined.row,
-        "link_weight": joined.of(grid.at_links.weights, real),
-        "link_move": joined.of(grid.move.reshape(-1, 8), real),
-        "link_linear": joined.of(grid.linear, real),
-        "link_yield": joined.of(grid.link_yield, real, 1.0),
-        "link_stiffness": joined.of(grid.stiffness, real, 1.0),
-        "link_room": joined.of(grid.room, real, 1.0),
+        "link_weight": of_links(grid.at_links.weights),
+        "link_move": of_links(grid.move.reshape(len(grid.move), -1)),
+        "link_linear": of_links(grid.linear),
+        "link_yield": of_links(grid.link_yield, 1.0),
+        "link_stiffness": of_links(grid.stiffness, 1.0),
+        "link_room": of_links(grid.room, 1.0),
         "link_set": joined.number,
         "link_segment": joined.segment,
     }

@@ -40,30 +40,30 @@ def stretch_at(x, node, constants):
 
 @inlined
 def move_nodes(u, d, node, constants, row, force):
-    """Apply forces (N) to the four nodes of each thing in a set; row: of ``constants``, the nodes' mobility."""
+    """Apply forces (N) to the four nodes of each thing in a set, whose mobility begins in ``row``."""
     for k in range(4):
-        step = load_row(constants, row + k) * force
-        scatter_add(u, node, k, step)
-        scatter_add(d, node, k, step)
+        scatter_add(u, d, node, k, load_row(constants, row + k) * force)
 
 
 @inlined
-def keep_past_of_masts(masts, lane, d, past, first):
+def keep_past_of_masts(scattered, masts, lane, d, past, first):
     """Save the increments at the masts, from set ``first`` of ``past`` on, which the leapfrog overwrites."""
     sets = masts.node.shape[1]
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        store_row(past, first + s, displacement_at(d[CONTACT], node, table))
+        if scattered.stiff_arms:
+            store_row(past, first + s, displacement_at(d[CONTACT], node, table))
         store_row(past, first + sets + s, displacement_at(d[MESSENGER], node, table))
 
 
 @inlined
-def apply_masts(masts, lane, u, d, past, first):
+def apply_masts(scattered, masts, lane, u, d, past, first):
     """Steady arms and supports, each implicit at its place."""
     sets = masts.node.shape[1]
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        _apply_spring(u[CONTACT], d[CONTACT], node, table, MAST.ARM, load_row(past, first + s))
+        if scattered.stiff_arms:
+            _apply_spring(u[CONTACT], d[CONTACT], node, table, MAST.ARM, load_row(past, first + s))
         _apply_spring(u[MESSENGER], d[MESSENGER], node, table, MAST.SUPPORT, load_row(past, first + sets + s))
 
 
@@ -81,24 +81,22 @@ def _apply_spring(u, d, node, table, row, past):
 def record_scattered(line, wire, lane, uplift, tension):
     """Write uplift at masts (m) and tension of droppers (N), as ``record_wire`` does."""
     masts, links = wire.scattered.masts, wire.scattered.links
+    u, d, past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
     sets = masts.node.shape[1]
-    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
-    for slot in range(masts.number.shape[1]):
-        n = masts.number[lane, slot]
-        if n >= 0 and n < uplift.size:
-            s, j = slot % sets, slot // sets
-            total = 0.0
-            for k in range(4):
-                place = masts.node[lane, s, k, j] & NOT_NEGATIVE
-                row, segment = place // WIDTH, place % WIDTH
-                total += masts.constants[lane, s, k, j] * (u[row, segment] - 0.5 * d[row, segment])
-            uplift[n] = total
+    for s in range(sets if uplift.size > 0 else 0):
+        node, table = masts.node[lane, s], masts.constants[lane, s]
+        moved = displacement_at(u[CONTACT], node, table) - 0.5 * displacement_at(d[CONTACT], node, table)
+        store_row(past, s, moved)
+        for j in range(WIDTH):
+            n = masts.number[lane, j * sets + s]
+            if n >= 0:
+                uplift[n & NOT_NEGATIVE] = past[s, j]
     sets, first = links.node.shape[1], line.link_row.size
-    for slot in range(links.number.shape[1]):
-        n = links.number[lane, slot]
-        if n >= 0 and n < tension.size:
-            s, j = first + slot % sets, slot // sets
-            tension[n] = wire.static[lane, s, j] + wire.change[lane, s, j]
+    for s in range(sets if tension.size > 0 else 0):
+        for j in range(WIDTH):
+            n = links.number[lane, j * sets + s]
+            if n >= 0:
+                tension[n & NOT_NEGATIVE] = wire.static[lane, first + s, j] + wire.change[lane, first + s, j]
 
 
 @inlined

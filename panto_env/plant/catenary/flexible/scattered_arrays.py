@@ -69,6 +69,7 @@ class Scattered(NamedTuple):
     mobility: Array  # (wires, nodes): displacement in a step by 1 N (m/N); the first node is -PAD
     masts: AlongLine
     links: AlongLine
+    stiff_arms: bool  # whether any steady arm is a spring
 
 
 class ScatteredWindow(NamedTuple):

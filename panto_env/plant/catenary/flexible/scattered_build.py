@@ -1,4 +1,4 @@
-"""Tables of what is attached to the wires of a line whose spans differ, and the window that holds a part of it."""
+"""Tables of what is attached to the wires of a line whose spans differ, and room for those of a window."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NODES = 4
 
 
 def scattered(grid: OnGrid | None, real: Any) -> Scattered:
-    """What is attached along a whole line on its grid; None where spans are alike, and nothing is scattered."""
+    """What is attached along a whole line on its grid; None where spans are alike: nothing is scattered."""
     masts, links = np.zeros(MAST_ROWS), np.zeros(LINK_ROWS)
     links[[LINK.YIELD, LINK.STIFFNESS, LINK.ROOM]] = 1.0  # a slot without a link has none that could be slack
     if grid is None:
@@ -36,6 +36,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             bare,
             AlongLine(none, np.zeros((0, MAST_ROWS), real), masts.astype(real)),
             AlongLine(none, np.zeros((0, LINK_ROWS), real), links.astype(real)),
+            False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
     at_links, at_springs = grid.at_links, grid.at_springs
@@ -59,6 +60,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         mobility=grid.mobility,
         masts=AlongLine(at_springs.first[::2].copy(), of_masts.astype(real), masts.astype(real)),
         links=AlongLine(at_links.first, of_links.astype(real), links.astype(real)),
+        stiff_arms=bool(levels[::2].any()),
     )
 
 
@@ -74,7 +76,7 @@ def _room(line: FlexibleLine, along: AlongLine, lanes: int) -> InWindow:
     return InWindow(
         begin=np.zeros(lanes, dtype=np.int64),
         number=np.full((lanes, sets * WIDTH), -1, dtype=np.int64),
-        node=np.zeros((lanes, sets, NODES, WIDTH), dtype=np.int64),
+        node=np.zeros((lanes, sets, NODES, WIDTH), dtype=np.int32),
         constants=np.tile(along.empty[:, None], (lanes, sets, 1, WIDTH)),
     )
 

@@ -128,7 +128,7 @@ class FlexibleCatenaryData(CatenaryData):
 
     @property
     def dropper_tables(self) -> tuple[Droppers, ...]:
-        """The droppers of each span that may differ from others; of a line with one span repeated, that one's."""
+        """The droppers of each span of a sequence, or of the one span that is repeated."""
         return tuple(span.droppers for span in spans_of(self).each) if self.sequence else (self.droppers,)
 
     @property

@@ -99,13 +99,13 @@ def _advance(line, wire, lane):
     u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
     masts, springs = wire.scattered.masts, line.spring_row.size
     keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
-    keep_past_of_masts(masts, lane, d, spring_past, springs)
+    keep_past_of_masts(line.scattered, masts, lane, d, spring_past, springs)
     measure_extensions(line, wire, lane)
     stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
     for w in range(u.shape[0]):
         leapfrog(u[w], d[w], inertia[w], stencil[w])
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
-    apply_masts(masts, lane, u, d, spring_past, springs)
+    apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
     pull_links(line, wire, lane)
 
 

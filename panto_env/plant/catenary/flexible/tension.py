@@ -16,15 +16,16 @@ from ....base.remember import remembered
 from ...line_condition import LineCondition
 from .beams import GRAVITY
 from .schema import FlexibleCatenaryData
+from .spans import spans_of
 from .static import StaticShape, solve
 
 
 class Misfit(NamedTuple):
     """Differences of a line that has lost tension from one that was designed for the remaining tension."""
 
-    too_long: Array  # (droppers of a span,): excess length of the droppers (m)
-    lighter: Array  # (droppers of a span,): missing weight of each half of a dropper (N)
-    lift: float  # additional upward force of each steady arm (N)
+    too_long: Array  # (droppers of the spans that repeat,): excess length of the droppers (m)
+    lighter: Array  # (droppers,): missing weight of each half of a dropper (N)
+    lift: Array  # (supports between two spans, or one for all,): additional upward force of steady arms (N)
 
 
 def with_tension_left(
@@ -56,13 +57,18 @@ def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> St
 
 def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit:
     """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
-    was, now, arm, support = solve(designed), solve(left), designed.steady_arm, np.zeros(1)
+    was, now = solve(designed), solve(left)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
-    lift: Any = arm.stiffness * float((was.contact.height(support) - now.contact.height(support))[0])
-    if arm.holds_wire:
-        lift += was.arm_force - now.arm_force
+    if designed.sequence:
+        arms, places = [span.steady_arm for span in spans_of(designed).each], designed.alignment().supports
+        arms.append(arms[-1])
+    else:
+        arms, places = [designed.steady_arm], (0.0,)
+    x = np.array(places)
+    lift: Any = np.array([arm.stiffness for arm in arms]) * (was.contact.height(x) - now.contact.height(x))
+    lift[[arm.holds_wire for arm in arms]] += was.arm_force - now.arm_force
     return Misfit(
         too_long=was.dropper_length - now.dropper_length + stretch,
         lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,
-        lift=lift,
+        lift=lift[1:-1] if designed.sequence else lift,
     )

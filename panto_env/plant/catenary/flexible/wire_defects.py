@@ -58,15 +58,23 @@ class WireDefects(NamedTuple):
         """Mass of the most worn wire as a share of a new one's."""
         return 1 - max((stretch.share for stretch in self.stretches), default=0.0)
 
-    def breaks(self, span: float, own: Sequence[float], further: Sequence[float] = ()) -> Array:
-        """Limits of the pieces of a span (m): its own and further places, and the defects of all spans."""
-        positions = [*further, *(spot.position for spot in self.spots)]
+    def breaks(self, own: Sequence[float], further: Sequence[float], begins: float | None) -> Array:
+        """Limits of the pieces of a span (m), from its beginning: its own limits, and further positions.
+
+        Where spans are alike, defects of all of them count in each; elsewhere those within the span, which
+        ``begins`` at a position along the line (m).
+        """
+        positions, span = [*further, *(spot.position for spot in self.spots)], own[-1]
         for begin, end, _, _ in self.stretches:
             positions += [begin, begin + RAMP, end - RAMP, end]
+        if begins is None:
+            places = [position % span for position in positions]
+        else:
+            places = [each - begins for each in positions if begins <= each < begins + span]
         breaks = list(own)
-        for place in positions:
-            if min(abs(place % span - each) for each in breaks) > NEAREST:
-                breaks.append(place % span)
+        for place in places:
+            if min(abs(place - each) for each in breaks) > NEAREST:
+                breaks.append(place)
         return np.array(sorted(breaks))
 
     def mass_of_nodes(self, x: Array, spacing: float, wire: Wire) -> Array:
@@ -109,14 +117,21 @@ NO_DEFECTS = WireDefects()
 
 def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> WireDefects:
     """Defects of the contact wire in a condition. Raises InputError for a place beyond the line."""
+    alignment = data.alignment(spans)
+    lengths = alignment.lengths
 
     def position(span: int, offset: float) -> float:
-        if span > spans or offset > data.span_length:
+        if span > spans or offset > lengths[span - 1]:
+            last = spans if span > spans else span
             raise InputError(
-                f"Line '{data.name}' has no place {offset:g} m from the first support of span {span}: it has "
-                f"{spans} spans of {data.span_length:g} m."
+                f"Line '{data.name}' has no place {offset:g} m from the first support of span {span}: "
+                + (
+                    f"it has {spans} spans of {data.span_length:g} m."
+                    if not data.sequence
+                    else f"it has {spans} spans, and span {last} is {lengths[last - 1]:g} m long."
+                )
             )
-        return (span - 1) * data.span_length + offset
+        return float(alignment.support(span - 1) + offset)
 
     spots = tuple(
         Spot(position(span, offset), mass, stiffness)
@@ -131,7 +146,7 @@ def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> 
                 f"{stretches[-1].begin:g} and {begin:g} m along the line do."
             )
         stretches.append(Stretch(begin, begin + length, share, worn_depth(data.contact_wire, share)))
-    whole = spans * data.span_length
+    whole = alignment.length
     for spot in spots:
         if not 0 < spot.position < whole:
             raise InputError(f"A hard spot must lie between the line's anchors, at 0 and {whole:g} m.")

@@ -28,9 +28,13 @@ def rise_by_defects(pieces, breaks, decay, x):
     per_span, span = breaks.size - 1, breaks[-1]
     number = min(int(x / span), pieces.shape[0] // per_span - 1)
     local = x - number * span
-    k = 0
-    while k < per_span - 1 and local >= breaks[k + 1]:
-        k += 1
+    k, beyond = 0, per_span
+    while beyond - k > 1:
+        middle = (k + beyond) // 2
+        if local >= breaks[middle]:
+            k = middle
+        else:
+            beyond = middle
     piece, left, right = pieces[number * per_span + k], local - breaks[k], breaks[k + 1] - local
     bend = piece[2] * math.exp(-decay * left) + piece[3] * math.exp(-decay * right)
     return piece[0] + piece[1] * left + bend + piece[4] * left * right
