@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..backend import inlined, kernel, open_packed
+from ..plant.alignment import between_supports
 from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import PLACE, ROW
@@ -51,12 +52,16 @@ def take_action(run, episode, own, task, now, lane):
 
 
 @inlined
-def end_episode(line, wire, episode, own, task, values, flags, lane):
+def end_episode(line, wire, run, episode, own, task, values, flags, lane):
     """Whether a lane's episode ends here; an early end is charged to reward and cost."""
     ending = ending_by_wire(line, wire, lane)
     if task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit:
         ending = ENDING.LOSS
-    if not abs(own[ROW.STATE]) <= episode.head_range:
+    height = own[ROW.STATE]
+    if episode.levels.size > 0:
+        x = position(run, CONTROLLED, lane, own[ROW.STEP])
+        height -= between_supports(episode.alignment, episode.levels, x)
+    if not abs(height) <= episode.head_range:
         ending = ENDING.HEAD
     if not abs(own[ROW.STATE]) <= LARGEST_HEIGHT:  # nor is NaN
         ending = ENDING.DIVERGED
@@ -112,7 +117,7 @@ def control_lane(packed, entries, values, flags, lane):
             add_control_step_to_figures(task, now)
         else:
             forget_reward(values)
-        ended = end_episode(line, wire, episode, own, task, values, flags, lane)
+        ended = end_episode(line, wire, run, episode, own, task, values, flags, lane)
         if ended:
             break
     prepare_entries(episode, sensors, run, own, now, lane)

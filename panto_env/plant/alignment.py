@@ -158,6 +158,14 @@ def mean_over_own_length(alignment, counted):
 
 
 @inlined
+def between_supports(alignment, values, x):
+    """Value at a position (m), on the straight line between those at the supports beside it."""
+    counted = in_spans(alignment, x)
+    k = min(max(int(counted), 0), values.size - 2) & NOT_NEGATIVE
+    return values[k] + (counted - k) * (values[k + 1] - values[k])
+
+
+@inlined
 def spans_of(alignment):
     """Number of spans."""
     return alignment.supports.size - 1

@@ -7,7 +7,8 @@ from enum import IntEnum
 from ..backend import constants
 
 HEAD_RANGE = 0.3
-"""Height of the head (m), up or down, beyond which a run ends: outside the wire's clearance."""
+"""Height of the head (m) over or under the line between the contact wire's heights at supports, beyond which a
+run ends: outside the wire's clearance."""
 LARGEST_HEIGHT = 3.0
 """Height of head or wire (m), up or down, ten times any real one: beyond it the computation has diverged."""
 LOSS_TIME = 0.5
@@ -41,7 +42,7 @@ def reason(ending: Ending, free_uplift: float) -> str:
     """Why a run ended, as a clause; free_uplift: the line's (m)."""
     return {
         Ending.HEAD: f"the collector head left the range of ±{1e3 * HEAD_RANGE:.0f} mm about the contact "
-        "wire's height at the support",
+        "wire's height at the supports",
         Ending.LOSS: f"contact was lost for {LOSS_TIME:g} s",
         Ending.STOP: f"the contact wire rose by {1e3 * free_uplift:.0f} mm at a support, all the room "
         "that it has there",

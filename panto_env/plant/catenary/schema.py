@@ -73,6 +73,11 @@ class CatenaryData(Settings):
         """Maximum number of spans of a run."""
         return MOST_SPANS
 
+    @property
+    def contact_heights(self) -> tuple[float, ...]:
+        """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
+        return ()
+
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)

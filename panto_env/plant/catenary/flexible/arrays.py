@@ -39,7 +39,7 @@ class FlexibleLine(NamedTuple):
     spacing: float  # of the grid (m)
     alignment: AlignmentArrays  # of the whole line
     stride: float  # by which the window moves (m): a span, or their mean length where spans differ
-    strides: int  # of the whole line
+    starts: Array  # (strides + 1,): positions at which a window may begin (m), and the line's end
     window: int  # strides that the grid covers
     rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # (rows, n): static height of the contact wire, at even distances (m)

@@ -18,8 +18,9 @@ from .static import StaticShape
 
 
 class Springs(NamedTuple):
-    """Springs and dampers between wires and the ground."""
+    """Springs and dampers between wires and the ground: two at each mast, then hard spots."""
 
+    masts: int
     wire: Index  # (springs,)
     place: Array  # (springs,): along the line, in nodes
     levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
@@ -89,6 +90,7 @@ def springs_of(
     held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
     arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
     return Springs(
+        masts=len(each),
         wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
         place=np.append(np.repeat(places, 2), hard - PAD),
         levels=np.array([*levels, *held]).reshape(-1, 3),

@@ -82,7 +82,7 @@ def constants(
         spacing=dx,
         alignment=data.alignment(spans).arrays,
         stride=data.stride,
-        strides=strides,
+        starts=data.stride * np.arange(strides + 1),
         window=window,
         rows=rows,
         shape=tensioned.shape[None],
@@ -103,7 +103,7 @@ def constants(
         link_static=np.tile(shape.dropper_tension, (1, len(each) // shape.spans)).astype(real),
         link_gap=np.zeros((1, len(grid.links.position)), dtype=real),
         scattered=scattered(grid if differ else None, real),
-        **in_equal_rows(grid, slice(0, 0 if differ else None), rows, real),
+        **in_equal_rows(grid, differ, rows, real),
     )
 
 

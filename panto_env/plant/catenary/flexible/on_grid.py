@@ -115,10 +115,15 @@ class Sets:
         return np.ascontiguousarray(np.moveaxis(array, 1, -1))
 
 
-def in_equal_rows(grid: OnGrid, those: slice, rows: int, real: Any) -> dict[str, Any]:
-    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows; those: all, or none."""
+def in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str, Any]:
+    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows.
+
+    differ: whether spans do. All but hard spots is scattered then; these are on nodes, of a whole line.
+    """
+    masts = grid.springs.masts
+    its, those = (slice(2 * masts, None), slice(0, 0)) if differ else (slice(None), slice(None))
     springs, links, yielding = grid.springs, grid.links, grid.spring_yield
-    held = Sets(springs.wire[those, None], grid.at_springs.first[those] + 1, rows)
+    held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
     joined = Sets(links.wires[those], grid.at_links.first[those], rows)
     pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
 
@@ -128,7 +133,7 @@ def in_equal_rows(grid: OnGrid, those: slice, rows: int, real: Any) -> dict[str,
     return {
         "spring_wire": held.wires[:, 0],
         "spring_row": held.row,
-        "spring_pull": held.of(pull[those], real),
+        "spring_pull": held.of(pull[its], real),
         "link_wire": joined.wires,
         "link_row": joined.row,
         "link_weight": of_links(grid.at_links.weights),

@@ -100,6 +100,12 @@ def record_scattered(line, wire, lane, uplift, tension):
 
 
 @inlined
+def at_line_end(line, wire, lane):
+    """Whether a lane's window has come to the end of the line."""
+    return wire.travelled[lane] + line.window >= line.starts.size - 1
+
+
+@inlined
 def take_window(line, wire, lane):
     """Take in what is in a lane's window at its present place; what has entered is at rest."""
     scattered, held = line.scattered, wire.scattered
@@ -107,7 +113,7 @@ def take_window(line, wire, lane):
         nodes = line.rows * WIDTH
         travelled = wire.travelled[lane]
         start = travelled * (nodes // line.window)
-        at_start, at_end = travelled == 0, travelled + line.window >= line.strides
+        at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
         end = start + nodes
         _leave(scattered.masts, held.masts, lane, start, at_start)

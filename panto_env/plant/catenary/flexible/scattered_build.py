@@ -39,7 +39,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
-    at_links, at_springs = grid.at_links, grid.at_springs
+    at_links = grid.at_links
     of_links = np.concatenate(
         [
             at_links.weights,
@@ -50,15 +50,18 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         axis=1,
     )
     # Springs come in pairs: at each mast the steady arm, then the support.
-    levels, yielding = grid.springs.levels, grid.spring_yield
-    mobility = grid.mobility[grid.springs.wire[:, None], at_springs.four]
+    pairs = slice(2 * grid.springs.masts)
+    first, weights, _ = grid.at_springs
+    first, weights, four = first[pairs], weights[pairs], grid.at_springs.four[pairs]
+    levels, yielding = grid.springs.levels[pairs], grid.spring_yield[pairs]
+    mobility = grid.mobility[grid.springs.wire[pairs, None], four]
     pull = levels / (1 + levels[:, :1] * yielding)
-    of_springs = np.concatenate([mobility * at_springs.weights, pull], axis=1)
-    of_masts = np.concatenate([at_springs.weights[::2], of_springs[::2], of_springs[1::2]], axis=1)
+    of_springs = np.concatenate([mobility * weights, pull], axis=1)
+    of_masts = np.concatenate([weights[::2], of_springs[::2], of_springs[1::2]], axis=1)
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
         mobility=grid.mobility,
-        masts=AlongLine(at_springs.first[::2].copy(), of_masts.astype(real), masts.astype(real)),
+        masts=AlongLine(first[::2].copy(), of_masts.astype(real), masts.astype(real)),
         links=AlongLine(at_links.first, of_links.astype(real), links.astype(real)),
         stiff_arms=bool(levels[::2].any()),
     )
@@ -86,7 +89,7 @@ def _sets(line: FlexibleLine, first: Index) -> int:
     if not first.size:
         return 0
     nodes = line.rows * WIDTH
-    starts = nodes // line.window * np.arange(line.strides - line.window + 1)
+    starts = nodes // line.window * np.arange(len(line.starts) - line.window)
     most = (np.searchsorted(first, starts + nodes) - np.searchsorted(first, starts)).max() + 2  # at anchors
     sets = int(-(-most // WIDTH))
     while len(first) > sets and (first[sets:] - first[:-sets]).min() < NODES:

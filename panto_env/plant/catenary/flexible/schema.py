@@ -132,6 +132,12 @@ class FlexibleCatenaryData(CatenaryData):
         return tuple(span.droppers for span in spans_of(self).each) if self.sequence else (self.droppers,)
 
     @property
+    def contact_heights(self) -> tuple[float, ...]:
+        """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
+        heights = spans_of(self).contact_heights if self.sequence else ()
+        return heights if any(heights) else ()
+
+    @property
     def most_spans(self) -> int:
         """Maximum number of spans of a run: where a sequence ends, no wire goes on."""
         return self.spans if self.sequence else super().most_spans

@@ -27,6 +27,7 @@ from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
 from .links import difference, follow_links, measure_extensions, pull_links
 from .scattered import (
     apply_masts,
+    at_line_end,
     displacement_at,
     keep_past_of_masts,
     record_scattered,
@@ -52,14 +53,14 @@ from .wires import (
 @inlined
 def window_start(line, wire, lane):
     """Position (m) at which a lane's window begins."""
-    return wire.travelled[lane] * line.stride
+    return line.starts[wire.travelled[lane] & NOT_NEGATIVE]
 
 
 @inlined
 def follow(line, wire, lane, x):
     """Move the window by a stride once the contact point at x (m) is past its middle."""
     ahead = int(x / line.stride) - wire.travelled[lane]
-    if 2 * ahead > line.window - 1 and wire.travelled[lane] + line.window < line.strides:
+    if 2 * ahead > line.window - 1 and not at_line_end(line, wire, lane):
         wire.travelled[lane] += 1
         per_stride = line.rows * WIDTH // line.window
         for w in range(wire.displacement.shape[1]):
@@ -143,7 +144,7 @@ def _apply(line, wire, lane, contact, x, force):
 @implements(end_step, FlexibleLine)
 def _end(line, wire, lane):
     travelled = wire.travelled[lane]
-    at_start, at_end = travelled == 0, travelled + line.window >= line.strides
+    at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
     absorbing = line.absorbing[own_row(line.absorbing, lane)]
     for w in range(wire.displacement.shape[1]):
         u, d = wire.displacement[lane, w], wire.increment[lane, w]

@@ -1,0 +1,247 @@
+"""Trains on lines whose spans differ, beside the line with one span repeated, and as a model by itself.
+
+A line of equal spans that are written out is that line itself. One whose last support is a thousandth of a
+millimetre higher is not: everything that hangs on it has nodes of its own, and the figures are the same.
+"""
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.backend import WIDTH
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.build import at_rest
+from panto_env.plant.catenary.flexible.scattered_arrays import LINK
+from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.plant import Plant
+from panto_env.plant.train import Train
+
+from .test_flexible import constants_of, travel, undamped
+
+NAME, SPANS = "en50318-2002", 30
+UNIFORM = load_catenary(NAME).model_copy(update={"spans": SPANS})
+MIXED = (50, 60, 55, 65, 45, 62, 50, 65, 60, 40, 60, 55, 64, 65, 50, 60)
+DISTANCE = 23 * 60.0
+
+
+def line_of(lengths, base=UNIFORM, **more):
+    """The line with spans of these lengths (m), its droppers at the same distances."""
+    table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    return FlexibleCatenaryData.model_validate(
+        table | {"sequence": [{"span_length": length} for length in lengths]} | more
+    )
+
+
+def nearly(base=UNIFORM):
+    return line_of([base.span_length] * SPANS, base, end_support={"encumbrance": base.encumbrance + 1e-6})
+
+
+def both(line=UNIFORM, pantograph=NAME, **settings):
+    """The same run on a line and on the same one with spans that differ by nothing that matters."""
+    settings = {"speed_kmh": 250, "distance": DISTANCE, "precision": "double"} | settings
+    return [simulate(catenary=each, pantograph=pantograph, **settings) for each in (line, nearly(line))]
+
+
+def rms(difference):
+    return np.sqrt((difference**2).mean())
+
+
+def alike(runs, force=2e-3):
+    """Behind the train, a dropper that just goes slack in one run may not do so in the other."""
+    one, other = runs
+    np.testing.assert_allclose(other.contact_force, one.contact_force, atol=force)
+    assert rms(other.uplift - one.uplift) < 5e-3 * rms(one.uplift)
+    assert rms(other.dropper_force - one.dropper_force) < 5e-3 * rms(one.dropper_force)
+    assert one.contact_force.std() > 10
+
+
+def test_equal_spans_written_out_are_the_uniform_line():
+    written = line_of([60.0] * SPANS)
+    assert written == UNIFORM.model_copy(update={"sources": written.sources})
+    runs = [
+        simulate(catenary=each, pantograph=NAME, speed_kmh=250, distance=300) for each in (UNIFORM, written)
+    ]
+    np.testing.assert_array_equal(runs[0].contact_force, runs[1].contact_force)
+
+
+@pytest.mark.parametrize("window", [None, 0])
+def test_nearly_equal_spans_move_as_equal_ones(window):
+    """While the window travels, and on the whole line."""
+    alike(both(**({} if window is None else {"window": window})))
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "as-built",
+        {"broken_droppers": [(8, 3), (9, 1)], "miscut_droppers": [(10, 5, 0.02)]},
+        {"raised_supports": [(9, 0.03)]},
+        {"hard_spots": [(9, 20.3, 4.0, 200.0)]},
+        {"worn_stretches": [(8, 10.0, 90.0, 0.2)]},
+        {"lost_contact_tension": 0.05, "lost_messenger_tension": 0.1},
+    ],
+    ids=lambda condition: condition if isinstance(condition, str) else next(iter(condition)),
+)
+def test_defects_are_the_same_where_spans_nearly_are(condition):
+    line = load_catenary("benchmark-2015").model_copy(update={"spans": SPANS})  # arms that hold the wire
+    runs = both(line, "dsa380", line_condition=condition, seed=3, distance=14 * line.span_length)
+    alike(runs, 0.02)
+    new = simulate(
+        catenary=line, pantograph="dsa380", speed_kmh=250, distance=14 * line.span_length, precision="double"
+    )
+    there = np.interp(new.position, runs[0].position, runs[0].contact_force)
+    assert np.abs(new.contact_force - there).max() > 5
+
+
+def test_shape_seen_is_the_same_where_spans_nearly_are():
+    views = []
+    for line in (UNIFORM, nearly()):
+        plant = plant_of(line)
+        plant.advance_passively(9000, plant.samples(1))
+        views.append(plant.model.view(0, 500.0, 900.0))
+    one, other = views
+    for name in ("contact", "messenger"):
+        np.testing.assert_allclose(
+            np.interp(one.x, other.x, getattr(other, name)), getattr(one, name), atol=2e-6
+        )
+    np.testing.assert_allclose(other.supports, one.supports)
+    np.testing.assert_allclose(other.droppers, one.droppers)
+    np.testing.assert_array_equal(other.slack, one.slack)
+
+
+def plant_of(line, lanes=1, kmh=(250.0,), **numerics):
+    speeds = np.array(kmh) / 3.6
+    plant = Plant(
+        line,
+        Train.of(load_pantograph(NAME)),
+        lanes=lanes,
+        numerics=Numerics(**numerics),
+        runs=Runs((speeds.min(), speeds.max())),
+    )
+    plant.start(np.arange(lanes), speeds)
+    return plant
+
+
+def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
+    """Each with a window that travels at its own time."""
+    line, speeds = line_of(MIXED), (150.0, 200.0, 250.0)
+    together = plant_of(line, 3, speeds, window=8)
+    samples = together.samples(6001, tension=True)
+    together.clear(samples, np.arange(3))
+    together.advance_passively(6000, samples)
+    for lane, speed in enumerate(speeds):
+        alone = Plant(line, Train.of(load_pantograph(NAME)), numerics=Numerics(window=8), runs=together.runs)
+        alone.start(0, speed / 3.6)
+        own = alone.samples(6001, tension=True)
+        alone.clear(own, np.arange(1))
+        alone.advance_passively(2500, own)
+        alone = pickle.loads(pickle.dumps(alone))
+        alone.advance_passively(3500, own)
+        assert alone.model.wire.travelled[0] > 0
+        for name in ("rows", "uplift", "tension"):
+            np.testing.assert_array_equal(getattr(own, name)[0], getattr(samples, name)[lane])
+
+
+def test_restarted_lane_forgets_the_run_before():
+    plant, runs = plant_of(line_of(MIXED), window=5), []
+    for _ in range(2):
+        samples = plant.samples(4001)
+        plant.start(0, 250 / 3.6)
+        plant.advance(np.full((1, 1, 2), 30.0), 4000, samples)
+        runs.append(samples)
+    assert plant.model.wire.travelled[0] > 0
+    np.testing.assert_array_equal(runs[0].rows, runs[1].rows)
+    np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)
+
+
+def test_default_grid_is_fine_enough_where_spans_differ():
+    line = line_of(MIXED)
+    settings = {"catenary": line, "pantograph": NAME, "speed_kmh": 250, "record_droppers": False}
+    ours = simulate(**settings).summary((4, 13))
+    fine = simulate(**settings, spacing=0.1).summary((4, 13))
+    assert ours.std == pytest.approx(fine.std, rel=0.01)
+    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
+
+
+def energy(line, wire, data, step):
+    """Energy (J) of the discrete line at mid-step; each node has a mass of its own."""
+    now, move = along(wire.displacement[0]), along(wire.increment[0])
+    old, middle, total = now - move, now - move / 2, 0.0
+    for w, own in enumerate(data.wires):
+        inner, bare = slice(PAD + 1, PAD + line.rows * WIDTH), own.mass * line.spacing
+        mass = step**2 / line.scattered.mobility[w, inner]
+        total += (mass * move[w, inner] ** 2).sum() / (2 * step**2)
+        near, far = line.stencil[0, w, :2]
+        u = old[w]
+        pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
+        total -= (now[w, 2:-2] * pull).sum() * bare / (2 * step**2)
+
+    def at(things, w):
+        four = middle[w, PAD + things.first[:, None] + np.arange(4)]
+        return (things.constants[:, :4] * four).sum(axis=1)
+
+    total += (data.support.stiffness * at(line.scattered.masts, MESSENGER) ** 2).sum() / 2
+    links = line.scattered.links
+    extension, stiffness = at(links, MESSENGER) - at(links, CONTACT), links.constants[:, LINK.STIFFNESS]
+    static = line.link_static[0]
+    taut = stiffness * extension**2 / 2
+    slack = -static * extension - static**2 / stiffness / 2
+    return total + np.where(stiffness * extension > -static, taut, slack).sum()
+
+
+@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
+    """Supports and droppers lie between nodes, and clamps make some nodes heavier."""
+    step, numerics = 1e-3, Numerics(spacing=0.25, time_step=1e-3, window=0, precision="double")
+    line = undamped(UNIFORM)
+    heavy = line.droppers.model_copy(update={"contact_clamp_mass": 0.3, "messenger_clamp_mass": 0.2})
+    data = line_of(MIXED[:10], line.model_copy(update={"droppers": heavy}))
+    built = constants_of(data, 10, numerics)
+    wire = at_rest(built, 1, 1)
+    pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 300) / 4) ** 2))
+    wire.displacement[0] = lay_out(pulse, built.rows, float)
+    steps = np.zeros(100)
+    travel(built, wire, 300.0, 0.0, 0.0, steps[:1])
+    first, largest, slack = energy(built, wire, data, step), 0.0, False
+    for _ in range(100):
+        travel(built, wire, 300.0, 0.0, 0.0, steps)
+        largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
+        slack |= bool((wire.change[0] <= -wire.static[0]).any())
+    assert largest < 1e-6
+    assert slack == goes_slack
+
+
+def test_a_sequence_has_its_own_number_of_spans_and_an_end():
+    line = line_of(MIXED)
+    with pytest.raises(InputError, match="is a sequence of 16 spans, so it has no other number of them"):
+        simulate(catenary=line, pantograph=NAME, speed_kmh=250, spans=20)
+    with pytest.raises(InputError, match=r"distance must be at most 906 m on line 'en50318-2002'"):
+        simulate(catenary=line, pantograph=NAME, speed_kmh=250, distance=907)
+    assert simulate(catenary=line, pantograph=NAME, speed_kmh=250).distance == pytest.approx(846, abs=1)
+
+
+def test_a_policy_sees_its_own_span_and_its_length():
+    env = gymnasium.make(
+        "Pantograph-v0", catenary=line_of(MIXED), line_values=True, observation="measured", speed_kmh=250
+    ).unwrapped
+    env.reset(seed=1)
+    names = [entry.name for entry in env.task.layout.entries]
+    sine, cosine, length = (
+        names.index(name) for name in ("sine of span position", "cosine of span position", "span length")
+    )
+    supports = np.append(0, np.cumsum(MIXED))
+    for _ in range(900):
+        observation, *_, info = env.step(np.zeros(1))
+        x = info["position"]
+        k = np.searchsorted(supports, x, side="right") - 1
+        turns = 2 * np.pi * (x - supports[k]) / MIXED[k]
+        # The odometer is wrong by up to half a metre.
+        assert observation[[sine, cosine]] == pytest.approx((np.sin(turns), np.cos(turns)), abs=0.08)
+        inside = min(x - supports[k], supports[k + 1] - x) > 0.5
+        assert not inside or 50 * observation[length] == pytest.approx(MIXED[k])
