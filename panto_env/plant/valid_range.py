@@ -7,7 +7,7 @@ from enum import IntEnum
 from ..backend import constants
 
 HEAD_RANGE = 0.3
-"""Height of the head (m) over or under the line between the contact wire's heights at supports, beyond which a
+"""Height of the head (m) over or under the line between the wire's heights at the supports, beyond which a
 run ends: outside the wire's clearance."""
 LARGEST_HEIGHT = 3.0
 """Height of head or wire (m), up or down, ten times any real one: beyond it the computation has diverged."""

@@ -39,7 +39,7 @@ def test_a_passive_run_ends_where_one_under_a_policy_does(force):
     assert alone.ending == driven.ending
     assert np.abs(alone.head).max() < 0.4
     assert f"at {alone.position[-1] + alone.stride / 2:.1f} m (span 1, " in alone.ending
-    assert alone.ending.endswith("left the range of ±300 mm about the contact wire's height at the support.")
+    assert alone.ending.endswith("left the range of ±300 mm about the contact wire's height at the supports.")
 
 
 def test_contact_lost_for_long_ends_a_passive_run():

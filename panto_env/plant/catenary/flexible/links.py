@@ -68,19 +68,20 @@ def slackening(stiffness, static, past, free, yielding):
 
 
 @inlined
-def pull_of(past, now, step, static, early, late, stiffness, yielding):
+def pull_of(link, past, now, static, step, linear, early, stiffness, yielding):
     """Change of the links' tension (N), the mean over a step; the tension is never negative.
 
-    past, now: extension before the step and at its start. step: displacement in the step of the upper ends
-    relative to the lower ones, without the links (m).
+    link: their set in ``past`` and ``now``, extension before the step and at its start (m), and in ``static``
+    (N). step: displacement in the step of the upper ends relative to the lower ones, without the links (m).
+    early: the first of two rows of ``linear``, change of tension by mean extension before and after (N/m).
     """
-    before = 0.5 * (past + now)
-    free, minimum = now + 0.5 * step, -static
-    taut = early * before + late * free  # the mean spring force
+    before = 0.5 * (load_row(past, link) + load_row(now, link))
+    free, minimum = load_row(now, link) + 0.5 * step, -load_row(static, link)
+    taut = load_row(linear, early) * before + load_row(linear, early + 1) * free  # the mean spring force
     pull = larger(taut, minimum)
     slack = stiffness * smaller(before, free - yielding * taut) < minimum
     if any_of(slack):
-        pull = choose(slack, slackening(stiffness, static, before, free, yielding), pull)
+        pull = choose(slack, slackening(stiffness, load_row(static, link), before, free, yielding), pull)
     return pull
 
 
@@ -94,16 +95,8 @@ def pull_links(line, wire, lane):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
         row, move_by, linear = line.link_row[s], line.link_move[s], line.link_linear[s]
         step = difference(d[lower], d[upper], row, line.link_weight[s], rows)
-        pull = pull_of(
-            load_row(past, s),
-            load_row(now, s),
-            step,
-            load_row(static, s),
-            load_row(linear, 0),
-            load_row(linear, 1),
-            load_row(line.link_stiffness, s),
-            load_row(line.link_yield, s),
-        )
+        stiffness, yielding = load_row(line.link_stiffness, s), load_row(line.link_yield, s)
+        pull = pull_of(s, past, now, static, step, linear, 0, stiffness, yielding)
         store_row(change, s, pull)
         for k in range(4):
             move(u[lower], d[lower], row + k, rows, load_row(move_by, k) * pull)
@@ -111,16 +104,9 @@ def pull_links(line, wire, lane):
     links, first = wire.scattered.links, line.link_row.size
     for s in range(links.node.shape[1]):
         node, table, number = links.node[lane, s], links.constants[lane, s], first + s
-        pull = pull_of(
-            load_row(past, number),
-            load_row(now, number),
-            stretch_at(d, node, table),
-            load_row(static, number),
-            load_row(table, LINK.EARLY),
-            load_row(table, LINK.LATE),
-            load_row(table, LINK.STIFFNESS),
-            load_row(table, LINK.YIELD),
-        )
+        step = stretch_at(d, node, table)
+        stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
+        pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
         store_row(change, number, pull)
         move_nodes(u[CONTACT], d[CONTACT], node, table, LINK.MOVE, pull)
         move_nodes(u[MESSENGER], d[MESSENGER], node, table, LINK.MOVE + 4, -pull)
