@@ -38,7 +38,7 @@ def main() -> None:
             result = simulation.simulate(
                 line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length
             )
-            theirs = figures_of(result, line.span_length)
+            theirs = figures_of(result)
             values = (theirs.mean, theirs.std, theirs.maximum, theirs.minimum)
             row = (f"{value:.2f}" for value in values)
             table.add_row(f"{speed:g}", "finite elements", f"{element:g}", f"{1e3 * step:g}", *row)
