@@ -55,18 +55,23 @@ def low_passed(force: Array, time_step: float, cutoff: float = 20.0) -> Array:
     return sosfilt(sections, force, zi=sosfilt_zi(sections) * force[0])[0]
 
 
+def filtered(run: Run) -> Array:
+    """Contact force of a run below 20 Hz (N), shape (n_times,)."""
+    return low_passed(run.contact_force, float(run.time[1] - run.time[0]))
+
+
 def figures(run: Run, spans: tuple[int, int] = (5, 6)) -> Figures:
-    """Figures over spans first..last, counted from 1, whatever their lengths."""
+    """Figures over spans first..last, counted from 1, whatever their lengths; not the one before the end."""
     first, last = spans
-    supports = np.array([0.0, *run.support_position, run.position[-1]])
-    return stretch(run, float(supports[first - 1]), float(supports[last]))
+    supports = [0.0, *run.support_position]
+    return stretch(run, supports[first - 1], supports[last])
 
 
 def stretch(run: Run, begin: float, end: float) -> Figures:
     """Figures between two positions (m). Raises ValueError where the run does not cover them."""
     if not 0 <= begin < end <= run.position[-1] + (run.position[1] - run.position[0]):
         raise ValueError(f"the run ends at {run.position[-1]:g} m; it has no stretch from {begin} to {end} m")
-    force = low_passed(run.contact_force, float(run.time[1] - run.time[0]))
+    force = filtered(run)
     inside = (run.position >= begin) & (run.position <= end)
     near = (run.support_position > begin - 1e-6) & (run.support_position < end + 1e-6)
     return Figures(

@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from panto_env import Trajectory, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import PantographData
+
+from . import simulation
+from .simulation import Result
 
 LENGTHS = (60.0, 48.0, 65.0, 55.0, 40.0, 62.0, 45.0, 58.0, 50.0, 65.0, 42.0, 57.0, 63.0, 52.0)  # m
 MIXED = {
@@ -24,7 +28,10 @@ BRIDGE = {
         for height, encumbrance in zip(HEIGHTS, LOW, strict=True)
     ]
 }
-"""The wire falls by 0.3 m at 2 per mille under a bridge, where supports are low, and rises again."""
+"""The wire falls by 0.3 m at 2 per mille under a bridge, where supports are low, and rises again.
+
+All that a train feels of the encumbrance is the droppers' mass, and stiffness by length, where they have any.
+"""
 BOTH = {
     "sequence": [
         {"span_length": length, "contact_height": height, "encumbrance": encumbrance}
@@ -48,6 +55,28 @@ class Section:
         supports = self.line.alignment().supports
         return (supports[self.spans[1]] + supports[self.spans[1] + 1]) / 2
 
+    def by_simulator(self) -> Trajectory:
+        """The same pass by the simulator: its default grid and step, the whole line at once."""
+        return simulate(
+            self.line,
+            self.pantograph,
+            self.speed_kmh,
+            distance=self.distance,
+            window=0,
+            record_droppers=False,
+        )
+
+    def by_finite_elements(self, element: float = 0.5) -> Result:
+        """A pass by the judge, in elements up to ``element`` (m) and steps of as many milliseconds."""
+        return simulation.simulate(
+            self.line,
+            self.pantograph,
+            self.speed_kmh,
+            element=element,
+            time_step=1e-3 * element,
+            distance=self.distance,
+        )
+
 
 def line_of(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
     """A line of the catalogue with values of its own."""
@@ -68,6 +97,6 @@ def sections() -> dict[str, Section]:
 
     return {
         "mixed": Section(line_of("en50318-2002", MIXED), pantograph("en50318-2002"), 250.0),
-        "bridge": Section(line_of("re330", BRIDGE), pantograph("dsa380"), 250.0),
-        "both": Section(line_of("benchmark-2015", BOTH), pantograph("cx"), 220.0),
+        "bridge": Section(line_of("benchmark-2015", BRIDGE), pantograph("dsa380"), 250.0),
+        "both": Section(line_of("re330", BOTH), pantograph("cx"), 250.0),
     }
