@@ -56,8 +56,11 @@ class Section:
         return (supports[self.spans[1]] + supports[self.spans[1] + 1]) / 2
 
     def by_simulator(self) -> Trajectory:
-        """The same pass by the simulator: its default grid and step, the whole line at once."""
-        return simulate(
+        """The same pass by the simulator: its default grid and step, the whole line at once.
+
+        Raises ValueError where it ends early.
+        """
+        run = simulate(
             self.line,
             self.pantograph,
             self.speed_kmh,
@@ -65,6 +68,9 @@ class Section:
             window=0,
             record_droppers=False,
         )
+        if run.terminated:
+            raise ValueError(run.ending)
+        return run
 
     def by_finite_elements(self, element: float = 0.5) -> Result:
         """A pass by the judge, in elements up to ``element`` (m) and steps of as many milliseconds."""
