@@ -1,6 +1,9 @@
-"""The flexible catenary beside finite elements: ``python -m tests.finite_element``."""
+"""The flexible catenary beside finite elements: ``python -m tests.finite_element [--sections]``."""
 
 from __future__ import annotations
+
+import argparse
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -12,6 +15,8 @@ from panto_env.studies.en50318.convergence import in_use
 
 from . import simulation
 from .figures import figures as figures_of
+from .pictures import draw
+from .sections import sections
 
 NAME = "en50318-2002"
 OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precision="double"))
@@ -38,7 +43,7 @@ def main() -> None:
             result = simulation.simulate(
                 line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length
             )
-            theirs = figures_of(result, line.span_length)
+            theirs = figures_of(result)
             values = (theirs.mean, theirs.std, theirs.maximum, theirs.minimum)
             row = (f"{value:.2f}" for value in values)
             table.add_row(f"{speed:g}", "finite elements", f"{element:g}", f"{1e3 * step:g}", *row)
@@ -46,5 +51,27 @@ def main() -> None:
     Console().print(table)
 
 
+def compare_sections(folder: Path) -> None:
+    """Print the figures of each section of unlike spans by both codes, and draw their forces in a folder."""
+    table = Table("section", "model", "F_m (N)", "σ (N)", "max (N)", "min (N)", "uplift per support (mm)")
+    for name, section in sections().items():
+        runs = {
+            "finite differences": section.by_simulator(),
+            "finite elements": section.by_finite_elements(),
+        }
+        for model, run in runs.items():
+            found = figures_of(run, section.spans)
+            values = (found.mean, found.std, found.maximum, found.minimum)
+            uplifts = " ".join(f"{each:.1f}" for each in found.uplifts_mm)
+            table.add_row(name, model, *(f"{value:.2f}" for value in values), uplifts)
+        table.add_section()
+        draw(runs, section.spans, folder / f"{name}.png")
+    Console().print(table)
+
+
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(prog="python -m tests.finite_element", description=__doc__)
+    parser.add_argument("--sections", action="store_true", help="sections of unlike spans, with pictures")
+    parser.add_argument("--output", type=Path, default=Path("runs/finite-element"), help="for the pictures")
+    given = parser.parse_args()
+    compare_sections(given.output) if given.sections else main()

@@ -12,12 +12,13 @@ from .hermite import Array
 
 
 class Run(Protocol):
-    """What the figures need of a run."""
+    """What the figures need of a run, by either code."""
 
     time: Array
     position: Array
     contact_force: Array
-    support_uplift: Array
+    uplift: Array
+    support_position: Array
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,24 @@ class Figures:
     std: float
     maximum: float
     minimum: float
-    statistical_maximum: float
-    statistical_minimum: float
-    uplift_mm: float
+    uplifts_mm: tuple[float, ...]
+    """Maximum at each support of the stretch, both its ends included; the line's own ends have none."""
     loss_percent: float
+
+    @property
+    def statistical_maximum(self) -> float:
+        """Mean and three standard deviations (N)."""
+        return self.mean + 3 * self.std
+
+    @property
+    def statistical_minimum(self) -> float:
+        """Mean less three standard deviations (N)."""
+        return self.mean - 3 * self.std
+
+    @property
+    def uplift_mm(self) -> float:
+        """Maximum at all supports of the stretch."""
+        return max(self.uplifts_mm)
 
 
 def low_passed(force: Array, time_step: float, cutoff: float = 20.0) -> Array:
@@ -40,21 +55,30 @@ def low_passed(force: Array, time_step: float, cutoff: float = 20.0) -> Array:
     return sosfilt(sections, force, zi=sosfilt_zi(sections) * force[0])[0]
 
 
-def figures(result: Run, span_length: float, spans: tuple[int, int] = (5, 6)) -> Figures:
-    """Figures over spans first..last; span n lies from (n - 1) to n span lengths (m)."""
+def filtered(run: Run) -> Array:
+    """Contact force of a run below 20 Hz (N), shape (n_times,)."""
+    return low_passed(run.contact_force, float(run.time[1] - run.time[0]))
+
+
+def figures(run: Run, spans: tuple[int, int] = (5, 6)) -> Figures:
+    """Figures over spans first..last, counted from 1, whatever their lengths; not the one before the end."""
     first, last = spans
-    force = low_passed(result.contact_force, float(result.time[1] - result.time[0]))
-    inside = (result.position >= (first - 1) * span_length) & (result.position <= last * span_length)
-    # Column j of support_uplift is the support at (j + 1) spans; line ends have none.
-    uplift = result.support_uplift[:, max(first - 2, 0) : last]
-    mean, std = float(force[inside].mean()), float(force[inside].std())
+    supports = [0.0, *run.support_position]
+    return stretch(run, supports[first - 1], supports[last])
+
+
+def stretch(run: Run, begin: float, end: float) -> Figures:
+    """Figures between two positions (m). Raises ValueError where the run does not cover them."""
+    if not 0 <= begin < end <= run.position[-1] + (run.position[1] - run.position[0]):
+        raise ValueError(f"the run ends at {run.position[-1]:g} m; it has no stretch from {begin} to {end} m")
+    force = filtered(run)
+    inside = (run.position >= begin) & (run.position <= end)
+    near = (run.support_position > begin - 1e-6) & (run.support_position < end + 1e-6)
     return Figures(
-        mean=mean,
-        std=std,
+        mean=float(force[inside].mean()),
+        std=float(force[inside].std()),
         maximum=float(force[inside].max()),
         minimum=float(force[inside].min()),
-        statistical_maximum=mean + 3 * std,
-        statistical_minimum=mean - 3 * std,
-        uplift_mm=1e3 * float(uplift.max()),
-        loss_percent=100 * float(np.mean(result.contact_force[inside] <= 0)),
+        uplifts_mm=tuple((1e3 * run.uplift[:, near].max(axis=0)).tolist()),
+        loss_percent=100 * float(np.mean(run.contact_force[inside] <= 0)),
     )

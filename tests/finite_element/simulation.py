@@ -17,12 +17,12 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 
-from .figures import Figures, figures
+from .figures import Figures, figures, stretch
 from .hermite import Array
 from .static import StaticShape, static_shape
 from .system import LineSystem, build
 
-__all__ = ["Figures", "Result", "StaticShape", "figures", "simulate", "static_shape"]
+__all__ = ["Figures", "Result", "StaticShape", "figures", "simulate", "static_shape", "stretch"]
 
 BANDWIDTH = 5  # two neighbouring nodes: messenger height of one to messenger slope of the next
 TOLERANCE = 1e-8
@@ -42,9 +42,10 @@ class Result:
     """Height of the collector head, shape (n_times,) (m)."""
     wire: Array
     """Height of the contact wire at the contact point, shape (n_times,) (m)."""
-    support_uplift: Array
-    """Contact wire over its static shape; column j is the support at (j + 1) spans,
-    shape (n_times, spans - 1) (m)."""
+    uplift: Array
+    """Contact wire over its static shape at the interior supports, shape (n_times, spans - 1) (m)."""
+    support_position: Array
+    """Where these stand, shape (spans - 1,) (m)."""
     dropper_tension: Array
     """Shape (n_times, n_droppers), droppers in order along the line (N)."""
 
@@ -82,14 +83,15 @@ def simulate(
 ) -> Result:
     """Run a pantograph from the wire's end at x = 0, all at rest there, at a speed in km/h.
 
-    ``spans`` and ``distance`` (m) are the catalogue's and the whole line unless given; ``element``
-    (m) bounds the elements, ``time_step`` is in s.
+    ``spans`` and ``distance`` (m) are the line's own and the whole line unless given; ``element``
+    (m) bounds the elements, ``time_step`` is in s. The spring to the ground is unloaded with the lowest
+    mass at nominal contact wire height 0, whatever the height of the first support.
     """
     spans = line.spans if spans is None else spans
     speed = speed_kmh / 3.6
-    whole = spans * line.span_length
-    steps = int(min(distance or whole, whole) / (speed * time_step) + 1e-9)
     system = build(line, spans, element)
+    whole = float(system.nodes[-1])
+    steps = int(min(distance or whole, whole) / (speed * time_step) + 1e-9)
     wires = Newmark(system.mass, system.damping, system.stiffness, time_step)
     solver = _Contact(system, wires, pantograph, speed)
 
@@ -101,7 +103,7 @@ def simulate(
         motion[n], tension[n] = solver.advance(speed * time[n])
         uplift[n] = wires.u[system.supports]
     force, head, wire = motion.T
-    return Result(time, speed * time, force, head, wire, uplift, tension)
+    return Result(time, speed * time, force, head, wire, uplift, system.support_position, tension)
 
 
 class _Contact:

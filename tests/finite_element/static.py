@@ -39,8 +39,9 @@ class StaticShape:
 def static_shape(line: FlexibleCatenaryData, element: float = 0.25) -> StaticShape:
     """Shape under gravity in elements of at most ``element`` (m).
 
-    A dropper's mass sits half on either wire. The steady arm carries none of the wire, unless the
-    catalogue says that it holds it: then the contact wire is at height 0 at the support.
+    A dropper's mass sits half on either wire. The messenger's support, unloaded, stands at the encumbrance
+    and yields under the load. The steady arm carries none of the wire, unless the catalogue says that it
+    holds it: then the contact wire is at height 0 at the support.
     """
     droppers = line.droppers
     x = span_nodes(line.span_length, droppers.positions, element)
@@ -48,15 +49,15 @@ def static_shape(line: FlexibleCatenaryData, element: float = 0.25) -> StaticSha
     held, heights = at, -np.array(droppers.sag)
     if line.steady_arm.holds_wire:
         held, heights = np.append(at, 0), np.append(heights, 0.0)
-    length = np.full(at.size, line.encumbrance)
+    length, top = np.full(at.size, line.encumbrance), np.array([line.encumbrance])
     for _ in range(50):
         half = droppers.mass * length / 2
         clamped = half + droppers.contact_clamp_mass
         contact, reaction = _hang(x, line.contact_wire, held, heights, at, clamped)
         tension = reaction[: at.size]
         load = tension / GRAVITY + half + droppers.messenger_clamp_mass
-        mast, height = np.array([0]), np.array([line.encumbrance])
-        messenger, _ = _hang(x, line.messenger_wire, mast, height, at, load)
+        messenger, carried = _hang(x, line.messenger_wire, np.array([0]), top, at, load)
+        top = line.encumbrance - carried / line.support.stiffness
         old, length = length, messenger[at, 0] - contact[at, 0]
         if np.max(np.abs(length - old)) < 1e-12:
             break

@@ -10,7 +10,7 @@ from scipy import sparse
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 from .hermite import Array, Indices, matrices, shape_functions
-from .static import static_shape
+from .rest import at_rest
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class LineSystem:
     """Static tension, shape (n_droppers,) (N)."""
     supports: Indices
     """Unknowns that are the contact wire's height at the interior supports, integers."""
+    support_position: Array
+    """Where the interior supports stand, shape (spans - 1,) (m)."""
 
     def contact_point(self, x: float) -> tuple[Indices, Array, Array, float, float]:
         """Unknowns, values and slopes of the contact wire's height at ``x`` (m), shapes (4,);
@@ -52,50 +54,46 @@ class LineSystem:
 
 def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
     """Line of ``spans`` spans in elements up to ``element`` (m), both wires fixed at its ends."""
-    shape = static_shape(line, element)
-    data = line.droppers
-    per_span, count = shape.x.size - 1, (shape.x.size - 1) * spans + 1
-    offsets = np.arange(spans)
-    nodes = np.append((offsets[:, None] * line.span_length + shape.x[:-1]).ravel(), spans * line.span_length)
-    static = np.stack([shape.contact, shape.contact_slope], axis=1)
-    static = np.concatenate([np.tile(static[:-1], (spans, 1)), static[-1:]])
-    at = np.searchsorted(shape.x, np.array(data.positions) - 1e-9)
-    at = (offsets[:, None] * per_span + at).ravel()
-    masts = per_span * np.arange(1, spans)
+    rest = at_rest(line, spans, element)
+    count, at, masts = rest.nodes.size, rest.droppers, rest.masts
+    tables = [span.droppers for span in rest.spans for _ in span.droppers.positions]
+    stands = rest.spans[1:]  # each interior support is its following span's
 
     size = 4 * count
     on_messenger = _placement(size, 4 * np.arange(count)[:, None] + [0, 1])
     on_contact = _placement(size, 4 * np.arange(count)[:, None] + [2, 3])
-    k_messenger, m_messenger = matrices(nodes, line.messenger_wire)
-    k_contact, m_contact = matrices(nodes, line.contact_wire)
+    k_messenger, m_messenger = matrices(rest.nodes, line.messenger_wire)
+    k_contact, m_contact = matrices(rest.nodes, line.contact_wire)
     stiffness = on_messenger @ k_messenger @ on_messenger.T + on_contact @ k_contact @ on_contact.T
     mass = on_messenger @ m_messenger @ on_messenger.T + on_contact @ m_contact @ on_contact.T
 
-    each = np.full(len(data.positions), data.stiffness or 0.0)
-    if data.axial_stiffness is not None:
-        each = data.axial_stiffness / shape.dropper_length
-    k = np.tile(each, spans)
+    k = np.array(
+        [
+            each.stiffness if each.axial_stiffness is None else each.axial_stiffness / length
+            for each, length in zip(tables, rest.dropper_length, strict=True)
+        ]
+    )
     extension = (_placement(size, 4 * at) - _placement(size, 4 * at + 2)).T.tocsr()
     stiffness = stiffness + extension.T @ sparse.diags_array(k) @ extension
     # Rayleigh damping is the wires' (and taut droppers'), so it is taken before what follows.
     damping = line.damping.alpha * mass + line.damping.beta * stiffness
 
-    half = np.tile(data.mass * shape.dropper_length / 2, spans)
+    half = np.array([each.mass for each in tables]) * rest.dropper_length / 2
     point_mass, point_spring, point_damper = np.zeros((3, size))
-    point_mass[4 * at] += half + data.messenger_clamp_mass
-    point_mass[4 * at + 2] += half + data.contact_clamp_mass
-    point_mass[4 * masts + 2] += line.steady_arm.mass
-    point_spring[4 * masts] += line.support.stiffness
-    point_spring[4 * masts + 2] += line.steady_arm.stiffness
-    point_damper[4 * masts] += line.support.damping
+    point_mass[4 * at] += half + [each.messenger_clamp_mass for each in tables]
+    point_mass[4 * at + 2] += half + [each.contact_clamp_mass for each in tables]
+    point_mass[4 * masts + 2] += [each.steady_arm.mass for each in stands]
+    point_spring[4 * masts] += [each.support.stiffness for each in stands]
+    point_spring[4 * masts + 2] += [each.steady_arm.stiffness for each in stands]
+    point_damper[4 * masts] += [each.support.damping for each in stands]
 
     free = np.ones(size)
     free[[0, 2, size - 4, size - 2]] = 0.0
     keep = sparse.diags_array(free)
     return LineSystem(
-        nodes=nodes,
+        nodes=rest.nodes,
         free=free,
-        static=static,
+        static=rest.contact,
         mass=(keep @ (mass + sparse.diags_array(point_mass)) @ keep
               + sparse.diags_array(1 - free)).tocsr(),
         damping=(keep @ (damping + sparse.diags_array(point_damper)) @ keep).tocsr(),
@@ -103,8 +101,9 @@ def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
         extension=extension,
         dropper_stiffness=k,
         dropper_damping=line.damping.beta * k,
-        dropper_tension=np.tile(shape.dropper_tension, spans),
+        dropper_tension=rest.dropper_tension,
         supports=4 * masts + 2,
+        support_position=rest.nodes[masts],
     )  # fmt: skip
 
 

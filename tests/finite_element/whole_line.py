@@ -28,6 +28,8 @@ class LineShape:
     """Node positions (m), shape (n_nodes,)."""
     contact: Array
     """Contact wire height (m), shape (n_nodes,)."""
+    contact_slope: Array
+    """Contact wire slope (-), shape (n_nodes,)."""
     messenger: Array
     """Messenger wire height (m), shape (n_nodes,)."""
     dropper_tension: Array
@@ -96,6 +98,7 @@ class ClosedLine:
         return LineShape(
             self.x[: self.own],
             contact[: 2 * self.own : 2],
+            contact[1 : 2 * self.own : 2],
             messenger[: 2 * self.own : 2],
             tension[: self.droppers],
             apart[: self.droppers],

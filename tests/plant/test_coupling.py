@@ -127,5 +127,5 @@ def test_finite_elements_agree_at_the_edges(catenary, pantograph, speed, spans):
     other = finite_element.simulate(
         catenary, pantograph, speed, element=0.25, time_step=step, distance=60.0 * spans[1] + 1
     )
-    theirs = figures_of(other, 60.0, spans)
+    theirs = figures_of(other, spans)
     assert ours.std == pytest.approx(theirs.std, rel=0.02)

@@ -166,7 +166,7 @@ def test_agrees_with_finite_elements(speed):
     run = simulate("en50318-2002", "en50318-2002", speed, **fine)
     ours = run.summary((5, 6))
     other = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
-    theirs = finite_element.figures(other, line.span_length)
+    theirs = finite_element.figures(other)
     assert ours.std == pytest.approx(theirs.std, rel=0.02)
     assert ours.mean == pytest.approx(theirs.mean, abs=0.5)
     assert ours.max == pytest.approx(theirs.maximum, abs=2.0)
@@ -174,7 +174,7 @@ def test_agrees_with_finite_elements(speed):
     # The finite-element run ends just past span 6: uplift is compared up to there.
     seen = run.position < other.position[-1]
     uplift = 1e3 * run.uplift[seen][:, 3:6].max()
-    assert uplift == pytest.approx(1e3 * other.support_uplift[:, 3:6].max(), abs=0.5)
+    assert uplift == pytest.approx(1e3 * other.uplift[:, 3:6].max(), abs=0.5)
 
 
 @pytest.mark.slow
@@ -193,7 +193,7 @@ def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
     fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
     ours = simulate(line, panto, speed, **fine).summary((5, 6))
     other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
-    assert ours.std == pytest.approx(finite_element.figures(other, data.span_length).std, rel=0.02)
+    assert ours.std == pytest.approx(finite_element.figures(other).std, rel=0.02)
 
 
 @pytest.mark.parametrize("speed", [250.0, 300.0])

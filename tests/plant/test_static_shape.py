@@ -35,6 +35,7 @@ def test_agrees_with_finite_elements(name):
     inner = (other.x >= 0) & (other.x <= line.span_length)
     # Smooth elements round the kinks at the droppers, at first order.
     np.testing.assert_allclose(shape.contact.height(other.x[inner]), other.contact[inner], atol=2e-4)
+    np.testing.assert_allclose(shape.messenger.height(other.x[inner]), other.messenger[inner], atol=2e-4)
     np.testing.assert_allclose(shape.dropper_tension, other.dropper_tension, rtol=1e-3, atol=0.2)
 
 

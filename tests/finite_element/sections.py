@@ -1,0 +1,108 @@
+"""Stretches of unlike spans to compare two codes on; all choices of spans and heights are our own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from panto_env import Trajectory, simulate
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.pantograph.schema import PantographData
+
+from . import simulation
+from .simulation import Result
+
+LENGTHS = (60.0, 48.0, 65.0, 55.0, 40.0, 62.0, 45.0, 58.0, 50.0, 65.0, 42.0, 57.0, 63.0, 52.0)  # m
+MIXED = {
+    "droppers": {"spacing": 6.5, "first": 5.0, "pre_sag": 0.02},
+    "sequence": [{"span_length": length} for length in LENGTHS],
+}
+"""No two neighbours alike."""
+HEIGHTS = (0.0, 0.0, 0.0, 0.0, 0.0, -0.1, -0.2, -0.3, -0.3, -0.2, -0.1, 0.0, 0.0, 0.0)  # m
+LOW = 1.2, 1.2, 1.2, 1.2, 1.1, 1.0, 0.9, 0.8, 0.8, 0.9, 1.0, 1.1, 1.2, 1.2  # m
+BRIDGE = {
+    "sequence": [
+        {"contact_height": height, "encumbrance": encumbrance, "span_length": 50.0}
+        for height, encumbrance in zip(HEIGHTS, LOW, strict=True)
+    ]
+}
+"""The wire falls by 0.3 m at 2 per mille under a bridge, where supports are low, and rises again.
+
+All that a train feels of the encumbrance is the droppers' mass, and stiffness by length, where they have any.
+"""
+BOTH = {
+    "sequence": [
+        {"span_length": length, "contact_height": height, "encumbrance": encumbrance}
+        for length, height, encumbrance in zip(LENGTHS, HEIGHTS, LOW, strict=True)
+    ]
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A line, the pantograph that runs along it, and the spans whose figures are compared."""
+
+    line: FlexibleCatenaryData
+    pantograph: PantographData
+    speed_kmh: float
+    spans: tuple[int, int] = (4, 12)
+
+    @property
+    def distance(self) -> float:
+        """Length of a pass (m): to the middle of the span behind the last one compared."""
+        supports = self.line.alignment().supports
+        return (supports[self.spans[1]] + supports[self.spans[1] + 1]) / 2
+
+    def by_simulator(self) -> Trajectory:
+        """The same pass by the simulator: its default grid and step, the whole line at once.
+
+        Raises ValueError where it ends early.
+        """
+        run = simulate(
+            self.line,
+            self.pantograph,
+            self.speed_kmh,
+            distance=self.distance,
+            window=0,
+            record_droppers=False,
+        )
+        if run.terminated:
+            raise ValueError(run.ending)
+        return run
+
+    def by_finite_elements(self, element: float = 0.5) -> Result:
+        """A pass by the judge, in elements up to ``element`` (m) and steps of as many milliseconds."""
+        return simulation.simulate(
+            self.line,
+            self.pantograph,
+            self.speed_kmh,
+            element=element,
+            time_step=1e-3 * element,
+            distance=self.distance,
+        )
+
+
+def line_of(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
+    """A line of the catalogue with values of its own."""
+    values = load_catenary(name).model_dump(exclude_none=True)
+    values["droppers"] |= changes.get("droppers", {})
+    if "spacing" in values["droppers"]:
+        del values["droppers"]["positions"], values["droppers"]["sag"]
+    own = {key: value for key, value in changes.items() if key != "droppers"}
+    del values["spans"]
+    return FlexibleCatenaryData.model_validate(values | own)
+
+
+def sections() -> dict[str, Section]:
+    """Sections by name. Pantographs lift with the force that their data state, as it is applied."""
+
+    def pantograph(name: str) -> PantographData:
+        return load_pantograph(name).model_copy(update={"force": "applied"})
+
+    return {
+        "mixed": Section(line_of("en50318-2002", MIXED), pantograph("en50318-2002"), 250.0),
+        "bridge": Section(line_of("benchmark-2015", BRIDGE), pantograph("dsa380"), 250.0),
+        "both": Section(line_of("re330", BOTH), pantograph("cx"), 250.0),
+    }

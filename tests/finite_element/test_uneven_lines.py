@@ -1,0 +1,179 @@
+"""The finite elements themselves on unlike spans: against equal ones, closed forms, energy, convergence."""
+
+import numpy as np
+import pytest
+
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.spans import spans_of
+
+from .rest import at_rest
+from .sections import line_of, sections
+from .simulation import Newmark, _chain, _Contact, figures, simulate, stretch
+from .system import build
+
+SECTIONS = sections()
+
+
+@pytest.mark.parametrize("name", ["en50318-2002", "benchmark-2015"])
+def test_equal_spans_of_a_sequence_move_as_one_span_repeated(name):
+    """The shape of a whole line and of a periodic span, droppers and supports one by one and all alike."""
+    line, pantograph = load_catenary(name), load_pantograph(name)
+    unlike = {"sequence": [{}, {}, {}, {"encumbrance": line.encumbrance + 1e-9}, {}, {}, {}]}
+    one, many = (
+        simulate(each, pantograph, 250.0, spans=7)
+        for each in (line, line_of(name, unlike))  # one that is all alike would be the uniform line again
+    )
+    for key in ("position", "contact_force", "head", "wire", "uplift", "support_position", "dropper_tension"):
+        expected = getattr(one, key)
+        np.testing.assert_allclose(getattr(many, key), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_every_support_arm_and_dropper_is_its_own_span_s():
+    """Where each value stands in the matrices, less those of a line without it."""
+    own = {
+        "support": {"stiffness": 4e5, "damping": 700.0},
+        "steady_arm": {"mass": 2.0, "stiffness": 900.0},
+        "droppers": {"positions": [6.0, 19.0, 33.0], "stiffness": 8e4, "contact_clamp_mass": 0.3},
+        "span_length": 45.0,
+    }
+    line = line_of("en50318-2002", {"sequence": [{}, own, {}, {}]})
+    system, rest = build(line, 4, 1.0), at_rest(line, 4, 1.0)
+    assert system.support_position.tolist() == [60.0, 105.0, 165.0]
+    places = rest.nodes[rest.droppers]
+    assert places[9:12] == pytest.approx([66.0, 79.0, 93.0], abs=1e-9)
+    assert system.dropper_stiffness.tolist() == [1e5] * 9 + [8e4] * 3 + [1e5] * 18
+
+    def added(key, unknown):
+        """Diagonal of a matrix at the unknowns of the first two interior supports."""
+        bare = build(line_of("en50318-2002", {"sequence": [{}, plain, {}, {}]}), 4, 1.0)
+        return (getattr(system, key) - getattr(bare, key)).diagonal()[4 * rest.masts + unknown].tolist()
+
+    plain = own | {"support": {}, "steady_arm": {}}
+    assert added("stiffness", 0) == pytest.approx([4e5 - 5e5, 0, 0], abs=1e-6)
+    assert added("damping", 0) == pytest.approx([700.0 - 1000.0, 0, 0], abs=1e-6)
+    assert added("stiffness", 2) == pytest.approx([900.0, 0, 0], abs=1e-6)
+    assert added("mass", 2) == pytest.approx([2.0, 0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_the_wire_is_at_its_wanted_height_at_droppers(name):
+    line = SECTIONS[name].line
+    rest, (spans, heights, _) = at_rest(line, line.spans, 1.0), spans_of(line)
+    supports = np.append(0.0, np.cumsum([span.span_length for span in spans]))
+    x = rest.nodes[rest.droppers]
+    wanted = np.interp(x, supports, heights) - np.concatenate([span.droppers.sag for span in spans])
+    np.testing.assert_allclose(rest.contact[rest.droppers, 0], wanted, atol=1e-12)
+    assert np.ptp(wanted) > 0.015
+
+
+def test_a_line_that_the_mirror_image_would_bend_is_refused():
+    tilted = line_of("re330", {"sequence": [{"contact_height": 0.05 * k} for k in range(4)]})
+    with pytest.raises(NotImplementedError, match="level outermost spans"):
+        build(tilted, 4, 1.0)
+    with pytest.raises(ValueError, match="14 spans, not 12"):
+        build(SECTIONS["mixed"].line, 12, 1.0)
+
+
+@pytest.fixture(scope="module")
+def climbing():
+    """Mean force (N) and head (m) on a line that climbs 0.36 m at 2 per mille, less those on a level one."""
+    heights = [0.0] * 3 + [0.12, 0.24] + [0.36] * 7
+    uneven = line_of("en50318-2002", {"sequence": [{"contact_height": height} for height in heights]})
+    level = load_catenary("en50318-2002").model_copy(update={"spans": len(heights)})
+
+    def differences(pantograph, first, last):
+        runs = [simulate(line, pantograph, 250.0, element=2.0, time_step=2e-3) for line in (level, uneven)]
+        inside = (runs[0].position >= 60.0 * (first - 1)) & (runs[0].position < 60.0 * last)
+        return [(getattr(runs[1], key) - getattr(runs[0], key))[inside].mean() for key in FORCE_AND_HEAD]
+
+    return differences
+
+
+FORCE_AND_HEAD = ("contact_force", "head")
+
+
+def test_uphill_the_damping_to_ground_takes_c_v_g(climbing):
+    """dsa380: 70 N s/m, hardly a spring."""
+    force, _ = climbing(load_pantograph("dsa380"), 4, 5)
+    assert force == pytest.approx(-70.0 * 250 / 3.6 * 0.12 / 60, rel=0.02)  # -9.7 N
+
+
+def test_high_up_the_spring_to_ground_takes_k_h(climbing):
+    """en50318-2002: 50 N/m. With less force the head stands a little lower, and the frame nearer to it."""
+    pantograph = load_pantograph("en50318-2002")
+    force, head = climbing(pantograph, 8, 10)
+    ground, between = pantograph.stiffnesses[-1], pantograph.stiffnesses[0]
+    assert head == pytest.approx(0.36, abs=0.02)
+    assert force == pytest.approx(-ground * head / (1 + ground / between), abs=0.15)
+    assert -18.0 < force < -16.5
+
+
+def test_energy_is_balanced_under_a_bridge():
+    """Lift and train (F v y') give what is in wires, droppers (also slack), masses, contact and dampers."""
+    section = SECTIONS["bridge"]
+    undamped = {"damping": {"alpha": 0.0, "beta": 0.0}, "support": {"stiffness": 5e5, "damping": 0.0}}
+    line = FlexibleCatenaryData.model_validate(section.line.model_dump(exclude_none=True) | undamped)
+    pantograph = section.pantograph.model_copy(update={"contact_damping": 100.0})
+    speed, step = section.speed_kmh / 3.6, 5e-4
+    system = build(line, line.spans, 1.0)
+    wires = Newmark(system.mass, system.damping, system.stiffness, step)
+    solver = _Contact(system, wires, pantograph, speed)
+    chain, mass = solver.chain, np.diag(_chain(pantograph)[0])
+    assert abs(system.damping).max() == 0
+
+    def energy(gap):
+        stretched = system.extension @ wires.u
+        tension, k = system.dropper_tension, system.dropper_stiffness
+        now = np.maximum(tension + k * stretched, 0.0)
+        slack = (now**2 - tension**2) / (2 * k) - tension * stretched - 0.5 * k * stretched**2
+        line_s = 0.5 * (wires.u @ (system.stiffness @ wires.u) + wires.v @ (system.mass @ wires.v))
+        pantograph_s = 0.5 * (chain.u @ chain.stiffness @ chain.u + mass @ chain.v**2)
+        return line_s + slack.sum() + pantograph_s + 0.5 * solver.k * max(gap, 0.0) ** 2
+
+    def power(x, force, gap):
+        unknowns, _, slopes, _, incline = system.contact_point(x)
+        lost = chain.v @ chain.damping @ chain.v + (force - solver.k * gap) ** 2 / solver.c
+        given = solver.lift @ chain.v
+        return given - force * speed * (incline + slopes @ wires.u[unknowns]) - lost
+
+    force, head, wire = solver.start()
+    first, before, given, largest = energy(head - wire), power(0.0, force, head - wire), 0.0, 0.0
+    slack, turnover = 0, 0.0
+    for n in range(1, int(500.0 / (speed * step))):
+        (force, head, wire), tension = solver.advance(speed * step * n)
+        now = power(speed * step * n, force, head - wire)
+        given += step * (before + now) / 2
+        turnover += step * abs(before + now) / 2
+        largest = max(largest, abs(energy(head - wire) - first - given))
+        slack, before = slack + int((tension <= 0).sum()), now
+    assert slack > 0
+    assert largest < 1e-3 * turnover
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "minimum"), [("mixed", 0.005), ("bridge", 0.005), ("both", 0.02)])
+def test_half_of_element_and_step_change_the_figures_little(name, minimum):
+    """The minimum converges last, with the element: what a wire yields to a force within one is missing."""
+    section = SECTIONS[name]
+    coarse, fine = (figures(section.by_finite_elements(element), section.spans) for element in (0.5, 0.25))
+    for key, share in {"std": 0.005, "maximum": 0.005, "minimum": minimum, "mean": 0.005}.items():
+        assert getattr(coarse, key) == pytest.approx(getattr(fine, key), rel=share)
+    assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)
+
+
+def test_figures_of_a_stretch_are_those_of_its_spans():
+    section = SECTIONS["mixed"]
+    run = simulate(
+        section.line, section.pantograph, section.speed_kmh, element=2.0, time_step=2e-3, distance=270
+    )
+    supports = section.line.alignment().supports
+    assert run.support_position == pytest.approx(supports[1:-1], abs=1e-9)
+    some = figures(run, (2, 4))
+    assert stretch(run, supports[1], supports[4]) == some
+    assert some.uplifts_mm == pytest.approx((1e3 * run.uplift[:, :4].max(axis=0)).tolist())
+    first, second = (stretch(run, a, b) for a, b in ((60.0, 140.0), (140.0, 228.0)))
+    assert some.maximum == max(first.maximum, second.maximum)
+    assert some.minimum == min(first.minimum, second.minimum)
+    with pytest.raises(ValueError, match="no stretch from"):
+        figures(run, (4, 6))
