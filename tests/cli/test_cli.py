@@ -5,6 +5,8 @@ import pytest
 
 from panto_env import Trajectory
 from panto_env.base.checksums import read_checked
+from panto_env.base.errors import AccuracyWarning, PlugInWarning, UnusualWarning
+from panto_env.cli import _show_warning
 from panto_env.studies.en50318 import reference
 
 from .. import documents
@@ -139,3 +141,14 @@ def test_a_switch_has_no_opposite():
         for command in group.commands.values():
             groups += [command] if hasattr(command, "commands") else []
             assert [option for each in command.params for option in each.secondary_opts] == []
+
+
+OURS = [AccuracyWarning, PlugInWarning, UnusualWarning]
+
+
+@pytest.mark.parametrize("category", [*OURS, UserWarning, DeprecationWarning])
+def test_a_warning_of_ours_is_a_sentence_and_one_of_others_says_where_it_is_from(category, capsys):
+    _show_warning("Look out.", category, "file.py", 7)
+    said = capsys.readouterr().err
+    assert (said == "panto: warning: Look out.\n") == (category in OURS)
+    assert said.startswith("panto: ") or said.startswith(f"file.py:7: {category.__name__}: Look out.")
