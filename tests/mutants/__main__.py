@@ -76,13 +76,20 @@ class Workbench:
         for name in failed:
             print(f"fails without any mutant, so it is left out: {name}", flush=True)
         self.left_out = [f"--deselect={name}" for name in failed]
+        self.kept = self.kernels / self._kernel_hash()
         self.data.read()
 
     def keep_kernels(self) -> None:
         """Let compiled kernels serve the sources as they are now: only files without kernels are mutated."""
+        now = self.kernels / self._kernel_hash()
+        if self.kept.exists() and not now.exists():
+            self.kept.rename(now)
+        self.kept = now
+
+    def _kernel_hash(self) -> str:
+        """Name of the folder of these sources' kernels; tests that check indices have another one beside it."""
         name = "from panto_env.backend.cache import kernel_hash; print(kernel_hash())"
-        for folder in self.kernels.glob("*"):
-            folder.rename(self.kernels / self._python("-c", name).stdout.strip())
+        return self._python("-c", name).stdout.split("\n")[0]
 
     def tests_of(self, mutant: Mutant) -> list[str]:
         """The tests that reach a mutant, and all of the room where a fixture does."""
