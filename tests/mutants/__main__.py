@@ -70,7 +70,7 @@ class Workbench:
             f"--source={','.join(self.room['sources'])}",
         ]
         done = self._python(*measured, "-m", "pytest", "-q", "-m", self.marks, *self.room["tests"])
-        failed = re.findall(r"^FAILED (\S+)", done.stdout, re.MULTILINE)
+        failed = re.findall(r"^(?:FAILED|ERROR) (\S+::\S+)", done.stdout, re.MULTILINE)
         if done.returncode and not failed:
             raise SystemExit(f"The tests do not run:\n{done.stdout[-2000:]}")
         for name in failed:
@@ -87,7 +87,7 @@ class Workbench:
         self.kept = now
 
     def _kernel_hash(self) -> str:
-        """Name of the folder of these sources' kernels; tests that check indices have another one beside it."""
+        """Name of the folder of these sources' kernels; tests that check indices have one of their own."""
         name = "from panto_env.backend.cache import kernel_hash; print(kernel_hash())"
         return self._python("-c", name).stdout.split("\n")[0]
 
