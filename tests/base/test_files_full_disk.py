@@ -13,6 +13,7 @@ from panto_env.base import files
 from panto_env.cli import make_app, reproduce
 
 from ..command import panto
+from ..full_disk import largest_file
 from ..fuzz.lines import SHORT
 
 LIMIT = 8192
@@ -30,18 +31,16 @@ COMMANDS = {
 @pytest.fixture
 def no_room(monkeypatch):
     """Files of more than ``LIMIT`` bytes cannot be written once a run is over."""
-    resource = pytest.importorskip("resource", reason="limits of Unix")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
     run = simulation.simulate
 
     def then_full(**settings):
         done = run(**settings)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, before[1]))
+        limit(LIMIT)
         return done
 
     monkeypatch.setattr(simulation, "simulate", then_full)
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with largest_file() as limit:
+        yield
 
 
 @pytest.mark.parametrize("name", COMMANDS)
