@@ -69,7 +69,7 @@ def test_a_training_shows_its_speed_and_what_the_environment_takes_of_it(monkeyp
     clock, told = [100.0], []
     monkeypatch.setattr(callbacks, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     bar = callbacks.ProgressBar(4000, lambda: [PAIR])
-    env = SimpleNamespace(unwrapped=SimpleNamespace(seconds=1.0))
+    env = SimpleNamespace(unwrapped=SimpleNamespace(seconds=3.2))
     rewards = [{"r": value} for value in (-3.0, -4.0)]
     bar.model = SimpleNamespace(get_env=lambda: env, ep_info_buffer=rewards)
     shown = SimpleNamespace(print=told.append)
@@ -81,7 +81,7 @@ def test_a_training_shows_its_speed_and_what_the_environment_takes_of_it(monkeyp
     words, given = told
     assert words.startswith("step 1500: ")
     assert given["completed"] == 1500
-    assert given["note"].startswith("250 steps/s, 25 % in the environment, reward -3.5, ")
+    assert given["note"].startswith("250 steps/s, 80 % in the environment, reward -3.5, ")
     bar._show()
     assert len(told) == 3, "an evaluation is said once"
 
