@@ -179,7 +179,10 @@ def test_running_mean_counts_from_the_passive_mean_too():
     for target in ("nominal", "passive"):
         env = gymnasium.make(NAME, reward=weights | {"target": target}, **given).unwrapped
         env.reset(seed=0)
-        sums[target] = np.mean([env.step([0.0])[1] for _ in range(300)][100:])
+        answers = [env.step([0.0]) for _ in range(300)][100:]
+        sums[target] = np.mean([reward for _, reward, *_ in answers])
+        terms = [info["reward_terms"]["mean_force"] for *_, info in answers]
+        assert terms == pytest.approx([-reward for _, reward, *_ in answers])
     assert sums["nominal"] < -0.01
     assert -0.002 < sums["passive"] <= 0.0
 
