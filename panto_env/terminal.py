@@ -225,20 +225,20 @@ def written_last() -> Iterator[Callable[..., None]]:
             raise errors[0]
 
 
+def bars(*columns: str | rich.progress.ProgressColumn) -> rich.progress.Progress:
+    """Progress bars on standard error, while the body of ``with`` runs; none where that is no terminal."""
+    hidden = not progress_console.is_terminal
+    return rich.progress.Progress(*columns, console=progress_console, transient=True, disable=hidden)
+
+
 @contextmanager
 def counting(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar while the body runs; yields a function of the finished number and the total.
-
-    The bar is on standard error, and only where that is a terminal.
-    """
-    with rich.progress.Progress(
+    """Show a progress bar while the body runs; yields a function of the finished number and the total."""
+    with bars(
         what,
         rich.progress.BarColumn(),
         rich.progress.MofNCompleteColumn(),
         rich.progress.TimeRemainingColumn(),
-        console=progress_console,
-        transient=True,
-        disable=not progress_console.is_terminal,
     ) as progress:
         bar = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(bar, completed=done, total=total)
@@ -251,5 +251,5 @@ def counting_on(what: str, folder: Path) -> Iterator[Callable[[int, int], None]]
         with counting(what) as progress:
             yield progress
     except KeyboardInterrupt as error:
-        progress_console.print(f"Stopped. To continue, repeat the command ({folder}).", markup=False)
+        progress_console.print(f"Stopped. To continue, repeat the command ({folder}).")
         raise typer.Exit(130) from error

@@ -64,7 +64,7 @@ def report(
     check_output(path, PAGES)
     announce_overwriting(path)
     save([read_result(file) for file in files], path)
-    console.print(f"The page is {path}.", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
 
 
 def _of_runs(files: list[Path], output: Path | None, figures: str | None, droppers: str | None) -> None:
@@ -75,7 +75,7 @@ def _of_runs(files: list[Path], output: Path | None, figures: str | None, droppe
     check_output(path, PAGES)
     announce_overwriting(path)
     report.save(files, path)
-    console.print(f"The report is {path}.", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"The report is {path}.", highlight=False, soft_wrap=True)
     runs = [Trajectory.load(file) for file in files] if figures or droppers else []
     if figures is not None:
         save_figures(runs, figures)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
+from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,7 @@ def save(rows: Sequence[Row], path: str | Path, **settings: Any) -> None:
     settings: those of the sweep, for the units of the swept values. CSV and Excel have units in the headings,
     all values are in SI units but for the speed (km/h).
     """
-    swept = list(rows[0])[: list(rows[0]).index(POLICY)] if rows else []
+    swept = list(takewhile(lambda name: name != POLICY, next(iter(rows), ())))
     units = {name: label[label.rfind(" (") :] for name, label in labels(swept, **settings).items()}
     headings = {name: f"{name}{units[name]}" for name in swept if units[name].endswith(")")}
     write_rows(rows, path, headings | HEADINGS)

@@ -63,7 +63,7 @@ def regular_file(path: str | Path) -> Path:
         mode = os.lstat(target).st_mode
     except (FileNotFoundError, NotADirectoryError):
         return target
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
     if stat.S_ISDIR(mode):
         raise InputError(f"{path} cannot be written: it is a folder.")
@@ -83,10 +83,9 @@ def _beside(target: Path, suffix: str) -> Path:
     return Path(name)
 
 
-def _reason(error: OSError | ValueError) -> str:
+def _reason(error: OSError) -> str:
     """The system's own description of an error."""
-    number = getattr(error, "errno", None)
-    return os.strerror(number) if number else str(error).rstrip(".")
+    return os.strerror(error.errno) if error.errno else str(error).rstrip(".")
 
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -137,7 +136,7 @@ def make_folder(path: str | Path) -> None:
     check_path(path)
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise InputError(f"The folder {path} cannot be made: {_reason(error)}.") from error
     _try(Path(path) / "trial", f"Nothing can be written into the folder {path}")
 

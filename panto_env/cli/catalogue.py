@@ -85,14 +85,12 @@ def list_entries(
                 changed.insert(0, f"kind={kind}")
             table.add_row(each.name, ", ".join(changed) or "none")
         console.print(table)
-    console.print(
-        "All values of one: panto list NAME. With your own values: NAME:key=value,...", markup=False
-    )
+    console.print("All values of one: panto list NAME. With your own values: NAME:key=value,...")
 
 
 def _print(each: Description) -> None:
-    console.print(f"{each.family} {each.name}", style="bold", markup=False)
-    console.print(each.text, markup=False)
+    console.print(f"{each.family} {each.name}", style="bold")
+    console.print(each.text)
     if each.rows:
         table = Table(*each.headings)
         for row in each.rows:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from rich.progress import Progress
 
 from ..analysis.options import RENAMED, with_settings
 from ..render.video import FILMS, write_film
-from ..terminal import console, progress_console, writable
+from ..terminal import bars, console, writable
 
 MOST = 4
 """Maximum number of passes in one film."""
@@ -73,9 +72,7 @@ def film(
         if given:
             raise InputError(f"The film takes all settings from {first.file}; leave out {', '.join(given)}.")
         settings, seed = first.settings, first.seed
-    with Progress(
-        console=progress_console, transient=True, disable=not progress_console.is_terminal
-    ) as progress:
+    with bars() as progress:
         bar = progress.add_task("simulating all passes", total=len(policies))
         filmed: list[Filmed] = []
         for policy in policies:
@@ -89,10 +86,9 @@ def film(
         write_film(drawn, output, what.rate, whole)
     for each in filmed:
         if each.run.terminated:
-            console.print(f"{each.title}: {each.run.ending}", markup=False, soft_wrap=True)
+            console.print(f"{each.title}: {each.run.ending}", soft_wrap=True)
     console.print(
         f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than real.",
-        markup=False,
         highlight=False,
         soft_wrap=True,
     )

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
@@ -17,11 +16,11 @@ from ..terminal import (
     ALARM,
     Json,
     announce_overwriting,
+    bars,
     console,
     number,
     print_json,
     print_table,
-    progress_console,
 )
 
 
@@ -41,7 +40,7 @@ def reproduce(
         announce_overwriting(output / name / studies.NUMBERS)
     found: dict[str, Any] = {}
     failed: list[InputError] = []
-    with Progress(console=progress_console, transient=True) as progress:
+    with bars() as progress:
         for study, run in chosen.items():
             bar = progress.add_task(study, total=1.0)
             outcome = run(

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
-from rich.progress import Progress
 from rich.table import Table
 
 from ..analysis.options import DroppersFile, FiguresFile, Seed, Spans, parse_spans, with_settings
@@ -22,10 +21,10 @@ from ..terminal import (
     Json,
     Plot,
     alert,
+    bars,
     console,
     number,
     print_json,
-    progress_console,
     writable,
     written_last,
 )
@@ -123,9 +122,7 @@ def _shown(
         return
     if live:
         say(f"--live needs a terminal of {LIVE_COLUMNS} columns to draw in; the run continues without.")
-    with Progress(
-        console=progress_console, transient=True, disable=not progress_console.is_terminal
-    ) as progress:
+    with bars() as progress:
         bar = progress.add_task("simulating", total=1.0)
         yield lambda share: progress.update(bar, completed=share), None
 

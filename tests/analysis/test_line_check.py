@@ -17,8 +17,8 @@ HEIGHTS = [0.0, 0.0, -0.065, -0.13, -0.13, 0.0]
 LENGTHS = [65.0, 65.0, 65.0, 50.0, 65.0, 65.0]
 
 
-@pytest.fixture(scope="module")
-def line():
+def of_unlike_spans():
+    """Lengths and contact heights that differ from span to span."""
     table = load_catenary("re250").model_dump(exclude_none=True)
     del table["spans"]
     spans = [
@@ -26,6 +26,11 @@ def line():
         for length, height in zip(LENGTHS, HEIGHTS, strict=True)
     ]
     return FlexibleCatenaryData.model_validate(table | {"sequence": spans})
+
+
+@pytest.fixture(scope="module")
+def line():
+    return of_unlike_spans()
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,16 @@
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 
 from panto_env import InputError
+from panto_env.analysis import worker
 from panto_env.analysis.pool import in_processes, in_threads, one_by_one
 from panto_env.base.machine import cores
 
@@ -78,3 +81,25 @@ def test_a_script_without_main_guard_is_told_what_to_do(tmp_path):
     result = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert result.returncode != 0
     assert "make this call under `if __name__ == '__main__':`" in result.stderr
+
+
+def test_a_worker_ends_at_once_when_its_parent_is_gone_and_never_keeps_itself_alive(monkeypatch):
+    """What a worker does first, here: a pipe is its parent, and closing the pipe is the parent's end."""
+    ours, parents = os.pipe()
+    ended, handler = threading.Event(), signal.getsignal(signal.SIGINT)
+    statuses = []
+    monkeypatch.setattr(worker, "parent_process", lambda: SimpleNamespace(sentinel=ours))
+    monkeypatch.setattr(worker.os, "_exit", lambda status: (statuses.append(status), ended.set()))
+    try:
+        worker.end_with_parent()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN, "an interrupt is the parent's"
+        (watch,) = [thread for thread in threading.enumerate() if thread.name == "panto-parent"]
+        assert watch.daemon, "the worker would wait for its parent, which waits for it"
+        assert not ended.wait(0.1)
+        os.close(parents)
+        assert ended.wait(10)
+        watch.join(10)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        os.close(ours)
+    assert statuses == [worker.ORPHANED] == [1]

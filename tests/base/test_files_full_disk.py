@@ -3,33 +3,19 @@
 import errno
 import json
 import os
-import subprocess
-import sys
 
 import pytest
 from typer.testing import CliRunner
 
 from panto_env import InputError, studies
+from panto_env.analysis import simulation
 from panto_env.base import files
 from panto_env.cli import make_app, reproduce
 
+from ..command import panto
+from ..full_disk import largest_file
 from ..fuzz.lines import SHORT
 
-LIMITED = """
-import resource
-import panto_env.analysis.simulation as simulation
-from panto_env.cli import main
-
-simulate = simulation.simulate
-
-def then_full(**settings):
-    run = simulate(**settings)
-    resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
-    return run
-
-simulation.simulate = then_full
-main()
-"""
 LIMIT = 8192
 """Bytes that a file may have once the run is over: a result has more."""
 COMMANDS = {
@@ -42,13 +28,26 @@ COMMANDS = {
 }
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="limits of Unix")
+@pytest.fixture
+def no_room(monkeypatch):
+    """Files of more than ``LIMIT`` bytes cannot be written once a run is over."""
+    run = simulation.simulate
+
+    def then_full(**settings):
+        done = run(**settings)
+        limit(LIMIT)
+        return done
+
+    monkeypatch.setattr(simulation, "simulate", then_full)
+    with largest_file() as limit:
+        yield
+
+
 @pytest.mark.parametrize("name", COMMANDS)
-def test_what_was_computed_is_printed_and_the_old_file_stays(name, tmp_path):
+def test_what_was_computed_is_printed_and_the_old_file_stays(name, no_room, tmp_path):
     words, file = COMMANDS[name]
     (tmp_path / file).write_text("old")
-    code = LIMITED.format(size=LIMIT)
-    done = subprocess.run([sys.executable, "-c", code, *words], cwd=tmp_path, capture_output=True, text=True)
+    done = panto(*words, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     *_, last = done.stderr.splitlines()

@@ -2,15 +2,18 @@
 
 import errno
 import os
+import re
 import socket
 import stat
 import sys
+from pathlib import Path
 
 import pytest
 
 from panto_env import InputError
 from panto_env.base import files
-from panto_env.base.files import check_output, make_folder, write_whole
+from panto_env.base.checksums import read_checked
+from panto_env.base.files import check_output, make_folder, read_toml, write_whole
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes, sockets and links of Unix")
 
@@ -113,6 +116,65 @@ def test_a_disk_that_fails_leaves_the_old_file_and_nothing_else(where, reason, t
     assert str(caught.value) == f"{path} cannot be written: {os.strerror(reason)}."
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["out.json"]
+
+
+CALLS = {
+    "write": (write, ["os.path.islink", "os.lstat", "os.open", "os.fsync", "os.chmod", "os.replace"]),
+    "check": (lambda path: check_output(path, (".json",)), ["os.path.islink", "os.lstat", "os.open"]),
+    "make": (make_folder, ["os.mkdir"]),
+    "read": (read_toml, ["os.open"]),
+    "read JSON": (read_checked, ["os.open"]),
+}
+
+
+@pytest.mark.parametrize(("name", "call"), [(name, call) for name in CALLS for call in CALLS[name][1]])
+def test_whatever_the_system_refuses_is_said_with_its_reason(name, call, tmp_path, monkeypatch):
+    """And nothing has changed, and nothing is left behind."""
+    path, attempt = tmp_path / "out.json", CALLS[name][0]
+    if name != "make":
+        path.write_text("a = 1")
+    refused = []
+
+    def refuse(*arguments, **_):
+        refused.append(arguments)
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(call, refuse)
+        if call == "os.open":
+            patch.setattr(Path, "open", refuse)
+            patch.setattr("io.open", refuse)
+        with pytest.raises(InputError) as caught:
+            attempt(path)
+    assert refused
+    message = str(caught.value)
+    assert "out.json" in message
+    assert message.endswith(": Permission denied.")
+    assert os.listdir(tmp_path) == ["out.json"] * (name != "make")
+    assert name == "make" or path.read_text() == "a = 1"
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002, 0])
+def test_a_file_may_be_read_and_written_by_whom_the_user_wants(mask, tmp_path):
+    """As one that a program opens; a temporary file's own mode would keep it from everybody else."""
+    before = os.umask(mask)
+    try:
+        write(tmp_path / "ours")
+        (tmp_path / "plain").write_text("as any other")
+        assert os.umask(mask) == mask, "of the user, as it was"
+    finally:
+        os.umask(before)
+    assert (tmp_path / "ours").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_all_suffixes_that_a_file_may_have_are_named(count, tmp_path):
+    suffixes = (".png", ".svg", ".pdf")[:count]
+    for suffix in suffixes:
+        check_output(tmp_path / f"out{suffix.upper()}", suffixes)
+    wanted = f"must end in {'one of ' * (count > 1)}{', '.join(suffixes)}."
+    with pytest.raises(InputError, match=f"{re.escape(wanted)}$"):
+        check_output(tmp_path / "out.doc", suffixes)
 
 
 def test_a_full_disk_is_found_before_the_work(tmp_path, monkeypatch):

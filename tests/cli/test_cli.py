@@ -1,11 +1,20 @@
+import io
 import json
+import re
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
 from panto_env import Trajectory
 from panto_env.base.checksums import read_checked
+from panto_env.base.errors import AccuracyWarning, PlugInWarning, UnusualWarning
+from panto_env.catalog.loader import text_of
+from panto_env.cli import _show_warning
+from panto_env.cli.descriptions import PRESETS
+from panto_env.cli.identify import pairs
 from panto_env.studies.en50318 import reference
+from panto_env.terminal import PlainConsole, bars, counting
 
 from .. import documents
 from ..command import panto
@@ -139,3 +148,77 @@ def test_a_switch_has_no_opposite():
         for command in group.commands.values():
             groups += [command] if hasattr(command, "commands") else []
             assert [option for each in command.params for option in each.secondary_opts] == []
+
+
+OURS = [AccuracyWarning, PlugInWarning, UnusualWarning]
+
+
+@pytest.mark.parametrize("category", [*OURS, UserWarning, DeprecationWarning])
+def test_a_warning_of_ours_is_a_sentence_and_one_of_others_says_where_it_is_from(category, capsys):
+    _show_warning("Look out.", category, "file.py", 7)
+    said = capsys.readouterr().err
+    assert (said == "panto: warning: Look out.\n") == (category in OURS)
+    assert said.startswith("panto: ") or said.startswith(f"file.py:7: {category.__name__}: Look out.")
+
+
+def test_a_list_shows_of_each_preset_what_differs_from_the_usual(monkeypatch):
+    monkeypatch.setattr("panto_env.terminal.console._width", 2000)
+    shown = panto("list").stdout
+    for presets in PRESETS.values():
+        kind = next(iter(presets.values())).model_dump().get("kind")
+        for name, preset in presets.items():
+            usual = type(preset)()
+            changed = [
+                f"{key}={value}" for key, value in preset if value != getattr(usual, key) and key != "kind"
+            ]
+            if preset.model_dump().get("kind") != kind:
+                changed.insert(0, f"kind={preset.kind}")
+            assert re.search(rf"│ {re.escape(name)} +│ {re.escape(', '.join(changed) or 'none')} +│", shown)
+
+
+def test_brackets_in_a_description_of_a_user_s_file_are_shown_as_they_are(tmp_path):
+    text = text_of("three-mass")
+    text = re.sub(r'^description = ".*"', 'description = "[bold]mine[/bold] [/x]"', text, flags=re.MULTILINE)
+    (tmp_path / "mine.toml").write_text(text)
+    assert "[bold]mine[/bold] [/x]" in panto("list", "mine.toml", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(("error", "status"), [(KeyboardInterrupt, 130), (EOFError, 1)])
+def test_a_command_that_is_interrupted_ends_without_a_traceback(error, status, monkeypatch):
+    def interrupt(**_):
+        raise error
+
+    monkeypatch.setattr("panto_env.analysis.simulation.simulate", interrupt)
+    done = panto("simulate")
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", "")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_is_shown_on_a_terminal_alone(terminal, monkeypatch):
+    said = io.StringIO()
+    console = PlainConsole(file=said, force_terminal=terminal, width=80)
+    monkeypatch.setattr("panto_env.terminal.progress_console", console)
+    with bars() as progress:
+        progress.update(progress.add_task("simulating", total=1.0), completed=0.25)
+        progress.refresh()
+    with counting("passes") as count:
+        count(3, 4)
+    assert [words in said.getvalue() for words in ("simulating", "25%", "passes", "3/4")] == [terminal] * 4
+
+
+@pytest.mark.parametrize(("count", "size"), [(1, (1280, 720)), (2, (1280, 960)), (4, (1280, 1920))])
+def test_a_film_is_as_large_as_its_help_says(count, size, monkeypatch, tmp_path):
+    pytest.importorskip("cv2")
+    pytest.importorskip("moviepy")
+    seen = []
+    monkeypatch.setattr("panto_env.cli.film.write_film", lambda *given: seen.append(given))
+    words = ["film", *["passive"] * count, "--catenary", "periodic-stiffness", "--pantograph", "three-mass"]
+    done = panto(*words, "--distance", "550", "--seconds", "0.1", "--output", tmp_path / "it.mp4")
+    assert done.returncode == 0, done.stderr
+    ((frames, path, rate, whole),) = seen
+    assert (Path(path).name, rate, whole) == ("it.mp4", 25.0, size)
+    assert next(iter(frames)).shape == (size[1], size[0], 3)
+
+
+def test_names_and_values_may_stand_between_commas_and_blanks():
+    assert pairs([",a=1,", "b=2 , c=3", " "]) == {"a": "1", "b": "2", "c": "3"}

@@ -6,9 +6,17 @@ import pytest
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from panto_env import InputError, simulate
+from panto_env.backend import JIT
 from panto_env.control.reward import REWARDS
+from panto_env.envs import BARE
+from panto_env.metrics.low_pass import low_pass
+
+pytestmark = pytest.mark.plain
 
 NAME = "panto_env:PantographStiffness-v0"
+WIRES = pytest.param(
+    "panto_env:Pantograph-v0", marks=pytest.mark.skipif(not JIT, reason="a minute in plain Python")
+)
 WEIGHTS = {"cost_function": 0.7, "contact_loss": 3.0, "effort": 0.2, "rate": 0.4}
 BOTH = {"place": "both", "force_limit": 250.0}
 
@@ -41,7 +49,7 @@ def actions():
     return np.random.default_rng(0).uniform(-1.5, 1.5, (60, 2))
 
 
-@pytest.mark.parametrize("name", ["panto_env:PantographStiffness-v0", "panto_env:Pantograph-v0"])
+@pytest.mark.parametrize("name", [NAME, WIRES])
 def test_effort_and_rate_are_those_of_the_clipped_actions(name, actions):
     env = gymnasium.make(name, actuator=BOTH, settle=0.0, washout=None).unwrapped
     effort, rate = effort_and_rate(actions)
@@ -171,7 +179,10 @@ def test_running_mean_counts_from_the_passive_mean_too():
     for target in ("nominal", "passive"):
         env = gymnasium.make(NAME, reward=weights | {"target": target}, **given).unwrapped
         env.reset(seed=0)
-        sums[target] = np.mean([env.step([0.0])[1] for _ in range(300)][100:])
+        answers = [env.step([0.0]) for _ in range(300)][100:]
+        sums[target] = np.mean([reward for _, reward, *_ in answers])
+        terms = [info["reward_terms"]["mean_force"] for *_, info in answers]
+        assert terms == pytest.approx([-reward for _, reward, *_ in answers])
     assert sums["nominal"] < -0.01
     assert -0.002 < sums["passive"] <= 0.0
 
@@ -197,3 +208,23 @@ def test_early_end_is_no_way_out_of_the_low_passed_term():
     passive = simulate("periodic-stiffness", "three-mass", 300.0).summary()
     charge = steps * (1.0 + (passive.mean / passive.std) ** 2)
     assert rewards[-1] == pytest.approx(rewards[-2] - charge, rel=0.02)
+
+
+@pytest.mark.parametrize("weights", [(2.0, 0.0), (0.0, 3.0), (0.5, 0.25)])
+def test_cost_is_the_weighted_share_of_the_step_beyond_each_limit(weights):
+    """Without contact, and above the 350 N of the low-passed force, by hand from the record of the run."""
+    cost = {"contact_loss": weights[0], "max_force": weights[1], "uplift": 0.0}
+    given = BARE | {"distance": 250.0, "actuator": {"force_limit": 250.0}, "cost": cost}
+    env = gymnasium.make(NAME, **given).unwrapped
+    env.reset(seed=0)
+    costs, ended, k = [], False, 0
+    while not ended:
+        *_, terminated, truncated, info = env.step(np.array([np.sin(0.4 * k)], dtype=np.float32))
+        costs.append(info["cost"])
+        ended, k = terminated or truncated, k + 1
+    run, steps = env.trajectory, env.task.length.control_steps
+    lost, pressed = run.contact_force <= 0, low_pass(run.contact_force, run.time_step) > 350
+    assert lost.any()
+    assert pressed.any()
+    shares = np.stack([lost, pressed], axis=1).reshape(-1, steps, 2).mean(axis=1)
+    assert np.array(costs) == pytest.approx(shares @ np.array(weights))

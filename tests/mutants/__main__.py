@@ -70,23 +70,26 @@ class Workbench:
             f"--source={','.join(self.room['sources'])}",
         ]
         done = self._python(*measured, "-m", "pytest", "-q", "-m", self.marks, *self.room["tests"])
-        failed = re.findall(r"^FAILED (\S+)", done.stdout, re.MULTILINE)
+        failed = re.findall(r"^(?:FAILED|ERROR) (\S+::\S+)", done.stdout, re.MULTILINE)
         if done.returncode and not failed:
             raise SystemExit(f"The tests do not run:\n{done.stdout[-2000:]}")
         for name in failed:
             print(f"fails without any mutant, so it is left out: {name}", flush=True)
         self.left_out = [f"--deselect={name}" for name in failed]
+        self.kept = self.kernels / self._kernel_hash()
         self.data.read()
 
     def keep_kernels(self) -> None:
         """Let compiled kernels serve the sources as they are now: only files without kernels are mutated."""
+        now = self.kernels / self._kernel_hash()
+        if self.kept.exists() and not now.exists():
+            self.kept.rename(now)
+        self.kept = now
+
+    def _kernel_hash(self) -> str:
+        """Name of the folder of these sources' kernels; tests that check indices have one of their own."""
         name = "from panto_env.backend.cache import kernel_hash; print(kernel_hash())"
-        # A test that changes sources has left another folder, with less in it.
-        folder = max(self.kernels.glob("*"), key=lambda each: len(list(each.iterdir())), default=None)
-        target = self.kernels / self._python("-c", name).stdout.strip()
-        if folder is not None and folder != target:
-            shutil.rmtree(target, ignore_errors=True)
-            folder.rename(target)
+        return self._python("-c", name).stdout.split("\n")[0]
 
     def tests_of(self, mutant: Mutant) -> list[str]:
         """The tests that reach a mutant, and all of the room where a fixture does."""

@@ -6,6 +6,8 @@ import pytest
 from panto_env.backend import kernel
 from panto_env.plant.alignment import Alignment, in_spans
 
+pytestmark = pytest.mark.plain
+
 NINE = Alignment.of_spans([50.0, 65.0, 42.5, 60.0, 55.0, 48.0, 63.0, 57.5, 44.0])
 EQUAL = Alignment.equal(60.0, 9)
 

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from panto_env import InputError
+from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.plant.actuators.motor import MotorActuator
 from panto_env.plant.actuators.motor.arrays import MotorRow
+from panto_env.plant.actuators.motor.current import age, decay
 from panto_env.plant.actuators.motor.power import motor_power
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
@@ -381,3 +383,20 @@ def test_the_preset_s_force_at_the_head():
 def test_motors_that_cannot_be_so_are_refused(changes, message):
     with pytest.raises(InputError, match=f"actuator is not valid: .*{message}"):
         actuator_settings(f"head-motor:{changes}")
+
+
+@kernel
+def _curves(x, halvings, decayed, aged):
+    for i in range(x.size):
+        decayed[i] = decay(x[i], halvings)
+        aged[i] = age(math.exp(-x[i]), halvings)
+
+
+@pytest.mark.parametrize("halvings", [2, 3, 6])
+def test_decay_is_the_exponential_and_age_its_inverse(halvings):
+    """To the order of their series, up to the argument that so many halvings are for."""
+    x = np.linspace(1e-3, 0.25 * 2**halvings, 200)
+    decayed, aged = np.zeros_like(x), np.zeros_like(x)
+    _curves(x, halvings, decayed, aged)
+    np.testing.assert_allclose(decayed, np.exp(-x), rtol=2e-6 * 2**halvings)
+    np.testing.assert_allclose(aged, x, rtol=1e-10)

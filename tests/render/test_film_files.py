@@ -1,7 +1,6 @@
 """A film is written whole or not at all: on a full disk, and by an encoder that is killed or broken."""
 
 import os
-import subprocess
 import sys
 from subprocess import Popen
 
@@ -12,26 +11,15 @@ from panto_env import InputError
 
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
-from panto_env.render import video
+from panto_env.render import film, video
 from panto_env.render.video import write_film
+
+from ..command import panto
+from ..full_disk import largest_file
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
 
 SIZE = (64, 64)
-LIMITED = """
-import resource
-import panto_env.render.film as film
-from panto_env.cli import main
-
-frames = film.frames
-
-def then_full(*arguments):
-    resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
-    return frames(*arguments)
-
-film.frames = then_full
-main()
-"""
 FILM = ["film", "passive", "--line-spans", "14", "--first-span", "2", "--seconds", "0.4", "--output"]
 BROKEN = {
     "killed": ("kill -9 $$", "FFmpeg was killed by SIGKILL"),
@@ -54,10 +42,18 @@ def noise(number=60):
 
 @pytest.mark.parametrize("size", [5000, 8192])
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_a_full_disk_is_one_sentence_and_the_film_before_stays(size, suffix, tmp_path):
+def test_a_full_disk_is_one_sentence_and_the_film_before_stays(size, suffix, tmp_path, monkeypatch):
+    """Full for frames, and for the encoder, which has the limits of the process that starts it."""
     (tmp_path / f"film{suffix}").write_text("old")
-    command = [sys.executable, "-c", LIMITED.format(size=size), *FILM, f"film{suffix}"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    frames = film.frames
+
+    def then_full(*arguments):
+        limit(size)
+        return frames(*arguments)
+
+    monkeypatch.setattr(film, "frames", then_full)
+    with largest_file() as limit:
+        done = panto(*FILM, f"film{suffix}", cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     announced, said = done.stderr.splitlines()
     assert announced == f"panto: film{suffix} exists already and will be overwritten."

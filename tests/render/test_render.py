@@ -20,7 +20,7 @@ from panto_env.plant.state import Place, Row
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import excerpt, figures_in_words, frames
+from panto_env.render.film import Excerpt, _highest, excerpt, figures_in_words, frames
 from panto_env.render.filmed import check_together, policy_pass
 from panto_env.render.layout import Layout, force_axis
 from panto_env.render.moment import moment_of
@@ -28,6 +28,8 @@ from panto_env.render.picture import QUIET, SUPPORT, Picture
 from panto_env.render.video import write_film
 
 SIZE = (640, 360)
+ROUND = [1, 2, 5, 10, 15, 20, 30, 50, 100, 200]
+"""Exaggerations of heights that are easy to remember."""
 
 
 def driven(steps=150, action=0.0, **settings):
@@ -148,6 +150,32 @@ def test_heights_are_exaggerated_by_what_is_said():
     assert (heights[0] - heights[1]) / (places[1] - places[0]) == pytest.approx(layout.exaggeration)
     assert layout.up(now.line.messenger).min() > 0
     assert layout.forces(np.array([0.0, 350.0]), 350.0)[0] > layout.forces(350.0, 350.0)
+
+
+def test_the_exaggeration_is_the_largest_round_one_at_which_the_line_fits_in():
+    """Below the title and above the roof, with the pantograph's share of the height between."""
+    now, seen = moment(driven()), set()
+    for height, width in itertools.product(np.geomspace(0.4, 60, 100), (1280, 200, 64)):
+        wire = now.line.messenger * 0 + height
+        tall = replace(now, line=now.line._replace(messenger=wire))
+        layout = Layout.of(tall, width, 720)
+        step = ROUND[ROUND.index(layout.exaggeration) + 1 :][:1]
+        top = 0.075 * 720
+        assert float(layout.up(height)) >= top or layout.exaggeration == 1
+        for larger in step:
+            assert float(replace(layout, exaggeration=larger).up(height)) < top
+        seen.add(layout.exaggeration)
+    assert seen == set(ROUND)
+
+
+def test_the_axis_of_a_film_fits_what_the_film_shows():
+    """What a pass had long before and has afterwards does not count."""
+    run = simulate("periodic-stiffness", "three-mass", 180.0, distance=400.0)
+    for peak in (40.0, 60.0, 99.0, 101.0, 149.0, 151.0, 200.0, 399.0):
+        force = np.where(np.abs(run.position - peak) < 0.2, 9000.0, 100.0)
+        what = Excerpt(begin=165.0 / 50, end=150.0 / 50 + 1, every=1, rate=25.0)  # 165 to 200 m, at 50 m/s
+        shown = 165 - 1.3 * 50 <= peak <= 200
+        assert _highest(replace(run, contact_force=force), what) == (9000.0 if shown else 100.0), peak
 
 
 @pytest.mark.parametrize(("name", "mode"), list(itertools.product(IDS, ("rgb_array", "rgb_array_list"))))

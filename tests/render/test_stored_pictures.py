@@ -3,19 +3,12 @@
 python -m tests.render.test_stored_pictures   # writes stored/*.png anew
 """
 
-from dataclasses import replace
 from functools import partial
 from io import BytesIO
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from panto_env.analysis.plots import plot_forces, plot_run
-from panto_env.analysis.sweep_plots import plot_sweep
-
-from ..metrics.test_summary import RUN
 
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
@@ -23,6 +16,7 @@ import cv2
 
 from panto_env.render.picture import Picture
 
+from .made_up_plots import PLOTS
 from .test_render import driven, moment
 
 STORED = Path(__file__).with_name("stored")
@@ -34,7 +28,6 @@ FRAMES = {
     "three-span": {"catenary": "ohl-three-span", "pantograph": "own-two-mass"},
     "stiffness": {"catenary": "periodic-stiffness", "pantograph": "three-mass", "action": -0.8},
 }
-ROW = {"catenary": "a line", "pantograph": "one", "system": "AC", "spans": "10-19", "terminated": False}
 
 
 def frame(name):
@@ -42,39 +35,15 @@ def frame(name):
     return Picture(800, 450).draw(moment(driven(**settings)))
 
 
-def pixels(figure):
+def pixels(plot):
     """A figure of Matplotlib as it is saved, on a coarse grid."""
     png = BytesIO()
-    figure.savefig(png, dpi=70, format="png")
+    plot().savefig(png, dpi=60, format="png")
     return cv2.imdecode(np.frombuffer(png.getvalue(), np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
 
 
-def rows():
-    """A sweep over two parameters whose figures are made up."""
-    for k, (policy, speed, mass) in enumerate(product(("passive", "pd"), (200.0, 300.0), (5.0, 7.0))):
-        figures = {"mean": 120.0 + k, "std": 20.0 + 3 * k, "max": 180.0 + 9 * k, "min": 60.0 - 5 * k}
-        figures |= {"statistical_max": 190.0 + 9 * k, "statistical_min": 50.0 - 6 * k}
-        figures |= {"max_uplift": 0.04 + 0.003 * k, "contact_loss": 0.1 * k}
-        yield ROW | figures | {"speed_kmh": speed, "mass": mass, "policy": policy}
-
-
-def sweep(*names):
-    kept = [row for row in rows() if "mass" in names or row["mass"] == 5.0]
-    return plot_sweep(kept, names, {"speed_kmh": "speed (km/h)", "mass": "mass (kg)"})
-
-
-def several():
-    ended = replace(RUN, contact_force=1.5 * RUN.contact_force, catenary="another", terminated=True)
-    return plot_forces((RUN, ended), ("p", "q"), (1, 3), "two runs")
-
-
-PICTURES = {
-    **{f"frame-{name}": partial(frame, name) for name in FRAMES},
-    "run": lambda: pixels(plot_run(RUN, "all")),
-    "runs": lambda: pixels(several()),
-    "sweep": lambda: pixels(sweep("speed_kmh")),
-    "maps": lambda: pixels(sweep("speed_kmh", "mass")),
-}
+PICTURES = {f"frame-{name}": partial(frame, name) for name in FRAMES}
+PICTURES |= {name: partial(pixels, plot) for name, plot in PLOTS.items()}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -85,7 +54,12 @@ def test_a_picture_is_as_it_was(name):
     assert (np.abs(now - then).max(axis=2) > SLIGHT).sum() == 0
 
 
+def test_no_picture_is_stored_that_is_not_compared():
+    assert {path.stem for path in STORED.glob("*.png")} == set(PICTURES)
+
+
 if __name__ == "__main__":
     STORED.mkdir(exist_ok=True)
     for name, draw in PICTURES.items():
-        cv2.imwrite(str(STORED / f"{name}.png"), np.ascontiguousarray(draw()[..., ::-1]))
+        smallest = [cv2.IMWRITE_PNG_COMPRESSION, 9]
+        cv2.imwrite(str(STORED / f"{name}.png"), np.ascontiguousarray(draw()[..., ::-1]), smallest)

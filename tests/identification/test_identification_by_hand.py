@@ -1,0 +1,263 @@
+"""What the identification says beside its values, worked out another way, and every bound of a record."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from panto_env import InputError
+from panto_env.analysis.pool import one_by_one
+from panto_env.catalog import load_pantograph
+from panto_env.identification import (
+    EXPERIMENTS,
+    FILTERED,
+    FREQUENCY_SWEEP,
+    IDENTIFIED,
+    MEASURED,
+    OUTPUT_ERROR,
+    Fit,
+    Identification,
+    Match,
+    Record,
+    add_noise,
+    band_limited,
+    clean_record,
+    coverage,
+    equations,
+    fit_equation_error,
+    parameters_of,
+    run_trials,
+    write_pantograph,
+)
+from panto_env.identification.equation_error import solve
+from panto_env.identification.output_error import Misfit
+from panto_env.identification.plausibility import _check_time, check_record
+
+from ..command import panto
+from .test_identification_files import MEASURED as MEASURED_WORDS
+from .test_identification_files import sweep as sweep
+
+TRUTH = parameters_of(load_pantograph("identified-2dof"))
+KNOWN = {name: TRUTH[name] for name in MEASURED}
+TRUE = np.array([TRUTH[name] for name in IDENTIFIED])
+RECORD = add_noise(clean_record(FREQUENCY_SWEEP, TRUTH, duration=5.0), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("free_offset", [False, True])
+@pytest.mark.parametrize("stride", [1, 7])
+def test_a_linear_fit_is_ordinary_least_squares_with_its_textbook_errors(free_offset, stride):
+    """By the normal equations, with a column of ones for each of the two equations where they are offset."""
+    fit = solve(RECORD, KNOWN, stride, free_offset, FILTERED)
+    a, y = (each[:, ::stride] for each in equations(RECORD, KNOWN))
+    ones = np.repeat(np.eye(2), a.shape[1], axis=0)[:, : 2 * free_offset]
+    columns, y = np.column_stack([a.reshape(-1, 5), ones]), y.ravel()
+    values, (squares,), *_ = np.linalg.lstsq(columns / (size := np.linalg.norm(columns, axis=0)), y)
+    variance = squares / (len(y) - columns.shape[1])
+    covariance = variance * np.linalg.inv(columns.T @ columns)
+    np.testing.assert_allclose(fit.values, (values / size)[:5], rtol=1e-6)
+    np.testing.assert_allclose(fit.std, np.sqrt(np.diag(covariance))[:5], rtol=1e-6)
+    if not free_offset:
+        assert fit.condition == pytest.approx(np.linalg.cond(columns))
+        assert fit.dependence == pytest.approx(np.linalg.cond(columns / size))
+
+
+def test_a_value_that_is_known_is_taken_out_of_the_equations():
+    """The others are then as if its column had been subtracted."""
+    known = KNOWN | {"m3": TRUTH["m3"], "c2": 120.0}
+    fit = fit_equation_error(RECORD, known)
+    a, y = equations(RECORD, KNOWN)
+    y = (y - a[:, :, 1] * 120.0 - a[:, :, 2] * TRUTH["m3"]).ravel()
+    values = np.linalg.lstsq(a.reshape(-1, 5)[:, [0, 3, 4]], y)[0]
+    assert fit.names == ("c1T", "c3", "k3")
+    np.testing.assert_allclose(fit.values, values, rtol=1e-6)
+    assert fit.parameters == KNOWN | {"m3": TRUTH["m3"], "c2": 120.0} | dict(
+        zip(fit.names, fit.values, strict=True)
+    )
+
+
+def test_an_interval_holds_95_per_cent_and_says_whether_0_is_in_it():
+    values, std = np.array([1.0, -2.0, 30.0, -4.0, 0.5]), np.array([0.6, 0.5, 20.0, 2.0, 0.255])
+    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, values, std, 9.0, 3.0)
+    low, high = fit.interval.T
+    np.testing.assert_allclose(norm.cdf((high - values) / std), 0.975)
+    np.testing.assert_allclose(norm.cdf((low - values) / std), 0.025)
+    np.testing.assert_allclose(fit.rsd, [60, 25, 200 / 3, 50, 51])
+    holds = {name for name, one, other in zip(IDENTIFIED, low, high, strict=True) if one < 0 < other}
+    assert set(fit.undetermined) == holds == {"c1T", "m3"}
+    told = fit.as_dict()["parameters"]["c2"]
+    assert (told["value"], told["low"], told["high"]) == (-2.0, low[1], high[1])
+
+
+@pytest.mark.parametrize("band", [0.5, 1.5, 4.0, 10.0, 60.0])
+def test_the_model_is_simulated_with_200_samples_per_period_of_the_band_or_all_there_are(band):
+    record = clean_record(EXPERIMENTS[0], TRUTH, duration=2.0)
+    misfit = Misfit(record, KNOWN, dict(zip(IDENTIFIED, TRUE, strict=True)), 0.1, band, False)
+    thin = round(misfit.time_step / record.time_step)
+    assert thin == 1 or 1 / (band * misfit.time_step) >= 200
+    assert 1 / (band * (thin + 1) * record.time_step) < 200
+    assert misfit.target.shape[0] == len(record.head[::thin][misfit.rows])
+
+
+def test_a_band_is_limited_around_its_middle_and_keeps_the_time_of_its_samples():
+    """A cosine at the band's edge comes out as it went in, sample for sample; one of thrice that is gone."""
+    time = 1e-3 * np.arange(6000)
+    slow, quick = np.cos(2 * np.pi * 2.0 * time), np.cos(2 * np.pi * 6.5 * time)
+    kept, stride = band_limited(Record(1e-3, 0.3 + slow, slow + quick, quick, slow, 5.0), 2.0)
+    inside = slice(round((kept.start - 5.0) / 1e-3), None)
+    for ours, wanted in (
+        (kept.plate, 0.3 + slow),
+        (kept.head, slow),
+        (kept.support, 0 * slow),
+        (kept.force, slow),
+    ):
+        np.testing.assert_allclose(ours, wanted[inside][: len(ours)], atol=3e-3)
+    assert stride == 166  # 1,000 samples a second over six per second, of noise up to 3 Hz
+
+
+def test_trials_count_in_which_the_truth_lies_inside_the_interval(monkeypatch):
+    """Records by seed, in their order; a method that finds nothing misses."""
+    seen, excitation = [], EXPERIMENTS[0]
+    monkeypatch.setattr(coverage, "in_processes", lambda jobs, progress: one_by_one(jobs, progress=progress))
+    monkeypatch.setattr(coverage, "TRIALS_PER_JOB", 2)
+    off = np.array([[0, 3, -3, 1, -1], [1.9, 2, -1.9, -2, 0], [0.0] * 5, [9, 9, 9, 9, 0], [-9, 0, 0, 0, 9]])
+
+    def fake(record, known, *, free_offset):
+        number = len(seen) % 5
+        seen.append((record, known, free_offset))
+        fit = Fit("one", KNOWN, IDENTIFIED, TRUE + 0.1 * off[number], np.full(5, 0.1), 1.0, 1.0)
+        return Identification(1.0, {"one": fit}, {"other": "it found nothing"})
+
+    monkeypatch.setattr(coverage, "identify", fake)
+    done = []
+    first, second = run_trials(
+        [(excitation, True), (EXPERIMENTS[1], False)], TRUTH, 5, progress=lambda *n: done.append(n)
+    )
+    assert [free for *_, free in seen] == [True] * 5 + [False] * 5
+    assert done[-1] == (6, 6)
+    for seed, (record, known, _) in enumerate(seen[:5]):
+        wanted = add_noise(clean_record(excitation, TRUTH), np.random.default_rng(seed))
+        np.testing.assert_array_equal(record.head, wanted.head)
+        assert known == KNOWN
+    for trials in (first, second):
+        np.testing.assert_allclose(trials["one"].values, TRUE + 0.1 * off)
+        np.testing.assert_allclose(trials["one"].std, 0.1)
+        np.testing.assert_allclose(trials["one"].coverage, 20 * (np.abs(off) < 1.96).sum(axis=0))
+        assert np.isnan(trials["other"].values).all()
+        assert np.isnan(trials["other"].std).all()
+        np.testing.assert_array_equal(trials["other"].coverage, 0.0)
+
+
+WRITTEN = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
+
+
+@pytest.mark.parametrize("driven_by", ["plate", "force"])
+@pytest.mark.parametrize("channel", ["y_p2", "y_p3", "force"])
+@pytest.mark.parametrize("share", [0.49, 0.51])
+def test_a_model_must_explain_the_displacements_that_it_was_identified_from(
+    driven_by, channel, share, tmp_path
+):
+    """By half or more; what the force drives, and the force itself, are not what was fitted."""
+    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, TRUE, 0.01 * TRUE, 10.0, 10.0)
+    recorded = np.sin(np.arange(100.0))
+    recorded -= recorded.mean()
+    matches = [
+        Match("y_p2", "plate", recorded, recorded),
+        Match(channel, driven_by, recorded, share * recorded),
+    ]
+    path = tmp_path / "mine.toml"
+    if driven_by == "plate" and channel != "force" and share < 0.5:
+        with pytest.raises(InputError, match=f"does not explain the motion of {channel} "):
+            write_pantograph(fit, path, matches=matches, **WRITTEN)
+    else:
+        write_pantograph(fit, path, matches=matches, **WRITTEN)
+    assert path.exists() == (driven_by == "force" or channel == "force" or share > 0.5)
+
+
+def identified():
+    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, TRUE, 0.01 * TRUE, 10.0, 10.0)
+    return Identification(4.0, {OUTPUT_ERROR: fit}, {})
+
+
+@pytest.mark.parametrize("options", [[], ["--plot", "a.png"], ["--output", "a.toml"]])
+def test_a_model_that_cannot_be_simulated_is_said_unless_a_file_needs_it(
+    options, sweep, monkeypatch, tmp_path
+):
+    def unstable(*_):
+        raise InputError("The model is not stable.")
+
+    found = identified()
+    monkeypatch.setattr("panto_env.identification.identify", lambda *_, **__: found)
+    monkeypatch.setattr("panto_env.identification.matches", unstable)
+    done = panto("identify", sweep, *MEASURED_WORDS, *options, cwd=tmp_path)
+    assert done.returncode == (2 if options else 0)
+    assert "The model is not stable." in (done.stderr if options else done.stdout)
+    assert list(tmp_path.iterdir()) == []
+
+
+def made(n=2000, step=1e-3, plate=2e-3, head=1.8e-3, support=1.5e-3, force=1.0, **other):
+    """A record of a sine, swings in m from end to end; head_with, support_with: correlations."""
+    angle = 2 * np.pi * other.get("periods", 1) * np.arange(n) / n
+    wave, across = np.sin(angle), np.cos(angle)
+
+    def along(correlation):
+        return correlation * wave + np.sqrt(1 - correlation**2) * across
+
+    y1, y2 = plate / 2 * wave, head / 2 * along(other.get("head_with", 1.0))
+    y3 = support / 2 * along(other.get("support_with", 1.0)) + other.get("high", 0.0)
+    spring = KNOWN["k1T"] * (y1 - y2)
+    if "force_with" in other:
+        spring = KNOWN["k1T"] * 1e-4 * along(other["force_with"])
+    pushes = force * spring + other.get("weight", 0.0)
+    return Record(step, y1, y2, y3, pushes)
+
+
+def frame(periods):
+    """A frame that goes against the head, so many times in 2 s."""
+    return made(periods=periods, support_with=-0.9)
+
+
+SLOWEST = 1 / 30**1.5
+EDGES = {  # a record by a factor that is 1 on the bound, and what is said of one beyond
+    "quick": (lambda f: made(n=40_000, step=1 / (50e3 * f)), "seconds in a column of ms"),
+    "slow": (lambda f: made(n=100, step=0.1 * f), "milliseconds in a column of s"),
+    "short": (lambda f: made(n=500, step=1e-3 / f), "seconds in a column of ms"),
+    "long": (lambda f: made(n=40_000, step=0.09 * f), "milliseconds in a column of s"),
+    "far": (lambda f: made(high=3.0 * f - 0.75e-3), "y_p3 holds displacements of 3"),
+    "wide": (lambda f: made(plate=0.5 * f, head=0.4, support=0.4), "y_p1 holds a motion of 0.5"),
+    "still plate": (lambda f: made(plate=20e-6 / f, head=25e-6, support=25e-6), "y_p1 moves by 19.9"),
+    "still head": (lambda f: made(plate=25e-6, head=20e-6 / f, support=25e-6), "y_p2 moves by 19.9"),
+    "head ahead": (lambda f: made(plate=3e-3, head=90e-3 * f), "y_p2 moves 30"),
+    "head behind": (lambda f: made(plate=30e-3, head=1e-3 / f), "y_p2 moves 1/30"),
+    "frame ahead": (lambda f: made(plate=3e-3, support=90e-3 * f), "y_p3 moves 30"),
+    "frame behind": (lambda f: made(plate=9e-2, head=8e-2, support=9e-2 * SLOWEST / f), "y_p3 moves 1/16"),
+    "against": (lambda f: made(head_with=-0.5 * f), "y_p2 falls as y_p1 rises"),
+    "frame against": (lambda f: made(support_with=-0.5 * f), "y_p3 falls as y_p2 rises"),
+    "pull": (lambda f: made(force_with=-0.5 * f), "force falls as the plate presses"),
+    "heavy": (lambda f: made(weight=3000 * f - 3.3), "newtons in a column of kN"),
+    "light": (lambda f: made(force=0.01 / (KNOWN["k1T"] * 2e-4) / f, force_with=0.3), "force changes by"),
+    "strong": (lambda f: made(force=30 * f), "is k1T in N/m"),
+    "weak": (lambda f: made(force=1 / (30 * f)), "is k1T in N/m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDGES)
+def test_a_record_is_taken_up_to_each_bound_and_refused_beyond(name):
+    record, message = EDGES[name]
+    check_record(record(0.995), KNOWN)
+    with pytest.raises(InputError, match=message):
+        check_record(record(1.005), KNOWN)
+
+
+def test_a_frame_must_follow_the_head_below_the_frequency_of_the_heaviest():
+    """Of 50 kg on k2: 2.71 Hz, 5.4 periods in 2 s."""
+    for periods in (3, 5):
+        with pytest.raises(InputError, match="y_p3 falls as y_p2 rises"):
+            check_record(frame(periods), KNOWN)
+    check_record(frame(6), KNOWN)
+
+
+def test_two_million_samples_are_the_most():
+    _check_time(SimpleNamespace(plate=range(2_000_000), time_step=1e-3))
+    with pytest.raises(InputError, match="2,000,000 at most"):
+        _check_time(SimpleNamespace(plate=range(2_000_001), time_step=1e-3))
