@@ -22,9 +22,9 @@ def spans(settings: RunSettings) -> int | None:
         return line.spans + more if settings.spans is None and more else settings.spans
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
     most = line.most_spans
-    clear = line.clear_spans(settings.numerics, settings.runs, last) if line.spans <= last < most else 1
+    clear = line.clear_spans(settings.numerics, settings.runs, last) if last >= line.spans else 1
     if most < MOST_SPANS:
-        clear = 0  # the train may run up to the anchor of a line that has one
+        clear = 0  # a line that ends has an anchor there, and a train may run up to it
     needed = last + clear
     if needed > most:
         longest = line.alignment().support(most - clear)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from panto_env import InputError, simulate
+from panto_env import InputError
 from panto_env.base.explanation import explain
 from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
@@ -183,14 +183,6 @@ def test_elasticity_along_the_line_is_that_of_finite_elements(changes):
         assert lifted.dropper_tension.min() > 0
         theirs = (lifted.contact[node] - rest.contact[node]) / 5.0
         assert np.interp(rest.x[node], places, yields) == pytest.approx(theirs, rel=0.01)
-
-
-def test_trains_do_not_run_on_unlike_spans_yet():
-    line = line_of("re250", MIXED)
-    for given in ({}, {"spans": 12}, {"distance": 3000.0}):
-        with pytest.raises(InputError, match="Trains do not run on line 're250' yet") as caught:
-            simulate(line, "dsa380", 200.0, **given)
-        assert str(caught.value).count(". ") == 0
 
 
 def test_the_dropper_table_names_every_dropper_of_every_span():
