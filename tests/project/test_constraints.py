@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize("python", ["3.11.0", "3.12.0", "3.13.0"])
 def test_every_version_takes_the_first_releases_of_the_pythons_that_we_name(python):
-    """On Python 3.11.2, that of Debian 12, one wanted 3.11.5: pip looked for another for minutes, and failed."""
+    """One wanted 3.11.5: on Debian's 3.11.2 pip looked for another version for minutes, and failed."""
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     tested = dict(line.split("==") for line in lines if line and not line.startswith("#"))
     tested = {canonicalize_name(name): version for name, version in tested.items()}
