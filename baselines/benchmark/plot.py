@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def plot(outcome: Benchmark) -> Figure:
         _changes(changes, cells, colours)
         where = f"pantograph {line.pantograph}, line {line.catenary}"
         part.suptitle(f"{where}; evaluated spans {in_words(outcome.spans[k])}, seeds: {cells[0].seeds}")
-        handles, labels = _legend(forces, cells)
+        handles, labels = _legend((forces, sigmas), cells)
         part.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
     return figure
 
@@ -100,7 +100,9 @@ def _sigmas(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
         axes.plot(speeds, [cell.figures["std"] for cell in by_speed], ".-", color=colour, linewidth=1.3)
     first = _by_speed(cells, next(iter(colours)))
     limit = [en50367.STD_OF_MEAN * cell.figures["mean"] for cell in first]
-    axes.plot([cell.speed_kmh for cell in first], limit, color=LIMIT, linestyle="--", linewidth=0.9)
+    words = f"{en50367.SOURCE}: σ of at most {en50367.STD_OF_MEAN:g} F_m ({first[0].policy})"
+    style: dict[str, Any] = {"color": LIMIT, "linestyle": "-.", "linewidth": 0.9}  # not as the force's
+    axes.plot([cell.speed_kmh for cell in first], limit, label=words, **style)
     axes.set(xlabel="speed (km/h)", ylabel=LABELS["std"].heading, xticks=sorted({c.speed_kmh for c in cells}))
     axes.set_ylim(bottom=0)
 
@@ -132,11 +134,15 @@ def _by_speed(cells: list[Cell], policy: str) -> list[Cell]:
     return sorted((cell for cell in cells if cell.policy == policy), key=lambda cell: cell.speed_kmh)
 
 
-def _legend(axes: Axes, cells: list[Cell]) -> tuple[list[Artist], list[str]]:
+def _legend(panels: tuple[Axes, ...], cells: list[Cell]) -> tuple[list[Artist], list[str]]:
     """Handles and labels of the legend that all panels of a line share."""
     from matplotlib.lines import Line2D
 
-    handles, labels = axes.get_legend_handles_labels()
+    handles, labels = list[Any](), list[str]()
+    for axes in panels:
+        own = axes.get_legend_handles_labels()
+        handles += own[0]
+        labels += own[1]
     if any(cell.disqualified for cell in cells):
         handles.append(Line2D([], [], linestyle="", marker="o", color="0.4", markerfacecolor="white"))
         labels.append("disqualified")
