@@ -96,10 +96,6 @@ def test_the_command_line_says_it_in_one_line():
     assert "resolution.py" not in told.stderr
 
 
-BEYOND = {"seed 20": [pytest.mark.xfail(reason="at 217 km/h the maximum is off by 1.05 % of the mean force")]}
-"""Lines that break the stated bounds somewhere, as docs/validation.md says."""
-
-
 def assert_within_bounds(check):
     """The bounds that documents state: up to 70 % of the wave speed, and beyond."""
     sigma, extremes = (1.0, 1.0) if check.share < 0.701 or not check.drawn else (1.5, 2.5)
@@ -108,10 +104,14 @@ def assert_within_bounds(check):
     assert abs(check.contact_loss) < (0.5 if check.drawn else 0.15)
 
 
-@pytest.mark.parametrize(("seed", "share"), [(4, 0.62), (4, 0.7), (8, 0.62)])
-def test_lines_outside_the_catalogue_are_as_accurate(seed, share):
-    """Wires without bending stiffness, under trams and light trains: sigma was wrong by 1.0 to 1.8 %."""
-    (case,) = (each for each in lines.drawn_cases(seed) if each.share == pytest.approx(share))
+@pytest.mark.parametrize(("seed", "speed"), [(4, 0.62), (4, 0.7), (8, 0.62), (16, 30.0), (20, 0.5)])
+def test_lines_outside_the_catalogue_are_as_accurate(seed, speed):
+    """Wires without bending stiffness, under trams and light trains: sigma was wrong by 1.0 to 1.8 %.
+
+    In the last two the maximum was, by 1.8 and 1.1 % of the mean force. speed: km/h, or a share of the wave
+    speed.
+    """
+    (case,) = (c for c in lines.drawn_cases(seed) if pytest.approx(speed) in (c.share, c.speed_kmh))
     (check,) = lines.check_case(case)
     assert not check.warned
     assert_within_bounds(check)
@@ -135,7 +135,7 @@ def test_a_grid_that_does_not_carry_the_waves_ahead_is_warned_of():
         pytest.param(
             case,
             id=f"{case.name}, {case.speed_kmh:.0f}",
-            marks=[pytest.mark.study if number % 6 else pytest.mark.slow, *BEYOND.get(case.name, ())],
+            marks=pytest.mark.study if number % 6 else pytest.mark.slow,
         )
         for number, case in enumerate(lines.every_case())
     ],

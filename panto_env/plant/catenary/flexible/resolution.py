@@ -54,9 +54,11 @@ SLOW = (
     (np.inf, np.inf, np.inf),
 )
 """Below a speed (m/s): a grid (m) that is fine enough, a time step (s) that is short enough."""
-LIMP_BELOW, LIMP_GRID, LIMP_NODES = from_kmh(200), 0.15, 0.2
-"""Below a speed (m/s) that shows how evenly a line yields: grid (m) for a contact wire without bending
-stiffness, which kinks within a grid, and nodes to which a kink, sqrt(EI / T) wide, must spread elsewhere."""
+LIMP = ((from_kmh(50), FINEST_GRID), (from_kmh(250), 0.15), (np.inf, np.inf))
+"""Below a speed (m/s), which shows how evenly a line yields: a grid (m) that is fine enough for a contact
+wire without bending stiffness, which kinks within it."""
+LIMP_NODES = 0.2
+"""Nodes to which a kink of another wire, sqrt(EI / T) wide, must spread at such speeds."""
 HARD_CONTACT_GRID = 0.15
 """Grid (m) for a hard contact."""
 HARD_CONTACT_ERROR = 20
@@ -155,9 +157,9 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
-    if slow < LIMP_BELOW:
-        wire = data.contact_wire
-        spacing = min(spacing, max(math.sqrt(wire.bending_stiffness / wire.tension) / LIMP_NODES, LIMP_GRID))
+    kink = math.sqrt(data.contact_wire.bending_stiffness / data.contact_wire.tension)
+    limp = next(grid for speed, grid in LIMP if slow < speed)
+    spacing = min(spacing, max(kink / LIMP_NODES, limp))
     spacing = min(spacing, max(carrying_grid(data, quick), FINEST_GRID))
     grid, step = _by_clamps(data)
     spacing, longest = min(spacing, grid), min(longest, step)
