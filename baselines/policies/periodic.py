@@ -28,7 +28,8 @@ class Periodic(TunableLaw):
     most of sigma, and its response to u is nearly linear, so that Gauss-Newton finds the coefficients.
 
     It needs to know line and pantograph (it is fitted to them), the place within the span, and the speed. It
-    does nothing against what differs from span to span; do not use it on another line.
+    does nothing against what differs from span to span; do not use it on another line. Where spans differ,
+    the series is over the share of the train's own span.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = SERIES_GAINS

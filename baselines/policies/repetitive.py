@@ -32,8 +32,11 @@ class Repetitive(TunableLaw):
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
-    learn. Where no sensor measures the place, ``place="counted"`` goes by the measured speed: what repeats
-    is learnt wherever the count begins, and learning follows the drift of a speed that is slightly wrong.
+    learn. Where spans differ, phi is the share of the train's own span, and learning goes at the rate of
+    spans of the mean length: it learns what stands at the same share of most spans, such as what supports
+    do, and takes the rest for noise. Where no sensor measures the place, ``place="counted"`` goes by the
+    measured speed: what repeats is learnt wherever the count begins, and learning follows the drift of a
+    speed that is slightly wrong.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {

@@ -288,14 +288,14 @@ class RunSettings(Numerics):
 def far_enough(settings: RunSettings) -> RunSettings:
     """Settings of a pass; without distance and spans it runs until its start has died out, and ten spans on.
 
-    The line gets as many spans as necessary, and enough more that its end has no influence.
+    The line gets as many spans as necessary, and enough more that its end has no influence. One that ends
+    after a sequence of spans keeps those, and the run goes to its last span.
     """
     line = settings.line
-    if settings.distance is not None or settings.spans is not None:
+    given = settings.distance is not None or settings.spans is not None
+    if given or line.most_spans == line.spans:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
-    if last >= line.most_spans:
-        return settings
     spans = last + line.clear_spans(settings.numerics, settings.runs, last)
     return settings.model_copy(update={"distance": line.alignment(last).length, "spans": spans})
 

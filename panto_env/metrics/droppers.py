@@ -1,4 +1,4 @@
-"""Forces in the droppers of a run, by their place in the span."""
+"""Forces in the droppers of a run, by their place in the span; one by one where spans differ."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ HEADINGS = {
 
 
 class MovingDropper(NamedTuple):
-    """The droppers at one place of all evaluated spans."""
+    """The droppers at one place of all evaluated spans, or one dropper of a line whose spans differ."""
 
     position: float  # from the support (m)
     largest: float  # over the whole evaluated run, wherever the train is (N)
     smallest: float  # over the whole evaluated run; 0 where slack (N)
     slack: float  # share of the time while the train is in the dropper's span (%)
+    span: int | None = None  # the dropper's, from 1, where spans differ
 
 
 def evaluated(run: Trajectory, spans: SpanChoice = None) -> tuple[Array, NDArray[np.intp]]:
@@ -51,14 +52,17 @@ def near_train(run: Trajectory, spans: SpanChoice = None) -> NDArray[np.bool_]:
 
 
 def moving_droppers(run: Trajectory, spans: SpanChoice = None) -> list[MovingDropper]:
-    """Droppers by their place in the span. Raises InputError as ``Trajectory.spans`` does."""
+    """Droppers by their place in the span, or one by one. Raises InputError as ``Trajectory.spans`` does."""
     force, own = evaluated(run, spans)
     near, places = near_train(run, spans), run.alignment.place(run.dropper_position[own])
+    number = run.alignment.span_of(run.dropper_position[own])
+    keys = np.stack([number if run.spans_differ else 0 * number, np.round(places, 6)], axis=1)
     found = []
-    for place in np.unique(np.round(places, 6)):
-        at = np.abs(places - place) < 1e-5
+    for span, place in np.unique(keys, axis=0):
+        at = (keys[:, 0] == span) & (np.abs(places - place) < 1e-5)
         forces, passing = force[:, at], near[:, at]
         if passing.any():
             slack = 100 * float((forces[passing] <= 0).mean())
-            found.append(MovingDropper(float(place), float(forces.max()), float(forces.min()), slack))
+            highest, lowest = float(forces.max()), float(forces.min())
+            found.append(MovingDropper(float(place), highest, lowest, slack, int(span) or None))
     return found

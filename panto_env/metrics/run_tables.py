@@ -12,6 +12,8 @@ from ..base.version import __version__
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
 from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
+from .by_span import HEADINGS as BY_SPAN
+from .by_span import by_span
 from .droppers import HEADINGS as MOVING
 from .droppers import moving_droppers
 from .labels import HEADINGS, LABELS
@@ -73,17 +75,28 @@ def figures(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
 def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     """Droppers by place in the span: at rest, and over the evaluated run. Raises InputError for no droppers.
 
+    Where spans differ, each dropper has a row of its own.
     Values at rest are those of the line as designed; they are missing for lines that have none.
     """
     rows: list[dict[str, Any]] = []
     for run in runs:
-        at_rest = {round(each["position"], 5): each for each in _at_rest(run.design)}
+        at_rest = {(each.get("span"), round(each["position"], 5)): each for each in _at_rest(run.design)}
         for moving in moving_droppers(run, spans):
-            known = at_rest.get(round(moving.position, 5), dict.fromkeys(("number", *AT_REST)))
-            rows.append(_of_run(run, spans) | known | moving._asdict())
+            unknown = dict.fromkeys(("number", *AT_REST))
+            known = at_rest.get((moving.span, round(moving.position, 5)), unknown)
+            own = moving._asdict()
+            if moving.span is None:
+                del own["span"]
+            rows.append(_of_run(run, spans) | known | own)
     if not rows:
         raise InputError("No forces in droppers are recorded, so there is no table of them.")
     return Sheet.of_rows("droppers", rows, {"speed_kmh": HEADINGS["speed_kmh"], **AT_REST, **MOVING})
+
+
+def of_spans(run: Trajectory, spans: SpanChoice = None) -> Sheet:
+    """Figures span by span. Raises InputError as ``Trajectory.summary`` does."""
+    rows = [_of_run(run, spans) | each._asdict() for each in by_span(run, spans)]
+    return Sheet.of_rows("by span", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_SPAN})
 
 
 def facts(run: Trajectory, without: str = "") -> Sheet:
@@ -110,6 +123,8 @@ def save_tables(run: Trajectory, path: str | Path, spans: SpanChoice = None) -> 
     sheets, without = [], ""
     try:
         sheets = [figures([run], spans)]
+        if run.spans_differ:
+            sheets.append(of_spans(run, spans))
         if run.dropper_force.size:
             sheets.append(droppers([run], spans))
     except InputError as error:

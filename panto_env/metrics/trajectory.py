@@ -98,6 +98,11 @@ class Trajectory:
     line: LineFacts = field(default_factory=LineFacts)
     design: Mapping[str, Any] = field(default_factory=dict)  # line and pantograph by value, plain data
 
+    @property
+    def spans_differ(self) -> bool:
+        """Whether the line is a sequence of spans, not one that is repeated."""
+        return self.alignment.pitch is None or bool(self.design.get("catenary", {}).get("sequence"))
+
     def summary(self, spans: SpanChoice = None) -> Figures:
         """Figures over spans (first, last), counted from 1 (EN 50318 takes 5 and 6), or "all".
 

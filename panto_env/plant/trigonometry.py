@@ -15,7 +15,7 @@ SINE = tuple((-1) ** k * _TURN ** (2 * k + 1) / math.factorial(2 * k + 1) for k 
 def sine_of_turns(turns):
     """sin(2 pi turns), within 1e-15 for |turns| below a million."""
     # The nearest half turn is subtracted; odd ones change the sign.
-    halves = math.floor(2.0 * turns + 0.5)
+    halves = int(math.floor(2.0 * turns + 0.5))  # noqa: RUF046  # on a GPU floor gives a float
     rest = turns - 0.5 * halves
     square = rest * rest
     total = SINE[10]

@@ -140,7 +140,8 @@ def stiffness(one: Findings) -> str:
 
     def draw(axes: Axes) -> None:
         axes.plot(places, 1e3 * lifts, color=BLUE)
-        axes.set(xlabel="place within the span (m)", ylabel="elasticity (mm/N)", xlim=(places[0], places[-1]))
+        place = "position along the line (m)" if one.run.spans_differ else "place within the span (m)"
+        axes.set(xlabel=place, ylabel="elasticity (mm/N)", xlim=(places[0], places[-1]))
         axes.set_ylim(bottom=0)
 
     return drawn(draw, 2.6)

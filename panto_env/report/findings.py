@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..catalog import unusual
+from ..metrics.by_span import SpanFigures, by_span
 from ..metrics.criterion import Criterion
 from ..metrics.droppers import MovingDropper, moving_droppers
 from ..metrics.figures import Figures, losses_of_contact
@@ -127,13 +128,20 @@ class Findings:
         ]
 
     @cached_property
+    def by_span(self) -> list[SpanFigures]:
+        """Figures of each evaluated span, or of all that the run covers, where spans differ."""
+        if not self.run.spans_differ:
+            return []
+        return by_span(self.run, "all" if self.covered is None else None)
+
+    @cached_property
     def at_rest(self) -> list[RestingDropper]:
-        """Droppers of a span of the line, as designed, at rest."""
+        """Droppers of a span of the line, or of all where they differ, as designed, at rest."""
         return droppers_at_rest(self.line)
 
     @cached_property
     def droppers(self) -> list[MovingDropper]:
-        """Droppers by place in the span: forces over the evaluated run."""
+        """Droppers by place in the span, or one by one where spans differ: forces over the evaluated run."""
         return moving_droppers(self.run, "all" if self.covered is None else None)
 
     @cached_property

@@ -60,14 +60,14 @@ LINES = """
 import warnings
 import sys
 sys.path.insert(0, {root!r})
-from tests.plant.test_nonsense import case_of, scaled
+from tests.plant.test_nonsense import case_of, made
 from panto_env import InputError, simulate
 ways = {{"finite": 0, "refused": 0}}
 for seed in range(40):
     case = case_of(seed)
     try:
-        line, pantograph = (scaled(*case[name]) for name in ("line", "pantograph"))
-        simulate(line, pantograph, case["speed_kmh"], seed=1, distance=4.5 * line.span_length,
+        line, pantograph = made(case)
+        simulate(line, pantograph, case["speed_kmh"], seed=1, distance=line.alignment().support(4.5),
                  line_condition=case["line_condition"], policy="p")
         ways["finite"] += 1
     except (InputError, ValueError):

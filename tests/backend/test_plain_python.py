@@ -17,6 +17,7 @@ import pytest
 import panto_env
 from panto_env.backend import JIT
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 
 pytestmark = pytest.mark.plain
 
@@ -79,6 +80,24 @@ def drifting_run():
     return [run.contact_force.tolist(), run.position.tolist()]
 
 
+def uneven_run():
+    """Short spans that differ: a window that travels, and the whole line with a hard spot."""
+    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table["steady_arm"] |= {"stiffness": 300.0, "mass": 0.9}
+    table["droppers"] |= {"contact_clamp_mass": 0.2}
+    spans = [{"span_length": length} for length in (12.0, 14.3, 11.1, 13.7, 12.9)]
+    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans})
+    settings = {"precision": "double", "distance": 62.0, "spacing": 0.5, "time_step": 2e-3}
+    conditions = {3: {"raised_supports": [(2, 0.02)]}, 0: {"hard_spots": [(3, 4.2, 2.0, 100.0)]}}
+    found = []
+    for window, condition in conditions.items():
+        run = panto_env.simulate(
+            line, "en50318-2002", window=window or None, line_condition=condition, **settings
+        )
+        found += [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+    return found
+
+
 def rig_run():
     """A rig's computer and cylinder."""
     run = panto_env.simulate(catenary="rig", distance=8.0, speed_kmh=200)
@@ -103,6 +122,7 @@ RUNS = {
     **{name: partial(observations, name) for name in CASES},
     "a window that moves along a line": passive_run,
     "a speed that drifts": drifting_run,
+    "spans that differ": uneven_run,
     "a rig": rig_run,
     "several lanes": several_lanes,
 }

@@ -245,3 +245,37 @@ def test_a_policy_sees_its_own_span_and_its_length():
         assert observation[[sine, cosine]] == pytest.approx((np.sin(turns), np.cos(turns)), abs=0.08)
         inside = min(x - supports[k], supports[k + 1] - x) > 0.5
         assert not inside or 50 * observation[length] == pytest.approx(MIXED[k])
+
+
+APPLIED = load_pantograph("dsa380").model_copy(update={"force": "applied"})
+"""With its static force as it is: no mean is aimed at."""
+
+
+def climbing(slope):
+    """A line whose contact wire rises by so much per metre from the tenth support on."""
+    line, supports = load_catenary("benchmark-2015"), np.arange(26) * 55.0
+    heights = np.interp(supports, [550.0, 1375.0], [0.0, slope * 825.0])
+    spans = [{"contact_height": float(height)} for height in heights[:-1]]
+    table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    end = {"contact_height": float(heights[-1])}
+    return FlexibleCatenaryData.model_validate(table | {"sequence": spans, "end_support": end})
+
+
+def test_a_climb_costs_the_damping_to_ground_times_its_speed():
+    """2 per mille at 250 km/h: 0.14 m/s times 70 N s/m."""
+    pantograph = APPLIED
+    level, climb = (simulate(climbing(slope), pantograph, 250).summary((16, 23)) for slope in (1e-9, 2e-3))
+    spring, damper = pantograph.stiffnesses[-1], pantograph.dampings[-1]
+    height = 2e-3 * 55 * (0.5 * (15 + 23) - 10)
+    expected = -damper * 250 / 3.6 * 2e-3 - spring * height
+    assert expected < -9
+    assert climb.mean - level.mean == pytest.approx(expected, abs=0.3)
+
+
+def test_a_high_wire_is_no_end_of_a_run():
+    heights = [0.0] * 8 + [0.1, 0.2, 0.3, 0.4] + [0.5] * 8
+    line = load_catenary("benchmark-2015").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    line |= {"sequence": [{"contact_height": height} for height in heights]}
+    run = simulate(FlexibleCatenaryData.model_validate(line), APPLIED, 160)
+    assert not run.terminated
+    assert run.head[-1] > 0.45

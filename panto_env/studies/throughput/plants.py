@@ -14,6 +14,7 @@ from ...catalog import load_catenary
 from ...control import Task
 from ...control.settings import run_settings
 from ...envs import IDS
+from ...plant.catenary.flexible import FlexibleCatenaryData
 from ...plant.state import Row
 
 COUNTED = "Pantograph-v0"
@@ -24,6 +25,8 @@ LINE_SPANS = 12
 WINDOWS = (3, 5, 8, 10, 0)
 """Spans computed about the train; 0: the whole line."""
 MODES = (10, 20, 40, 80)
+SECTION = 5 * (50.0, 65.0, 55.0, 70.0, 60.0, 60.0)
+"""Lengths of spans (m) of a line whose spans differ; their mean is that of the line with equal ones."""
 DISCRETISATIONS: tuple[dict[str, Any], ...] = (
     {},
     {"precision": "double"},
@@ -108,7 +111,28 @@ def cost_of_settings(repeats: int, report: Report) -> dict[str, list[dict[str, A
             "time_step": task.plant.time_step,
         }
         discretisations.append(grid | {"precision": "single" if in_single(task) else "double"} | speed)
-    return {"spans": spans, "modes": modes, "discretisation": discretisations}
+    lines = []
+    for what, entry in _lines().items():
+        speed, _ = measured({"catenary": entry, "distance": 27 * entry.stride}, what)
+        lines.append({"line": what} | speed)
+    return {"spans": spans, "modes": modes, "discretisation": discretisations, "lines": lines}
+
+
+def _lines() -> dict[str, FlexibleCatenaryData]:
+    """The same wires and droppers in equal spans and in spans that differ, as many of them."""
+    line = load_catenary(IDS[COUNTED].get("catenary", "en50318-2002"))
+    assert isinstance(line, FlexibleCatenaryData)
+    table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    spans = [{"span_length": length, "droppers": {"positions": _spread(line, length)}} for length in SECTION]
+    return {
+        "equal spans": line.model_copy(update={"spans": len(SECTION)}),
+        "spans that differ": FlexibleCatenaryData.model_validate(table | {"sequence": spans}),
+    }
+
+
+def _spread(line: FlexibleCatenaryData, length: float) -> list[float]:
+    """Places of as many droppers in a span of another length (m)."""
+    return [place * length / line.span_length for place in line.droppers.positions]
 
 
 def in_single(task: Task) -> bool:

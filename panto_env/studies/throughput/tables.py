@@ -74,6 +74,11 @@ def details(result: Row) -> list[Table | str]:
         )
         for row in scaling["discretisation"]
     ]
+    lines = scaling.get("lines", [])  # older results have none
+    of_lines = [
+        (f"{row['line']}, {row['times_real_time'] / lines[0]['times_real_time']:.2f} of the speed", row)
+        for row in lines
+    ]
     environments = [(_environment(row), row) for row in result["environments"]]
     cores = [(f"{_environment(row)}, {_count(row['cores'], 'core')}", row) for row in scaling["cores"]]
     return [
@@ -82,6 +87,7 @@ def details(result: Row) -> list[Table | str]:
         _plants(f"Spans computed of {flexible}", "spans", spans),
         _plants("Modes of the three-span catenary", "modes", modes),
         _plants(f"Speed, accuracy and precision of {flexible}", "speed, accuracy, grid, step", grids),
+        *([_plants("Lines, their window travelling", "line", of_lines)] if lines else []),
         _environments("Environments", environments),
         _environments("Vector environments by cores", cores)
         if cores

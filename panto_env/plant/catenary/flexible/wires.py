@@ -44,7 +44,7 @@ def rise_by_defects(pieces, breaks, decay, x):
 def locate(x, spacing, rows):
     """Row and segment of the first of four nodes around x (m from the window's start), and their weights."""
     ratio = x / spacing
-    left = min(max(math.floor(ratio), 0), rows * WIDTH - 1)
+    left = min(max(int(math.floor(ratio)), 0), rows * WIDTH - 1)  # noqa: RUF046  # on a GPU it is a float
     segment = segment_of(left - 1, rows)
     return row_of(left - 1, segment, rows), segment, cubic_weights(ratio - left)
 
