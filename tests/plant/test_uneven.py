@@ -279,3 +279,18 @@ def test_a_high_wire_is_no_end_of_a_run():
     run = simulate(FlexibleCatenaryData.model_validate(line), APPLIED, 160)
     assert not run.terminated
     assert run.head[-1] > 0.45
+
+
+def test_lanes_of_a_vector_environment_equal_single_ones():
+    settings = {"catenary": line_of(MIXED), "line_condition": "as-built", "speed_kmh": (200, 260)}
+    envs = gymnasium.make_vec("Pantograph-v0", num_envs=2, **settings)
+    singles = [gymnasium.make("Pantograph-v0", **settings) for _ in range(2)]
+    seen = [env.reset(seed=5 + lane)[0] for lane, env in enumerate(singles)]
+    np.testing.assert_array_equal(envs.reset(seed=5)[0], seen)
+    for step in range(300):
+        actions = np.full((2, 1), 0.2 * np.sin(step / 5), dtype=np.float32)
+        observations, rewards, *_ = envs.step(actions)
+        for env, action, observation, reward in zip(singles, actions, observations, rewards, strict=True):
+            alone, own, *_ = env.step(action)
+            np.testing.assert_array_equal(alone, observation)
+            assert own == reward
