@@ -301,7 +301,7 @@ def test_the_rules_for_print_keep_headings_with_their_tables(found):
     rules = page([found]).partition("@media print")[2].partition("</style>")[0]
     for name in ("h2", "h3", "caption", "figcaption", "thead"):
         assert re.search(rf"\b{name}\b[^{{}}]*{{ break-after: avoid; }}", rules), name
-    for table in ("#requirements", "#figures", "#losses", ".uplift", ".droppers"):
+    for table in ("#requirements", "#figures", "#losses", ".uplift", ".droppers", ".at-rest"):
         assert re.search(rf"{table}\b[^{{}}]*{{ break-inside: avoid; }}", rules), table
 
 
