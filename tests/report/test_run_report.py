@@ -332,3 +332,17 @@ def test_no_table_of_a_printed_report_is_away_from_its_heading(file, tmp_path):
         ]
         assert at, heading
         assert any(last in pages[k] for k in at), f"{heading} is on page {at}, its table is not"
+
+
+def test_a_folded_force_is_that_of_the_same_place_of_every_evaluated_span(found):
+    """Looked up again at one place of each span."""
+    one = found
+    folded, run = one.folded, one.run
+    first, last = one.covered
+    for share in (0.0, 0.25, 0.75):
+        places = [run.alignment.support(span - 1) + share * 60.0 for span in range(first, last + 1)]
+        force = np.interp(places, run.position, one.filtered)
+        k = np.abs(folded.share - share).argmin()
+        assert folded.share[k] == share
+        assert (folded.low[k], folded.high[k]) == pytest.approx((force.min(), force.max()))
+        assert folded.median[k] == pytest.approx(np.median(force))
