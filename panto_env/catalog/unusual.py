@@ -63,7 +63,7 @@ def remarks(entry: Any, usual: Ranges) -> list[str]:
 
 def _hogging(line: FlexibleCatenaryData) -> Iterator[str]:
     """A sentence where the contact wire stands above its supports, or above the outer droppers."""
-    each: Iterable[FlexibleCatenaryData | Span] = spans_of(line).each if line.sequence else (line,)
+    each = spans_of(line, 1).each
     for number, span in enumerate(each, start=1):
         sag = span.droppers.sag
         outer = min(sag[0], sag[-1])

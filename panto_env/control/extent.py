@@ -17,14 +17,12 @@ def spans(settings: RunSettings) -> int | None:
     """Number of spans: as given, or as many as the distance needs, at least the line's own; None: its own."""
     line = settings.line
     if settings.spans is not None or settings.distance is None:
-        more = math.ceil(settings.settle)
-        more = min(more, line.most_spans - line.spans)
+        more = 0 if line.ends else math.ceil(settings.settle)
         return line.spans + more if settings.spans is None and more else settings.spans
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
-    most = line.most_spans
-    clear = line.clear_spans(settings.numerics, settings.runs, last) if last >= line.spans else 1
-    if most < MOST_SPANS:
-        clear = 0  # a line that ends has an anchor there, and a train may run up to it
+    most, clear = (line.spans, 0) if line.ends else (MOST_SPANS, 1)  # a train may run up to a line's end
+    if not line.ends and last >= line.spans:
+        clear = line.clear_spans(settings.numerics, settings.runs, last)
     needed = last + clear
     if needed > most:
         longest = line.alignment().support(most - clear)

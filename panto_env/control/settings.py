@@ -293,7 +293,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
     """
     line = settings.line
     given = settings.distance is not None or settings.spans is not None
-    if given or line.most_spans == line.spans:
+    if given or line.ends:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
     spans = last + line.clear_spans(settings.numerics, settings.runs, last)

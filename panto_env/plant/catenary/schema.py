@@ -69,9 +69,9 @@ class CatenaryData(Settings):
         return self.sources.get(name, NO_SOURCE if name in self.model_fields_set else BY_DEFAULT)
 
     @property
-    def most_spans(self) -> int:
-        """Maximum number of spans of a run."""
-        return MOST_SPANS
+    def ends(self) -> bool:
+        """Whether no wire goes on after the line's own spans; else a run may have more of them."""
+        return False
 
     @property
     def contact_heights(self) -> tuple[float, ...]:

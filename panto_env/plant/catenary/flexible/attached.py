@@ -70,9 +70,7 @@ def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung][:spans])
 
 
-def springs_of(
-    each: Sequence[FlexibleCatenaryData | Span], places: Array, step: float, spots: Array
-) -> Springs:
+def springs_of(each: Sequence[Span], places: Array, step: float, spots: Array) -> Springs:
     """At each mast the contact wire's steady arm, then the messenger's support; after all masts, hard spots.
 
     each: the span that begins at each mast. places: of the masts, in nodes. step: s. spots: stiffness of hard
@@ -98,9 +96,7 @@ def springs_of(
     )
 
 
-def links_of(
-    data: FlexibleCatenaryData, each: Sequence[FlexibleCatenaryData | Span], shape: StaticShape
-) -> Links:
+def links_of(data: FlexibleCatenaryData, each: Sequence[Span], shape: StaticShape) -> Links:
     """The droppers of these spans, whose static shape is ``shape``, or repeats it."""
     droppers = [span.droppers for span in each]
     counts = [len(own.positions) for own in droppers]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from .arrays import PAD, FlexibleLine, FlexibleWire
 from .attached import links_of, springs_of
 from .grid import nodes_per_span, stencil_weights
 from .on_grid import in_equal_rows, on_grid
-from .parts import Span
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
@@ -62,7 +60,7 @@ def constants(
             f"the maximum is {MOST_NODES:,}, so take a coarser spacing or a smaller window."
         )
     x = dx * (np.arange(count) - PAD)
-    each: Sequence[FlexibleCatenaryData | Span] = spans_of(data).each if differ else (data,) * covered
+    each = spans_of(data, covered).each
     masts = (
         np.array(data.alignment(covered).supports[1:-1]) / dx
         if differ
@@ -86,7 +84,7 @@ def constants(
         window=window,
         rows=rows,
         shape=tensioned.shape[None],
-        shape_length=data.alignment().length if differ else data.span_length,
+        shape_length=data.period,
         rise=np.zeros((1, 0, 5)),
         rise_breaks=np.zeros(0),
         rise_decay=np.zeros(1),
@@ -124,10 +122,9 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
         [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
     ]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
-    length = data.alignment().length if data.sequence else data.span_length
-    table = int(np.ceil(length / SHAPE_SPACING)) + 1
+    table = int(np.ceil(data.period / SHAPE_SPACING)) + 1
     return Tensioned(
-        shape=shape.contact.height(np.linspace(0, length, table)),
+        shape=shape.contact.height(np.linspace(0, data.period, table)),
         stencil=np.array(stencil),
         absorbing=(courant - 1) / (courant + 1),
     )

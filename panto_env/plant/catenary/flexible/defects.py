@@ -58,7 +58,7 @@ class DefectiveLine:
 
         Raises InputError for what a line of so many spans has not.
         """
-        each: Sequence[FlexibleCatenaryData | Span] = spans_of(data).each if data.sequence else [data] * spans
+        each = spans_of(data, spans).each
         alignment = data.alignment(spans)
         left = with_tension_left(data, condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
@@ -202,7 +202,7 @@ class DefectiveLine:
 
 
 def _divided(
-    span: FlexibleCatenaryData | Span, own: WireDefects, nodes: Sequence[float], begin: float | None = None
+    span: Span, own: WireDefects, nodes: Sequence[float], begin: float | None = None
 ) -> tuple[Array, Array, Index]:
     """Limits and lengths of the pieces of a span (m), and at which limits its droppers hang.
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ....base.table import Table
-from .parts import Span
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import hang
@@ -75,10 +74,9 @@ def droppers_at_rest(line: Any) -> list[RestingDropper]:
     shape = hang(line)
     stretch = shape.dropper_tension / shape.dropper_stiffness
     rows = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
-    each: Sequence[FlexibleCatenaryData | Span] = spans_of(line).each if line.sequence else [line]
     return [
         RestingDropper(number, position, sag, *next(rows), number_of_span)
-        for number_of_span, span in enumerate(each, start=1)
+        for number_of_span, span in enumerate(spans_of(line, 1).each, start=1)
         for number, (position, sag) in enumerate(
             zip(span.droppers.positions, span.droppers.sag, strict=True), start=1
         )

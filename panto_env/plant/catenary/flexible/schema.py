@@ -129,18 +129,23 @@ class FlexibleCatenaryData(CatenaryData):
     @property
     def dropper_tables(self) -> tuple[Droppers, ...]:
         """The droppers of each span of a sequence, or of the one span that is repeated."""
-        return tuple(span.droppers for span in spans_of(self).each) if self.sequence else (self.droppers,)
+        return tuple(span.droppers for span in spans_of(self, 1).each)
 
     @property
     def contact_heights(self) -> tuple[float, ...]:
         """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
-        heights = spans_of(self).contact_heights if self.sequence else ()
+        heights = spans_of(self, 1).contact_heights
         return heights if any(heights) else ()
 
     @property
-    def most_spans(self) -> int:
-        """Maximum number of spans of a run: where a sequence ends, no wire goes on."""
-        return self.spans if self.sequence else super().most_spans
+    def ends(self) -> bool:
+        """Whether no wire goes on after the line's own spans: where a sequence ends, none does."""
+        return bool(self.sequence)
+
+    @property
+    def period(self) -> float:
+        """Length after which the line as designed repeats (m): a span, or all of a sequence."""
+        return self.alignment().length if self.sequence else self.span_length
 
     @property
     def stride(self) -> float:

@@ -104,6 +104,11 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
 
     Raises InputError, naming the type or the span, for one that cannot be.
     """
+    if not line.sequence:
+        count = line.spans if spans is None else spans
+        names = (name for name in Span.model_fields if name != "contact_height")
+        one = Span.model_construct(**{name: getattr(line, name) for name in names})  # valid in the line
+        return Spans((one,) * count, (0.0,) * (count + 1), (line.encumbrance,) * (count + 1))
     own = {
         "span_length": line.span_length,
         "encumbrance": line.encumbrance,
@@ -111,10 +116,6 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
         "support": line.support.model_dump(),
         "steady_arm": line.steady_arm.model_dump(),
     }
-    if not line.sequence:
-        count = line.spans if spans is None else spans
-        each = (Span.model_validate(own),) * count
-        return Spans(each, (0.0,) * (count + 1), (line.encumbrance,) * (count + 1))
     types = {
         name: _changed(own, changes, f"type '{name}' in span_types")
         for name, changes in line.span_types.items()

@@ -59,12 +59,10 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
     """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
     was, now = solve(designed), solve(left)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
+    arms = [span.steady_arm for span in spans_of(designed, 1).each]
     if designed.sequence:
-        arms, places = [span.steady_arm for span in spans_of(designed).each], designed.alignment().supports
         arms.append(arms[-1])
-    else:
-        arms, places = [designed.steady_arm], (0.0,)
-    x = np.array(places)
+    x = np.array(designed.alignment().supports[: len(arms)])
     lift: Any = np.array([arm.stiffness for arm in arms]) * (was.contact.height(x) - now.contact.height(x))
     lift[[arm.holds_wire for arm in arms]] += was.arm_force - now.arm_force
     return Misfit(
