@@ -18,7 +18,7 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
-from .line_values import LINE_CENTRES, LINE_ENTRIES
+from .line_values import LINE_CENTRES, LINE_ENTRIES, SPAN_LENGTH
 from .state import NOW, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
@@ -169,13 +169,13 @@ def _speed(episode, own, task, now, number):
     return now[NOW.SPEED]
 
 
-@entries(MEASURED, lambda options: [(*LINE_ENTRIES[0], 0)] if options.line_values else [])
+@entries(MEASURED, lambda options: [(*SPAN_LENGTH, 0)] if options.line_values else [])
 def _span_length(episode, own, task, now, number):
     return episode.alignment.mean_length / mean_over_own_length(episode.alignment, now[NOW.SPANS])
 
 
 def _line_values(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    return [(*each, row) for row, each in enumerate(LINE_ENTRIES) if row > 0] if options.line_values else []
+    return [(*each, row) for row, each in enumerate(LINE_ENTRIES)] if options.line_values else []
 
 
 @entries(MEASURED, _line_values)

@@ -9,8 +9,9 @@ from ..base.errors import InputError
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.flexible import FlexibleCatenaryData
 
+SPAN_LENGTH = ("span length", 50.0, "m")
+"""Name, scale and unit of the length of the span that the train is in."""
 LINE_ENTRIES = (
-    ("span length", 50.0, "m"),
     ("wave speed", 150.0, "m/s"),
     ("contact wire tension", 20e3, "N"),
     ("messenger wire tension", 20e3, "N"),
@@ -18,7 +19,7 @@ LINE_ENTRIES = (
     ("messenger wire mass", 1.0, "kg/m"),
     ("droppers of a span", 10.0, "-"),
 )
-"""Name, scale and unit of each value. The span length is that of the span that the train is in."""
+"""Name, scale and unit of each value of the whole line."""
 LINE_CENTRES = {
     "span length": (55.0, 8.0),
     "wave speed": (140.0, 14.0),
@@ -41,7 +42,6 @@ def line_values(line: CatenaryData) -> Array:
     contact, messenger = line.contact_wire, line.messenger_wire
     return np.array(
         [
-            line.alignment().mean_length,
             contact.wave_speed,
             contact.tension,
             messenger.tension,
