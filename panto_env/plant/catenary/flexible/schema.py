@@ -14,7 +14,7 @@ from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
-from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Span, SteadyArm, Support, check_inside
+from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Overlap, Span, SteadyArm, StitchWire, Support, check_inside
 from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 
@@ -23,13 +23,15 @@ __all__ = [
     "Droppers",
     "EndSupport",
     "FlexibleCatenaryData",
+    "Overlap",
     "Rayleigh",
     "Span",
     "SteadyArm",
+    "StitchWire",
     "Support",
 ]
 
-SEQUENCE = {"span_types", "sequence", "end_support"}
+SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}
 """Values of a line whose spans differ."""
 
 
@@ -54,11 +56,14 @@ class FlexibleCatenaryData(CatenaryData):
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
+    stitch_wire: StitchWire | None = Field(
+        None, description="at every support; without it all droppers hang from the messenger"
+    )
     damping: Rayleigh
     span_types: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
         description="types of spans by name: tables of what differs from the line's own span_length, "
-        "encumbrance, droppers, support and steady_arm, and contact_height at the span's first support",
+        "encumbrance, droppers, support, steady_arm and stitch_wire, and contact_height at the span's first support",
     )
     sequence: tuple[str | dict[str, Any], ...] = Field(
         (),
@@ -67,6 +72,9 @@ class FlexibleCatenaryData(CatenaryData):
     )
     end_support: EndSupport | None = Field(
         None, description="heights at the last support of a sequence, by default those of its last span"
+    )
+    overlaps: tuple[Overlap, ...] = Field(
+        (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
 
     def __hash__(self) -> int:
@@ -94,12 +102,14 @@ class FlexibleCatenaryData(CatenaryData):
                 )
         line = handler(table)
         if not line.sequence:
-            if line.span_types or line.end_support is not None:
-                raise InputError("A line with span_types or an end_support needs a sequence of its spans.")
+            if line.span_types or line.end_support is not None or line.overlaps:
+                raise InputError(
+                    "A line with span_types, overlaps or an end_support needs a sequence of its spans."
+                )
             return line
         found = spans_of(line)
         alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
-        if not alike or len(set(found.encumbrances)) > 1:
+        if not alike or len(set(found.encumbrances)) > 1 or line.overlaps:
             return line
         names = (name for name in Span.model_fields if name != "contact_height")
         one = {name: getattr(found.each[0], name) for name in names}

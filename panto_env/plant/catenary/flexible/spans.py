@@ -116,6 +116,8 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
         "support": line.support.model_dump(),
         "steady_arm": line.steady_arm.model_dump(),
     }
+    if line.stitch_wire is not None:
+        own["stitch_wire"] = line.stitch_wire.model_dump()
     types = {
         name: _changed(own, changes, f"type '{name}' in span_types")
         for name, changes in line.span_types.items()
@@ -150,9 +152,9 @@ def _changed(own: Table, changes: Any, where: str) -> Span:
     if not isinstance(changes, Mapping):
         raise InputError(f"The {where} must be a table of a span's values.")
     table = {**own, **changes}
-    for key in ("support", "steady_arm"):
+    for key in ("support", "steady_arm", "stitch_wire"):
         if isinstance(changes.get(key), Mapping):
-            table[key] = {**own[key], **changes[key]}
+            table[key] = {**own.get(key, {}), **changes[key]}
     try:
         table["droppers"] = _droppers(own, changes.get("droppers", {}), table["span_length"])
         return _valid(Span, table, "")
