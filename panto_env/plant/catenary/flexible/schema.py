@@ -153,6 +153,11 @@ class FlexibleCatenaryData(CatenaryData):
         return bool(self.sequence)
 
     @property
+    def one_by_one(self) -> bool:
+        """Whether what hangs on the wires is laid out on the grid one by one, not in rows alike in all spans."""
+        return bool(self.sequence) or self.stitch_wire is not None
+
+    @property
     def period(self) -> float:
         """Length after which the line as designed repeats (m): a span, or all of a sequence."""
         return self.alignment().length if self.sequence else self.span_length
