@@ -130,9 +130,7 @@ class DefectiveLine:
         unused[:: self._per_node] = unused[1 :: self._per_node] = False
         unused[2 :: self._per_node] = unused[3 :: self._per_node] = False
         for k in range(len(stitches.support)):
-            first, last = (
-                int(np.argmin(np.abs(places - end[k]))) for end in (stitches.begin, stitches.end)
-            )
+            first, last = (int(np.argmin(np.abs(places - end[k]))) for end in (stitches.begin, stitches.end))
             rope = above[first:last] + 2  # its nodes are the messenger's, but for its ends
             unused[np.unique(rope)] = False
             unused[[rope[0, 0], rope[-1, 2]]] = True

@@ -94,7 +94,9 @@ def record_scattered(line, wire, lane, uplift, tension):
     if tension.size > 0:
         first = line.link_row.size
         _record_links(line.scattered.links, links, wire, lane, first, tension)
-        _record_links(line.scattered.hung, wire.scattered.hung, wire, lane, first + links.node.shape[1], tension)
+        _record_links(
+            line.scattered.hung, wire.scattered.hung, wire, lane, first + links.node.shape[1], tension
+        )
 
 
 @inlined

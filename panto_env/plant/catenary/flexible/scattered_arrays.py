@@ -96,7 +96,9 @@ class Scattered(NamedTuple):
     stitches: AlongLine
     upper: Index  # (hung,): node of the stitch wire before the upper end
     carrying: Index  # (hung,): number of the stitch wire
-    deficit: Array  # (wires, nodes): weight of a slope in a node's step, for missing tension (-); none if none
+    deficit: (
+        Array  # (wires, nodes): weight of a slope in a node's step, for missing tension (-); none if none
+    )
     stiff_arms: bool  # whether any steady arm is a spring
 
 
@@ -107,7 +109,9 @@ class ScatteredWindow(NamedTuple):
     links: InWindow
     hung: InWindow
     stitches: InWindow
-    deficit: Array  # (lanes, wires, rows + 2 PAD, WIDTH), as ``Scattered`` has it; no rows without stitch wires
+    deficit: (
+        Array  # (lanes, wires, rows + 2 PAD, WIDTH), as ``Scattered`` has it; no rows without stitch wires
+    )
     # Nodes of stitch wires, from clamp to clamp, those of set after set.
     displacement: Array  # (lanes, sets times nodes, WIDTH): m
     increment: Array  # (lanes, sets times nodes, WIDTH): m

@@ -14,7 +14,18 @@ from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
-from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Overlap, Span, SteadyArm, StitchWire, Support, check_inside
+from .parts import (
+    CLOSEST,
+    Droppers,
+    Encumbrance,
+    EndSupport,
+    Overlap,
+    Span,
+    SteadyArm,
+    StitchWire,
+    Support,
+    check_inside,
+)
 from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 

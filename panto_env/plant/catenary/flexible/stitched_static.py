@@ -47,7 +47,9 @@ class StitchedMessenger:
         self._loads: list[tuple[Any, Any]] = []  # unknowns, and forces and moments on them
         self._pieces: list[tuple[Any, Any, Beams, Array]] = []  # of the messenger
 
-        unknowns = np.stack([self._height[:-1], self._height[:-1] + 1, self._height[1:], self._height[1:] + 1])
+        unknowns = np.stack(
+            [self._height[:-1], self._height[:-1] + 1, self._height[1:], self._height[1:] + 1]
+        )
         lengths = np.diff(self.breaks)
         tensions = wire.tension - stitches.deficit(self.breaks[:-1], self.breaks[1:])
         self._decay = np.zeros(len(lengths))
@@ -91,9 +93,7 @@ class StitchedMessenger:
         self._loads.append((unknowns, beams.end_loads(bulge)))
         return beams, bulge
 
-    def _add_rope(
-        self, stitches: Stitches, k: int, x: Array, ends: tuple[float, float], slopes: Any
-    ) -> None:
+    def _add_rope(self, stitches: Stitches, k: int, x: Array, ends: tuple[float, float], slopes: Any) -> None:
         """Add a stitch wire; where the line is cut in its middle, it goes on at the slope there."""
         begin, end, (first, last) = stitches.begin[k], stitches.end[k], ends
         hung = np.flatnonzero(stitches.carrying == k)
