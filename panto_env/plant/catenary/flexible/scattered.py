@@ -139,7 +139,7 @@ def take_window(line, wire, lane):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
                 _rest(line, wire, lane, scattered.links, held.links, n, first)
             n += 1
-        if scattered.deficit.shape[1] > 0:
+        if scattered.deficit.size > 0:
             _take_stitches(line, wire, lane, start, end, at_start, at_end)
 
 
@@ -148,12 +148,11 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
     """Take in stitch wires, and the droppers that hang from them."""
     scattered, held = line.scattered, wire.scattered
     deficit, last = held.deficit[lane], line.rows * WIDTH
-    for w in range(deficit.shape[0]):
-        for i in range(deficit.shape[1]):
-            for j in range(WIDTH):
-                local = j * line.rows + i - PAD
-                inside = local > 0 and local < last
-                deficit[w, i, j] = scattered.deficit[w, start + local + PAD] if inside else 0.0
+    for i in range(deficit.shape[0]):
+        for j in range(WIDTH):
+            local = j * line.rows + i - PAD
+            inside = local > 0 and local < last
+            deficit[i, j] = scattered.deficit[start + local + PAD] if inside else 0.0
     _leave(scattered.stitches, held.stitches, lane, start, at_start)
     n = held.stitches.begin[lane] & NOT_NEGATIVE
     sets, nodes = held.stitches.node.shape[1], scattered.stitches.empty.size - STITCH.INERTIA

@@ -96,9 +96,8 @@ class Scattered(NamedTuple):
     stitches: AlongLine
     upper: Index  # (hung,): node of the stitch wire before the upper end
     carrying: Index  # (hung,): number of the stitch wire
-    deficit: (
-        Array  # (wires, nodes): weight of a slope in a node's step, for missing tension (-); none if none
-    )
+    deficit: Array  # (nodes,): weight in a node's step of the messenger's slope from the node before, by the
+    # tension that stitch wires take from it (-); none without them
     stiff_arms: bool  # whether any steady arm is a spring
 
 
@@ -109,9 +108,9 @@ class ScatteredWindow(NamedTuple):
     links: InWindow
     hung: InWindow
     stitches: InWindow
-    deficit: (
-        Array  # (lanes, wires, rows + 2 PAD, WIDTH), as ``Scattered`` has it; no rows without stitch wires
-    )
+    # Of the messenger, as ``Scattered`` has it, and a node's step by it; no rows without stitch wires.
+    deficit: Array  # (lanes, rows + 2 PAD, WIDTH)
+    missing: Array  # (lanes, rows + 2 PAD, WIDTH): scratch (m)
     # Nodes of stitch wires, from clamp to clamp, those of set after set.
     displacement: Array  # (lanes, sets times nodes, WIDTH): m
     increment: Array  # (lanes, sets times nodes, WIDTH): m

@@ -44,7 +44,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             stitches=without[0],
             upper=none,
             carrying=none,
-            deficit=bare.astype(real),
+            deficit=np.zeros(0, real),
             stiff_arms=False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
@@ -135,11 +135,8 @@ def _stitches(grid: OnGrid, real: Any) -> AlongLine:
 
 def _deficit(grid: OnGrid, real: Any) -> Array:
     """Weights of slopes for the tension that stitch wires take from the messenger."""
-    if not grid.ropes.intervals:
-        return np.zeros((2, 0), real)
-    weights = np.zeros(grid.mobility.shape)
-    weights[MESSENGER] = grid.ropes.deficit
-    return np.asarray(weights * grid.slope_mobility, dtype=real)
+    missing = grid.ropes.deficit * grid.slope_mobility[MESSENGER]
+    return np.asarray(missing if grid.ropes.intervals else missing[:0], dtype=real)
 
 
 def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
@@ -154,7 +151,8 @@ def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
         links=_room(line, along.links, lanes),
         hung=_room(line, along.hung, lanes, HUNG_NODES),
         stitches=stitches,
-        deficit=np.zeros((lanes, 2, rows, WIDTH), real),
+        deficit=np.zeros((lanes, rows, WIDTH), real),
+        missing=np.zeros((lanes, rows, WIDTH), real),
         displacement=np.zeros((lanes, nodes, WIDTH), real),
         increment=np.zeros((lanes, nodes, WIDTH), real),
         clamp_force=np.zeros((lanes, 2 * sets, WIDTH), real),

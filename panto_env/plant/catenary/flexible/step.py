@@ -36,7 +36,7 @@ from .scattered import (
 )
 from .scattered_arrays import LINK
 from .segments import shift_nodes
-from .stitched import advance_stitches, pull_clamps, stretch_of_hung
+from .stitched import advance_stitches, pull_messenger, stretch_of_hung
 from .wires import (
     apply_springs,
     deflection,
@@ -106,8 +106,8 @@ def _advance(line, wire, lane):
     stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
     advance_stitches(held, lane, u, d, stencil[MESSENGER])
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], inertia[w], held.deficit[lane, w], stencil[w])
-    pull_clamps(held, lane, u, d)
+        leapfrog(u[w], d[w], inertia[w], stencil[w])
+    pull_messenger(held, lane, u, d, inertia[MESSENGER])
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
     pull_links(line, wire, lane)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....backend import gather, inlined, load_row, scatter_add, store_row
-from .arrays import CONTACT, MESSENGER
+from .arrays import CONTACT, MESSENGER, PAD
 from .scattered import displacement_at, move_nodes
 from .scattered_arrays import HUNG, STITCH
 
@@ -19,10 +19,11 @@ def _at_clamp(x, node, constants, clamp):
 
 @inlined
 def advance_stitches(held, lane, u, d, stencil):
-    """One step of the stitch wires, and the forces at their clamps; the messenger is still as it was.
+    """One step of the stitch wires, and the forces on the messenger, which is still as it was.
 
     stencil: of the messenger, whose damping is the same.
     """
+    _find_missing_tension(held, lane, u[MESSENGER], d[MESSENGER], stencil[3])
     stitches = held.stitches
     sets = stitches.node.shape[1]
     intervals = stitches.constants.shape[2] - STITCH.INERTIA - 1
@@ -51,8 +52,29 @@ def advance_stitches(held, lane, u, d, stencil):
 
 
 @inlined
-def pull_clamps(held, lane, u, d):
-    """Apply the forces of stitch wires to the messenger at their clamps."""
+def _find_missing_tension(held, lane, u, d, lag):
+    """Step of the messenger's nodes by the tension that stitch wires take from it."""
+    deficit, missing = held.deficit[lane], held.missing[lane]
+    before = load_row(u, PAD - 1) + lag * load_row(d, PAD - 1)
+    here = load_row(u, PAD) + lag * load_row(d, PAD)
+    pull = load_row(deficit, PAD) * (here - before)
+    for i in range(PAD, deficit.shape[0] - PAD):
+        after = load_row(u, i + 1) + lag * load_row(d, i + 1)
+        ahead = load_row(deficit, i + 1) * (after - here)
+        store_row(missing, i, pull - ahead)
+        here, pull = after, ahead
+
+
+@inlined
+def pull_messenger(held, lane, u, d, inertia):
+    """Apply the forces of stitch wires to the messenger: at their clamps, and between them."""
+    missing, its_u, its_d = held.missing[lane], u[MESSENGER], d[MESSENGER]
+    for i in range(PAD, missing.shape[0] - PAD):
+        step = load_row(missing, i)
+        if inertia.shape[0] > 0:
+            step = load_row(inertia, i - PAD) * step
+        store_row(its_d, i, load_row(its_d, i) + step)
+        store_row(its_u, i, load_row(its_u, i) + step)
     stitches, forces = held.stitches, held.clamp_force[lane]
     for s in range(stitches.node.shape[1]):
         node, table = stitches.node[lane, s], stitches.constants[lane, s]
