@@ -294,3 +294,10 @@ def test_lanes_of_a_vector_environment_equal_single_ones():
             alone, own, *_ = env.step(action)
             np.testing.assert_array_equal(alone, observation)
             assert own == reward
+
+
+def test_longest_distance_counts_the_spans_before_a_run():
+    """Seven spans of the environment's run-in, of the first lengths of the line."""
+    with pytest.raises(InputError, match="at most 519 m on line .*, behind 7 spans before the run, not 520 m"):
+        gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=520.0)
+    gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=519.0).close()

@@ -198,7 +198,7 @@ def joined(line: FlexibleCatenaryData, shapes: Sequence[StaticShape]) -> StaticS
         dropper_mass=of_droppers("dropper_mass"),
         spans=len(line.sequence),
         ropes=tuple(
-            Rope(part.begin + rope.places, rope.heights)
+            Rope(part.begin + rope.places, rope.heights, part.wire)
             for part, shape in zip(parts, shapes, strict=True)
             for rope in shape.ropes
         ),

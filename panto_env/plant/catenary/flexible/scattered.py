@@ -16,7 +16,7 @@ from ....backend import (
 from ...state import own_row
 from .arrays import MESSENGER, PAD
 from .scattered_arrays import MAST, SPRING, STITCH
-from .segments import row_of, segment_of
+from .segments import row_of, segment_of, share_ends
 
 
 @inlined
@@ -130,6 +130,8 @@ def take_window(line, wire, lane):
         start = travelled * (nodes // line.window)
         at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
+        if line.pairs > 1:
+            _hold_anchors(wire.displacement[lane], wire.increment[lane], wire.inertia[lane], line.rows)
         end = start + nodes
         _leave(scattered.masts, held.masts, lane, start, at_start)
         n = held.masts.begin[lane] & NOT_NEGATIVE
@@ -201,6 +203,19 @@ def _take_nodes(scattered, inertia, mobility, start, rows):
         for i in range(inertia.shape[1]):
             for j in range(WIDTH):
                 inertia[w, i, j] = scattered.inertia[w, start + j * rows + i + PAD]
+
+
+@inlined
+def _hold_anchors(u, d, inertia, rows):
+    """Put nodes at rest that are at anchors or beyond; the window's absorbing end may have moved them."""
+    for w in range(inertia.shape[0]):
+        for i in range(inertia.shape[1]):
+            for j in range(WIDTH):
+                if inertia[w, i, j] == 0.0:
+                    u[w, i + PAD, j] = 0.0
+                    d[w, i + PAD, j] = 0.0
+        share_ends(u[w], rows)
+        share_ends(d[w], rows)
 
 
 @inlined

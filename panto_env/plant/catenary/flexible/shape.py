@@ -43,6 +43,7 @@ class Rope(NamedTuple):
 
     places: Array  # of its clamps and droppers (m), along the line or about a support that repeats at 0
     heights: Array  # m
+    wire: int = 0  # contact wire under it
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,18 +116,16 @@ def _ropes(
     """Places and heights (m) of the stitch wires in a lane's window, by their number along the line."""
     stitches = moving_stitches(model.data, model.alignment.spans)
     found: dict[int, tuple[Array, Array]] = {}
-    rest = sorted(shape.ropes, key=lambda rope: float(rope.places[0]))
     for k, moved in rope_nodes(model.line, model.wire, lane):
         if not len(x) or stitches.begin[k] < x[0] or stitches.end[k] > x[-1]:
             continue
         places = np.linspace(stitches.begin[k], stitches.end[k], len(moved))
         support = 0.0
         if model.data.sequence:
-            rope = min(
-                rest, key=lambda each: abs(each.places[0] - places[0]) + abs(each.places[-1] - places[-1])
-            )
+            own = [each for each in shape.ropes if each.wire == stitches.wire[k]]
+            rope = min(own, key=lambda each: float(np.abs(each.places[[0, -1]] - places[[0, -1]]).sum()))
         else:
-            rope, support = rest[0], float((places[0] + places[-1]) / 2)
+            rope, support = shape.ropes[0], float((places[0] + places[-1]) / 2)
         heights = np.interp(places - support, rope.places, rope.heights) + moved
         messenger = messengers[stitches.wire[k] // 2]
         heights[[0, -1]] = np.interp(places[[0, -1]], x, messenger)
