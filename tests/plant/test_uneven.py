@@ -297,7 +297,9 @@ def test_lanes_of_a_vector_environment_equal_single_ones():
 
 
 def test_longest_distance_counts_the_spans_before_a_run():
-    """Seven spans of the environment's run-in, of the first lengths of the line."""
-    with pytest.raises(InputError, match="at most 519 m on line .*, behind 7 spans before the run, not 520 m"):
-        gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=520.0)
-    gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=519.0).close()
+    """Seven of the line's sixteen."""
+    with pytest.raises(
+        InputError, match=r"at most 512 m on line .*, behind 7 spans before the run, not 513 m"
+    ):
+        gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=513.0)
+    gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=512.0).close()
