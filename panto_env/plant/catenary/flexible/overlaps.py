@@ -15,6 +15,7 @@ from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ..schema import FEWEST_SPANS
+from .beams import Profile
 from .parts import Overlap, Span
 from .schema import FlexibleCatenaryData
 from .shape import InUse, Rope, StaticShape
@@ -205,12 +206,24 @@ def joined(line: FlexibleCatenaryData, shapes: Sequence[StaticShape]) -> StaticS
     )
 
 
+def profiles(
+    line: FlexibleCatenaryData, shape: StaticShape, spans: int | None = None
+) -> list[tuple[TensionLength, Profile, Profile]]:
+    """Each tension length with its contact wire and its messenger at rest, along itself."""
+    parts = tension_lengths(line, spans)
+    if isinstance(shape.contact, InUse) and isinstance(shape.messenger, InUse):
+        return list(zip(parts, shape.contact.profiles, shape.messenger.profiles, strict=True))
+    assert isinstance(shape.contact, Profile)
+    assert isinstance(shape.messenger, Profile)
+    return [(parts[0], shape.contact, shape.messenger)]
+
+
 def heights_of_pair(line: FlexibleCatenaryData, shape: StaticShape, pair: int, x: Array) -> Array:
     """Height of a pair's contact wire at positions x (m), (n,); ``FAR`` where it has none."""
-    if not isinstance(shape.contact, InUse):
+    if not line.overlaps:
         return shape.contact.height(x)
     found = np.full(len(x), FAR)
-    for part, profile in zip(tension_lengths(line), shape.contact.profiles, strict=True):
+    for part, profile, _ in profiles(line, shape):
         if part.pair == pair:
             ours = (x >= part.begin) & (x <= part.end)
             found[ours] = profile.height(x[ours] - part.begin)

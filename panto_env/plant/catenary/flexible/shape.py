@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,7 +25,7 @@ class InUse(NamedTuple):
 
     limits: Array  # (tension lengths - 1,): where trains pass from one to the next (m)
     begins: Array  # (tension lengths,): m
-    profiles: tuple[Any, ...]  # of each, from its own begin
+    profiles: tuple[Any, ...]  # ``Profile`` of each, from its own begin
     breaks: tuple[float, float]  # ends of the line (m)
 
     def height(self, x: Array) -> Array:

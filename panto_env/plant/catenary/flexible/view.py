@@ -11,10 +11,10 @@ from ....base.arrays import Array, Index
 from ..view import LineView
 from .arrays import CONTACT, MESSENGER, PAD
 from .beams import Profile
-from .overlaps import FAR, tension_lengths
+from .overlaps import FAR, profiles, tension_lengths
 from .scattered_build import present, rope_nodes
 from .segments import along
-from .shape import InUse, StaticShape
+from .shape import StaticShape
 from .stitches import moving_stitches
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
 
 def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
     """Height of a pair's messenger at rest (m), (n,)."""
-    if isinstance(shape.messenger, InUse):
+    if model.data.overlaps:
         found = np.full(len(x), FAR)
-        for part, profile in zip(tension_lengths(model.data), shape.messenger.profiles, strict=True):
+        for part, _, profile in profiles(model.data, shape):
             ours = (x >= part.begin) & (x <= part.end) & (part.pair == pair)
             found[ours] = profile.height(x[ours] - part.begin)
         return found
