@@ -98,6 +98,26 @@ def uneven_run():
     return found
 
 
+def overlapping_run():
+    """Short spans with stitch wires and an overlap: a window that travels, and defects on the whole line."""
+    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table["stitch_wire"] = {"length": 9.0, "tension": 2000.0, "mass": 0.3, "clamp_mass": 0.2}
+    table |= {"span_length": 20.0}
+    table["droppers"] |= {"positions": (2.5, 10.0, 17.5), "sag": (0.0, 0.0, 0.0)}
+    spans = [{}, {}, {"stitch_wire": {"length": 0.0}}, {}]
+    overlaps = [{"first_span": 4, "rises": (0.02, 0.1), "level": 1.0}]
+    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans * 2, "overlaps": overlaps})
+    settings = {"precision": "double", "distance": 150.0, "spacing": 0.5, "time_step": 2e-3}
+    conditions = {4: {"broken_droppers": [(5, 5)]}, 0: {"hard_spots": [(6, 4.2, 2.0, 100.0)]}}
+    found = []
+    for window, condition in conditions.items():
+        run = panto_env.simulate(
+            line, "en50318-2002", window=window or None, line_condition=condition, **settings
+        )
+        found += [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+    return found
+
+
 def rig_run():
     """A rig's computer and cylinder."""
     run = panto_env.simulate(catenary="rig", distance=8.0, speed_kmh=200)
@@ -123,6 +143,7 @@ RUNS = {
     "a window that moves along a line": passive_run,
     "a speed that drifts": drifting_run,
     "spans that differ": uneven_run,
+    "stitch wires and an overlap": overlapping_run,
     "a rig": rig_run,
     "several lanes": several_lanes,
 }
