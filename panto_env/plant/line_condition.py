@@ -30,6 +30,8 @@ Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
 Length = Annotated[float, Between(2, 2000, "m")]
 Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
 Lost = Annotated[float, Between(0, 0.5)]
+# Ice loads of standards reach 1.5 kg/m (recalled).
+Ice = Annotated[float, Between(0, 5, "kg/m")]
 # A hurricane blows with 33 m/s; trains are stopped well before.
 WindSpeed = Annotated[float, Between(-40, 40, "m/s")]
 
@@ -97,6 +99,12 @@ class LineCondition(Settings):
         "random from Davenport's spectrum (-)",
     )
 
+    ice: Ice = Field(
+        0.0,
+        description="ice on both wires of a flexible line, which was built without it (kg/m); a coat of 10 mm "
+        "on a wire of 13 mm is 0.65 kg/m at 900 kg/m^3",
+    )
+
     @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
     @classmethod
     def _each_once(cls, value: tuple[Any, ...], info: Any) -> tuple[Any, ...]:
@@ -151,12 +159,13 @@ class LineCondition(Settings):
 
     @property
     def of_wires(self) -> tuple[Any, ...]:
-        """Defects of the wires themselves, which all lanes of a plant share."""
+        """Defects of the wires themselves, and what weather does to them: all lanes of a plant share these."""
         return (
             self.hard_spots,
             self.worn_stretches,
             self.lost_contact_tension,
             self.lost_messenger_tension,
+            self.ice,
         )
 
 

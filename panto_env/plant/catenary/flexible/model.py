@@ -19,6 +19,7 @@ from .beams import Profile
 from .build import at_rest, constants, of_tension, settle
 from .defects import DefectiveLine
 from .grid import contact_gain
+from .loaded import check_loaded
 from .resolution import resolution
 from .scattered_build import present
 from .schema import FlexibleCatenaryData
@@ -66,7 +67,7 @@ class FlexibleCatenary:
         shape = hang(designed)
         if data is not designed:
             shape = shape_left(designed, data)
-        own = locate(data, spans, condition)
+        own = locate(designed, spans, condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
@@ -90,6 +91,9 @@ class FlexibleCatenary:
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
+        if data is not designed:
+            defective = self._defective[condition]
+            check_loaded(data, shape, spans, defective.rise(defective.solve()))
         self.wire = at_rest(self.line, lanes, collectors)
 
     def _make_defective(
@@ -203,6 +207,7 @@ def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
     if len({condition.of_wires for condition in conditions}) > 1:
         raise InputError(
             "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
-            "worn_stretches, lost_contact_tension or lost_messenger_tension; make a separate run for each."
+            "worn_stretches, lost_contact_tension, lost_messenger_tension, ice or temperature; make a "
+            "separate run for each."
         )
     return conditions[0]
