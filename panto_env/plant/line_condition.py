@@ -32,6 +32,8 @@ Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a t
 Lost = Annotated[float, Between(0, 0.5)]
 # Ice loads of standards reach 1.5 kg/m (recalled).
 Ice = Annotated[float, Between(0, 5, "kg/m")]
+# From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
+Temperature = Annotated[float, Between(-80, 80, "K")]
 # A hurricane blows with 33 m/s; trains are stopped well before.
 WindSpeed = Annotated[float, Between(-40, 40, "m/s")]
 
@@ -101,8 +103,14 @@ class LineCondition(Settings):
 
     ice: Ice = Field(
         0.0,
-        description="ice on both wires of a flexible line, which was built without it (kg/m); a coat of 10 mm "
-        "on a wire of 13 mm is 0.65 kg/m at 900 kg/m^3",
+        description="ice on both wires of a flexible line, which was built without it (kg/m); a coat of "
+        "10 mm on a wire of 13 mm is 0.65 kg/m at 900 kg/m^3",
+    )
+
+    temperature: Temperature = Field(
+        0.0,
+        description="temperature of the wires less that at which the line was built (K); it acts on wires "
+        "that are fixed at both ends (axial_stiffness)",
     )
 
     @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
@@ -159,13 +167,14 @@ class LineCondition(Settings):
 
     @property
     def of_wires(self) -> tuple[Any, ...]:
-        """Defects of the wires themselves, and what weather does to them: all lanes of a plant share these."""
+        """Defects of the wires themselves, and what weather does to them: all lanes of a plant share it."""
         return (
             self.hard_spots,
             self.worn_stretches,
             self.lost_contact_tension,
             self.lost_messenger_tension,
             self.ice,
+            self.temperature,
         )
 
 

@@ -11,7 +11,9 @@ from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, STEEPEST, StaticShape
 
-ADVICE = "in this line_condition; let it have less ice, or lose less tension."
+ADVICE = (
+    "in this line_condition; take less ice, less lost tension, or a temperature nearer to that of its design."
+)
 
 
 def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, rise: Profile) -> None:
@@ -26,7 +28,8 @@ def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, ris
     if given_way > MOST_YIELD:
         most = beside(given_way, MOST_YIELD, ".2g")
         raise InputError(
-            f"At rest a support of line '{left.name}' would yield by {most} m, more than {MOST_YIELD} m, {ADVICE}"
+            f"At rest a support of line '{left.name}' would yield by {most} m, more than {MOST_YIELD} m, "
+            + ADVICE
         )
     share = np.linspace(0.0, 1.0, POINTS, endpoint=False)
     for k, (begin, length) in enumerate(zip(supports, np.diff(supports), strict=False)):

@@ -18,6 +18,7 @@ from .attached import dropper_positions
 from .beams import Profile
 from .build import at_rest, constants, of_tension, settle
 from .defects import DefectiveLine
+from .fixed_wires import tensions_of_fixed
 from .grid import contact_gain
 from .loaded import check_loaded
 from .resolution import resolution
@@ -63,7 +64,8 @@ class FlexibleCatenary:
             )
         self.data, condition = data, of_wires(runs.conditions)
         designed = data
-        data = with_tension_left(designed, condition)
+        self._fixed = contact, messenger = tensions_of_fixed(designed, condition)
+        data = with_tension_left(designed, condition, self._fixed)
         shape = hang(designed)
         if data is not designed:
             shape = shape_left(designed, data)
@@ -71,7 +73,7 @@ class FlexibleCatenary:
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
-        tightest = with_tension_left(designed, condition, (1 + error, 1 + error))
+        tightest = with_tension_left(designed, condition, ((1 + error) * contact, (1 + error) * messenger))
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
@@ -100,7 +102,9 @@ class FlexibleCatenary:
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
         """Write the defects into the line, or tables for them where each lane draws its own."""
-        self._defective = {condition: DefectiveLine(data, spans, condition) for condition in conditions}
+        self._defective = {
+            condition: DefectiveLine(data, spans, condition, self._fixed) for condition in conditions
+        }
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -121,14 +125,20 @@ class FlexibleCatenary:
             self._write_tension(row, drawn)
         if drawn.tensions != (1.0, 1.0):
             assert self._designed is not None
-            defective = DefectiveLine(self._designed, self._alignment.spans, drawn.condition, drawn.tensions)
+            tensions = self._tensions(drawn)
+            defective = DefectiveLine(self._designed, self._alignment.spans, drawn.condition, tensions)
         state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
+
+    def _tensions(self, drawn: DrawnLine) -> tuple[float, float]:
+        """Tensions of a drawn line's wires, relative to those that they have not lost."""
+        (contact, messenger), fixed = drawn.tensions, self._fixed
+        return contact * fixed[0], messenger * fixed[1]
 
     def _write_tension(self, row: int, drawn: DrawnLine) -> None:
         """Write the stencil and the static shape for a lane's own tensions."""
         assert self._designed is not None
-        own = with_tension_left(self._designed, drawn.condition, drawn.tensions)
+        own = with_tension_left(self._designed, drawn.condition, self._tensions(drawn))
         shape = shape_left(self._designed, own)
         tensioned = of_tension(own, shape, self.line.spacing, self.time_step)
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing

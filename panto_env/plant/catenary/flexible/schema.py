@@ -159,11 +159,21 @@ class FlexibleCatenaryData(CatenaryData):
 
     def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
         """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
-        return clear_spans(self.wires, numerics, runs, last)
+        return clear_spans(self._tightest(runs), numerics, runs, last)
 
     def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
         """Warn where a given window costs more than 1 % of the figures."""
-        warn_if_short(self.wires, numerics, runs)
+        warn_if_short(self._tightest(runs), numerics, runs)
+
+    def _tightest(self, runs: Runs) -> tuple[Wire, Wire]:
+        """The wires with their tension in the cold, where waves are faster."""
+        condition = runs.conditions[0]
+        if not condition.temperature:
+            return self.wires
+        from .fixed_wires import tensions_of_fixed  # it imports this module
+        from .tension import with_tension_left
+
+        return with_tension_left(self, condition, tensions_of_fixed(self, condition)).wires
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
