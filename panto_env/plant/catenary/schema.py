@@ -101,21 +101,13 @@ LOWEST_TENSION = 500.0  # N
 
 
 class Wire(Settings):
-    """A tensioned wire with bending stiffness; weights or springs keep its tension, or it is fixed."""
+    """A tensioned wire with bending stiffness."""
 
     # Twin wires, and one equivalent wire for all, have up to five times the values of one wire.
     mass: Annotated[float, Between(0.05, 20, "kg/m")] = Field(description="mass per length (kg/m)")
     tension: Annotated[float, Between(LOWEST_TENSION, 200e3, "N")] = Field(description="tension (N)")
     bending_stiffness: Annotated[float, Between(0, 1e5, "N m^2")] = Field(
         description="bending stiffness EI (N m^2)"
-    )
-    axial_stiffness: Annotated[float, Between(1e5, 1e9, "N")] | None = Field(
-        None,
-        description="EA of a wire that is fixed at both ends, so that its tension depends on temperature and "
-        "ice (N); by default its tension is kept, as by weights",
-    )
-    expansion: Annotated[float, Between(0, 1e-4, "1/K")] = Field(
-        17e-6, description="thermal expansion of a wire that is fixed (1/K); copper's by default (recalled)"
     )
 
     @property

@@ -13,8 +13,18 @@ from ....base.ranges import Between
 from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
-from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
-from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Span, SteadyArm, Support, check_inside
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
+from .parts import (
+    CLOSEST,
+    Conductor,
+    Droppers,
+    Encumbrance,
+    EndSupport,
+    Span,
+    SteadyArm,
+    Support,
+    check_inside,
+)
 from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 
@@ -49,8 +59,8 @@ class FlexibleCatenaryData(CatenaryData):
 
     kind: Literal["flexible"] = "flexible"
     encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
-    contact_wire: Wire
-    messenger_wire: Wire
+    contact_wire: Conductor
+    messenger_wire: Conductor
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
@@ -153,22 +163,22 @@ class FlexibleCatenaryData(CatenaryData):
         return self.alignment().mean_length
 
     @property
-    def wires(self) -> tuple[Wire, Wire]:
+    def wires(self) -> tuple[Conductor, Conductor]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire
 
     def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
         """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
-        return clear_spans(self._tightest(runs), numerics, runs, last)
+        return clear_spans(self._wires_in(runs), numerics, runs, last)
 
     def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
         """Warn where a given window costs more than 1 % of the figures."""
-        warn_if_short(self._tightest(runs), numerics, runs)
+        warn_if_short(self._wires_in(runs), numerics, runs)
 
-    def _tightest(self, runs: Runs) -> tuple[Wire, Wire]:
-        """The wires with their tension in the cold, where waves are faster."""
+    def _wires_in(self, runs: Runs) -> tuple[Conductor, Conductor]:
+        """The wires with the tension and the ice that they have in these runs: the cold makes waves faster."""
         condition = runs.conditions[0]
-        if not condition.temperature:
+        if not (condition.temperature or condition.ice):
             return self.wires
         from .fixed_wires import tensions_of_fixed  # it imports this module
         from .tension import with_tension_left
