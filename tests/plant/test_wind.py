@@ -1,5 +1,6 @@
 """Wind along the track: its gusts have Davenport's spectrum, and act on a pantograph as moving air does."""
 
+import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -8,9 +9,11 @@ from scipy.integrate import quad
 from scipy.signal import lsim, welch
 
 from panto_env import InputError, simulate
+from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.diagnosis.force import estimated_force
 from panto_env.plant.state import Row
 from panto_env.plant.wind import LONGEST_GUST, SHORTEST_GUST, Wind, draw_wind, resolved, winds_at
 
@@ -199,3 +202,19 @@ def test_a_wind_that_would_change_nothing_or_has_no_meaning_is_refused():
     for said, changes in refused.items():
         with pytest.raises(InputError, match=said):
             Task(run_settings(SIMPLE | {"line_condition": WINDY} | changes))
+
+
+def test_an_estimate_from_motion_is_said_to_lack_the_wind_s_lift():
+    still, windy = (
+        simulate("re330", "dsa380", 250.0, distance=800.0, record_droppers=False, line_condition=each)
+        for each in ("new", {"wind": 10.0, "turbulence": 0.0})
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        estimated_force(still, 0)
+    more = 0.00097 * ((250 + 36) ** 2 - 250**2)
+    with pytest.warns(AccuracyWarning, match=rf"wind of 10 m/s, .* its lift, \+{more:.0f} N in the mean"):
+        force = estimated_force(windy, 0)
+    inside = windy.inside("all")
+    missing = np.mean(windy.contact_force[inside] - force[inside])
+    assert missing == pytest.approx(more, abs=1.0)

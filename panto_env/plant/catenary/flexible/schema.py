@@ -176,7 +176,7 @@ class FlexibleCatenaryData(CatenaryData):
         warn_if_short(self._wires_in(runs), numerics, runs)
 
     def _wires_in(self, runs: Runs) -> tuple[Conductor, Conductor]:
-        """The wires with the tension and the ice that they have in these runs: the cold makes waves faster."""
+        """The wires with their tension and ice in these runs: waves are faster in the cold."""
         condition = runs.conditions[0]
         if not (condition.temperature or condition.ice):
             return self.wires
