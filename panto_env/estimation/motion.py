@@ -65,8 +65,8 @@ def warn_of_wind(run: Trajectory) -> None:
     coefficient = run.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
     more = coefficient * (to_kmh(run.speed + run.wind) ** 2 - run.speed_kmh**2)
     warnings.warn(
-        f"A run was in a wind of {run.wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, is "
-        "missing in the force that is estimated from the motion.",
+        f"A run was in wind of {run.wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, "
+        "is missing in the force that is estimated from the motion.",
         AccuracyWarning,
         stacklevel=1,  # one place for all runs: the sentence comes once
     )
