@@ -21,6 +21,7 @@ from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY
 from ..finite_element.system import _placement, build
 from .test_flexible import WHOLE
+from .test_uneven import MIXED, line_of
 
 of_defects = python_function(rise_by_defects)
 EN50318 = "en50318-2002"
@@ -138,3 +139,19 @@ def test_what_cannot_hang_or_has_no_wires_is_refused():
         simulate("periodic-stiffness", "three-mass", line_condition={"ice": 1.0})
     with pytest.raises(InputError, match=r"must not differ in .* ice or temp"):
         simulate(line_condition=["new", {"ice": 0.3}])
+
+
+def test_spans_that_differ_bear_ice_as_finite_elements_say():
+    data, ice = line_of(MIXED), 0.6
+    condition, spans = LineCondition(ice=ice), len(MIXED)
+    other, line = iced(data, spans, 0.1, ice), DefectiveLine(data, spans, condition)
+    state, begins = line.solve(), data.alignment().supports
+    ours = solve(with_tension_left(data, condition)).contact.height(other.nodes)
+    ours = ours + line.rise(state).height(other.nodes)
+    inner = (other.nodes > begins[3]) & (other.nodes < begins[-4])
+    np.testing.assert_allclose(ours[inner], other.static[inner, 0], atol=5e-4)
+    droppers = np.concatenate(
+        [begin + np.array(own.positions) for begin, own in zip(begins, data.dropper_tables, strict=False)]
+    )
+    own = (droppers > begins[3]) & (droppers < begins[-4])
+    np.testing.assert_allclose(state.tension[own], other.dropper_tension[own], atol=0.5)

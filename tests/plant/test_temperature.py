@@ -19,6 +19,7 @@ from panto_env.plant.line_condition import LineCondition
 from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.system import _placement, build
+from .test_uneven import line_of
 
 of_defects = python_function(rise_by_defects)
 EN50318, SPANS, ELEMENT = "en50318-2002", 9, 0.1
@@ -135,3 +136,11 @@ def test_slack_that_only_a_temperature_makes_is_refused_and_so_is_one_that_does_
     ):
         with pytest.raises(InputError, match=said):
             simulate(catenary, speed_kmh=200.0, line_condition={"temperature": temperature}, distance=600.0)
+
+
+def test_a_long_line_of_spans_that_nearly_agree_has_the_tension_of_the_uniform_one():
+    data, condition = fixed(EN50318, WIRES["both"]), LineCondition(temperature=-20.0, ice=0.2)
+    nearly = line_of([60, 60.001] * 15, data.model_copy(update={"spans": 30}))
+    np.testing.assert_allclose(
+        tensions_of_fixed(nearly, condition), tensions_of_fixed(data, condition), rtol=5e-3
+    )
