@@ -165,9 +165,9 @@ class RunSettings(Numerics):
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values and '
-        'defects such as "worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; from a list one is '
-        "drawn per run",
+        description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values, '
+        'defects and weather such as "worn:broken_droppers=[(4, 5)],wind=15,ice=0.3", or a table; from a '
+        "list one is drawn per run",
     )
     mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
         None,

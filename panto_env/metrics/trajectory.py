@@ -177,6 +177,12 @@ class Trajectory:
         return bool(self.settings.get("speed_drift"))
 
     @property
+    def wind(self) -> float:
+        """Mean wind along the track in which the run may have been made, the strongest (m/s); 0: none."""
+        conditions = self.settings.get("line_condition") or ()
+        return max((each.get("wind", 0.0) for each in conditions), key=abs, default=0.0)
+
+    @property
     def speeds(self) -> Array:
         """Speed of the train at each sample, (n,) (m/s)."""
         if not self.drifts or len(self.time) < FEWEST:
@@ -185,7 +191,7 @@ class Trajectory:
 
     @property
     def lift(self) -> Array:
-        """Static force and aerodynamic uplift as applied in each step, (n,) (N)."""
+        """Static force and aerodynamic uplift in each step, (n,) (N), in still air: wind adds to it."""
         coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
         more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.drifts else 0.0
         return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)

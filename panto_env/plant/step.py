@@ -17,7 +17,7 @@ from .catenary.protocol import (
 from .contact import contact_force, shared_forces
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
-from .train import lift, mean_stride, position
+from .train import lift, lift_by_wind, mean_stride, position
 from .trigonometry import cosine_of_turns
 
 
@@ -36,6 +36,8 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
     own = run.table[contact, lane]
     if run.drift.shape[1] > 0:
         own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
+    if run.wind.shape[1] > 0:
+        own[ROW.WIND] = lift_by_wind(run, contact, lane, own[ROW.STEP] + 0.5)
     drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
     move_freely(pantographs, contact, own, lane)
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)

@@ -80,6 +80,21 @@ def drifting_run():
     return [run.contact_force.tolist(), run.position.tolist()]
 
 
+def run_in_weather():
+    """Ice on both wires, one of them fixed and cold, and a speed that drifts in a gusty wind."""
+    line, blown = (
+        short_line(),
+        load_pantograph("en50318-2002").model_copy(update={"aerodynamic_coefficient": 1e-3}),
+    )
+    fixed = line.messenger_wire.model_copy(update={"axial_stiffness": 10e6})
+    line = line.model_copy(update={"messenger_wire": fixed})
+    weather = {"wind": 12.0, "ice": 0.4, "temperature": -20.0}
+    numerics = {"window": 3, "precision": "double", "spacing": 0.5, "time_step": 2e-3}
+    drawn = {"speed_drift": 5.0, "line_condition": weather, "seed": 1}
+    run = panto_env.simulate(line, blown, distance=30.0, **numerics, **drawn)
+    return [run.contact_force.tolist(), run.dropper_force.tolist()]
+
+
 def uneven_run():
     """Short spans that differ: a window that travels, and the whole line with a hard spot."""
     table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
@@ -144,6 +159,7 @@ RUNS = {
     "a speed that drifts": drifting_run,
     "spans that differ": uneven_run,
     "stitch wires and an overlap": overlapping_run,
+    "weather": run_in_weather,
     "a rig": rig_run,
     "several lanes": several_lanes,
 }

@@ -196,6 +196,19 @@ def test_a_line_as_built_and_lines_that_are_worn_run_through_overlaps():
         )
 
 
+def test_ice_weighs_on_both_pairs_and_not_on_stitch_wires():
+    """The wires in use hang lower, by a parabola between droppers on the messenger that sags more."""
+    dry, iced = (run(line_of(), line_condition=each) for each in ("new", {"ice": 0.3}))
+    inside = (dry.position > FIRST * LENGTH) & (dry.position < (FIRST + 2) * LENGTH)
+    assert dry.wire[inside].mean() - iced.wire[inside].mean() > 0.01
+    with pytest.raises(InputError, match="has stitch wires, on which ice is not computed"):
+        run(line_of(stitched=True), line_condition={"ice": 0.3})
+    fixed = load_catenary("re330").messenger_wire.model_dump() | {"axial_stiffness": 1e7}
+    for line in (line_of(messenger_wire=fixed), line_of((), stitched=True, messenger_wire=fixed)):
+        with pytest.raises(InputError, match="wires that are fixed at both ends are not computed"):
+            run(line, line_condition={"temperature": 10.0})
+
+
 def test_default_grid_is_fine_enough_in_an_overlap():
     ours, fine = (run(line_of(), **own).summary((FIRST, FIRST + 2)) for own in ({}, {"spacing": 0.1}))
     assert ours.std == pytest.approx(fine.std, rel=0.01)

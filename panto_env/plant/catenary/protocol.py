@@ -115,8 +115,8 @@ def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> N
     """Raise InputError where a condition has defects: for lines without droppers and supports."""
     if any(condition.defective for condition in conditions):
         raise InputError(
-            "Only a flexible catenary has droppers and supports that can be defective or scatter, and line "
-            f"'{data.name}' is not one; use another line_condition, such as 'fair'."
+            "Only a flexible catenary has droppers and supports that can be defective or scatter, and wires "
+            f"that bear ice, and line '{data.name}' is not one; use another line_condition, such as 'fair'."
         )
 
 

@@ -126,7 +126,7 @@ def _lines() -> dict[str, FlexibleCatenaryData]:
     assert isinstance(line, FlexibleCatenaryData)
     table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
     spans = [{"span_length": length, "droppers": {"positions": _spread(line, length)}} for length in SECTION]
-    sections = {
+    sections: dict[str, dict[str, Any]] = {
         "spans that differ": {},
         "spans that differ, an overlap": {"overlaps": [OVERLAP]},
         "spans that differ, stitch wires": {"stitch_wire": STITCH_WIRE},

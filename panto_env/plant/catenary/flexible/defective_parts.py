@@ -34,17 +34,18 @@ class DefectiveParts:
         self._parts = tension_lengths(data)
         check_places(data, _counts(self._parts, spans), condition)
         locate(data, spans, condition)
-        self._lines = [
+        self.lines = [
             DefectiveLine(part.line, part.spans, _of_part(part, data, condition), tensions)
             for part in self._parts
         ]
+        """The static state of each tension length."""
         self._droppers = sum(len(part.droppers) for part in self._parts)
         self._breaks = [self._breaks_of(pair)[0] for pair in (0, 1)]
 
     def _breaks_of(self, pair: int) -> tuple[Array, list[slice]]:
         """Limits of all pieces of a pair's contact wire (m), and which are those of each tension length."""
         breaks, pieces = [0.0], []
-        for part, own in zip(self._parts, self._lines, strict=True):
+        for part, own in zip(self._parts, self.lines, strict=True):
             if part.pair == pair:
                 if part.begin > breaks[-1]:
                     breaks.append(part.begin)
@@ -62,7 +63,7 @@ class DefectiveParts:
             link_gap=np.zeros((rows, self._droppers), dtype=real),
             rise=np.zeros((rows, len(first) - 1, 5)),
             rise_breaks=first,
-            rise_decay=np.full(rows, self._lines[0].decay),
+            rise_decay=np.full(rows, self.lines[0].decay),
             beside=Beside(line.beside.shape, np.zeros((rows, len(second) - 1, 5)), second),
         )
 
@@ -73,7 +74,7 @@ class DefectiveParts:
         tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
         rises = line.rise[row], line.beside.rise[row]
         places = iter(self._breaks_of(0)[1]), iter(self._breaks_of(1)[1])
-        for part, own in zip(self._parts, self._lines, strict=True):
+        for part, own in zip(self._parts, self.lines, strict=True):
             inner = slice(part.first_span, part.first_span + part.spans - 1)
             state = own.solve(
                 None if scatter is None else scatter[part.droppers],
@@ -82,8 +83,8 @@ class DefectiveParts:
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
             rises[part.pair][next(places[part.pair])] = state.rise
         line.link_static[row], line.link_gap[row] = tension, gap
-        line.rise_decay[row] = self._lines[0].decay
-        return StaticState(tension, gap, line.rise[row])
+        line.rise_decay[row] = self.lines[0].decay
+        return StaticState(tension, gap, line.rise[row], np.zeros(0))
 
 
 def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:

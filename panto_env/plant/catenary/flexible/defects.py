@@ -44,6 +44,7 @@ class StaticState:
     tension: Array  # (droppers,): N
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
     rise: Array  # (pieces, 5): change of the running surface's height: a, b, c, d, e between nodes
+    change: Array  # (unknowns,): of heights and slopes (m, -)
 
 
 class DefectiveLine:
@@ -102,10 +103,11 @@ class DefectiveLine:
         self._beams = Beams(left.contact_wire, lengths)
         add_to_band(self._band, self._unknowns, self._beams.stiffness)
         above = self._unknowns + 2 * (MESSENGER - CONTACT)
+        self._above = Beams(left.messenger_wire, lengths)
         if stitched:
             self._stitch(left.messenger_wire, stitches, lengths, above)
         else:
-            add_to_band(self._band, above, Beams(left.messenger_wire, lengths).stiffness)
+            add_to_band(self._band, above, self._above.stiffness)
         self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
         self._band[0, masts] += [span.steady_arm.stiffness for span in each[1:]]
         self._band[0, masts + 2] += self._support_stiffness
@@ -215,11 +217,17 @@ class DefectiveLine:
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
         rise = self._beams.pieces(change[self._unknowns], self._bulge)
         rise[:, :2] += self._surface
-        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
+        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise, change)
 
     def rise(self, state: StaticState) -> Profile:
         """Change of the running surface's height in a state."""
         return Profile(self.breaks, state.rise, self.decay, self._repeats)
+
+    def rises(self, state: StaticState) -> tuple[Profile, Profile]:
+        """Change of the running surface's and of the messenger's height in a state."""
+        unknowns = state.change[self._unknowns + 2 * (MESSENGER - CONTACT)]
+        pieces = self._above.pieces(unknowns, np.zeros(len(unknowns)))
+        return self.rise(state), Profile(self.breaks, pieces, self._above.decay, self._repeats)
 
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
         """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""

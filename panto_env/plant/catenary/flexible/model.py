@@ -16,7 +16,10 @@ from .attached import dropper_positions
 from .build import at_rest, constants, of_tension, settle
 from .defective_parts import DefectiveParts
 from .defects import DefectiveLine
+from .fixed_wires import tensions_of_fixed
 from .grid import contact_gain
+from .loaded import check_loaded
+from .overlaps import tension_lengths
 from .resolution import resolution
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
@@ -56,15 +59,16 @@ class FlexibleCatenary:
             )
         self.data, condition = data, of_wires(runs.conditions)
         designed = data
-        data = with_tension_left(designed, condition)
+        self._fixed = contact, messenger = tensions_of_fixed(designed, condition)
+        data = with_tension_left(designed, condition, self._fixed)
         shape = hang(designed)
         if data is not designed:
             shape = shape_left(designed, data)
-        own = locate(data, spans, condition)
+        own = locate(designed, spans, condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
-        tightest = with_tension_left(designed, condition, (1 + error, 1 + error))
+        tightest = with_tension_left(designed, condition, ((1 + error) * contact, (1 + error) * messenger))
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
@@ -84,13 +88,17 @@ class FlexibleCatenary:
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
+        if data is not designed:
+            self._check_loaded(designed, data, condition, spans)
         self.wire = at_rest(self.line, lanes, collectors)
 
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
         """Write the defects into the line, or tables for them where each lane draws its own."""
-        self._defective = {condition: _defective(data, spans, condition) for condition in conditions}
+        self._defective = {
+            condition: _defective(data, spans, condition, self._fixed) for condition in conditions
+        }
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -112,14 +120,30 @@ class FlexibleCatenary:
             self._write_tension(row, drawn)
         if drawn.tensions != (1.0, 1.0):
             assert self._designed is not None
-            defective = _defective(self._designed, self.alignment.spans, drawn.condition, drawn.tensions)
+            tensions = self._tensions(drawn)
+            defective = _defective(self._designed, self.alignment.spans, drawn.condition, tensions)
         state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
+
+    def _check_loaded(
+        self, designed: FlexibleCatenaryData, left: FlexibleCatenaryData, condition: LineCondition, spans: int
+    ) -> None:
+        """Raise InputError where a tension length does not hang with its wires as they are."""
+        defective = self._defective[condition]
+        lines = defective.lines if isinstance(defective, DefectiveParts) else [defective]
+        parts = zip(tension_lengths(designed, spans), tension_lengths(left, spans), lines, strict=True)
+        for own, now, line in parts:
+            check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
+
+    def _tensions(self, drawn: DrawnLine) -> tuple[float, float]:
+        """Tensions of a drawn line's wires, relative to those that they have not lost."""
+        (contact, messenger), fixed = drawn.tensions, self._fixed
+        return contact * fixed[0], messenger * fixed[1]
 
     def _write_tension(self, row: int, drawn: DrawnLine) -> None:
         """Write the stencil and the static shape for a lane's own tensions."""
         assert self._designed is not None
-        own = with_tension_left(self._designed, drawn.condition, drawn.tensions)
+        own = with_tension_left(self._designed, drawn.condition, self._tensions(drawn))
         shape = shape_left(self._designed, own)
         tensioned = of_tension(own, shape, self.line.spacing, self.time_step)
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
@@ -162,6 +186,7 @@ def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
     if len({condition.of_wires for condition in conditions}) > 1:
         raise InputError(
             "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
-            "worn_stretches, lost_contact_tension or lost_messenger_tension; make a separate run for each."
+            "worn_stretches, lost_contact_tension, lost_messenger_tension, ice or temperature; make a "
+            "separate run for each."
         )
     return conditions[0]

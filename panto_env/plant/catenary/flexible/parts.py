@@ -10,11 +10,24 @@ from pydantic import Field, model_validator
 from ....base.explanation import comma_hint
 from ....base.ranges import Between
 from ....base.settings import Settings
-from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength
+from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength, Wire
 
 CLOSEST = 0.1
 """Least distance between two droppers, or between one and a support (m)."""
 Clamp = Annotated[float, Between(0, 10, "kg")]
+
+
+class Conductor(Wire):
+    """A wire of a flexible line: weights or springs keep its tension, or it is fixed at both ends."""
+
+    axial_stiffness: Annotated[float, Between(1e5, 5e8, "N")] | None = Field(
+        None,
+        description="EA of a wire that is fixed at both ends, so that its tension depends on temperature and "
+        "ice (N); by default its tension is kept, as by weights",
+    )
+    expansion: Annotated[float, Between(0, 1e-4, "1/K")] = Field(
+        17e-6, description="thermal expansion of a wire that is fixed (1/K); copper's by default (recalled)"
+    )
 
 
 class Droppers(Settings):

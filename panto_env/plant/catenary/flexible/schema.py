@@ -13,9 +13,10 @@ from ....base.ranges import Between
 from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
-from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
 from .parts import (
     CLOSEST,
+    Conductor,
     Droppers,
     Encumbrance,
     EndSupport,
@@ -62,8 +63,8 @@ class FlexibleCatenaryData(CatenaryData):
 
     kind: Literal["flexible"] = "flexible"
     encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
-    contact_wire: Wire
-    messenger_wire: Wire
+    contact_wire: Conductor
+    messenger_wire: Conductor
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
@@ -180,17 +181,27 @@ class FlexibleCatenaryData(CatenaryData):
         return self.alignment().mean_length
 
     @property
-    def wires(self) -> tuple[Wire, Wire]:
+    def wires(self) -> tuple[Conductor, Conductor]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire
 
     def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
         """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
-        return clear_spans(self.wires, numerics, runs, last)
+        return clear_spans(self._wires_in(runs), numerics, runs, last)
 
     def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
         """Warn where a given window costs more than 1 % of the figures."""
-        warn_if_short(self.wires, numerics, runs)
+        warn_if_short(self._wires_in(runs), numerics, runs)
+
+    def _wires_in(self, runs: Runs) -> tuple[Conductor, Conductor]:
+        """The wires with their tension and ice in these runs: waves are faster in the cold."""
+        condition = runs.conditions[0]
+        if not (condition.temperature or condition.ice):
+            return self.wires
+        from .fixed_wires import tensions_of_fixed  # it imports this module
+        from .tension import with_tension_left
+
+        return with_tension_left(self, condition, tensions_of_fixed(self, condition)).wires
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.

@@ -61,13 +61,15 @@ class Rig:
         """Build the computed line, and the rig around it.
 
         Raises InputError where the line cannot be computed with these numerics, and for conditions with
-        irregularity, which the cylinder does not follow.
+        irregularity, which the cylinder does not follow, or with wind.
         """
         if any(condition.waves for condition in runs.conditions):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
                 "wire; use a line_condition without irregularity and wear, such as 'new'."
             )
+        if any(condition.wind for condition in runs.conditions):
+            raise InputError(f"No wind blows on a rig; leave it out, or use another line than '{data.name}'.")
         computer = data.computer
         interval = runs.whole_part(computer.interval)
         if abs(interval - computer.interval) > 1e-9:
