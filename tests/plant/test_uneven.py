@@ -183,13 +183,13 @@ def energy(line, wire, data, step):
         total -= (now[w, 2:-2] * pull).sum() * bare / (2 * step**2)
 
     def at(things, w):
-        four = middle[w, PAD + things.first[:, None] + np.arange(4)]
+        four = middle[w, PAD + things.first + np.arange(4)]
         return (things.constants[:, :4] * four).sum(axis=1)
 
     total += (data.support.stiffness * at(line.scattered.masts, MESSENGER) ** 2).sum() / 2
     links = line.scattered.links
     extension, stiffness = at(links, MESSENGER) - at(links, CONTACT), links.constants[:, LINK.STIFFNESS]
-    static = line.link_static[0]
+    static = line.link_static[0, links.number]
     taut = stiffness * extension**2 / 2
     slack = -static * extension - static**2 / stiffness / 2
     return total + np.where(stiffness * extension > -static, taut, slack).sum()

@@ -15,6 +15,7 @@ from .parts import Span
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import StaticShape
+from .stitches import Stitches
 
 
 class Springs(NamedTuple):
@@ -31,6 +32,7 @@ class Links(NamedTuple):
     """Droppers: links between two wires at one place along the line, which can only pull."""
 
     wires: Index  # (links, 2): the lower and the upper one
+    stitch: Index  # (links,): number of the stitch wire, of those in the window, at the upper end; -1: a wire
     position: Array  # (links,): m
     stiffness: Array  # (links,): in tension (N/m)
     mass: Array  # (links, 2): mass that moves with the lower and the upper end (kg)
@@ -96,14 +98,20 @@ def springs_of(each: Sequence[Span], places: Array, step: float, spots: Array) -
     )
 
 
-def links_of(data: FlexibleCatenaryData, each: Sequence[Span], shape: StaticShape) -> Links:
-    """The droppers of these spans, whose static shape is ``shape``, or repeats it."""
+def links_of(
+    data: FlexibleCatenaryData, each: Sequence[Span], shape: StaticShape, stitches: Stitches
+) -> Links:
+    """The droppers of these spans, whose static shape is ``shape``, or repeats it.
+
+    stitches: those that move.
+    """
     droppers = [span.droppers for span in each]
     counts = [len(own.positions) for own in droppers]
     half = np.tile(shape.dropper_mass / 2, len(each) // shape.spans)
     clamps = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
     return Links(
         wires=np.tile(np.array([CONTACT, MESSENGER], dtype=np.int64), (len(half), 1)),
+        stitch=stitches.carrying,
         position=dropper_positions(data, len(each)),
         stiffness=np.tile(shape.dropper_stiffness, len(each) // shape.spans),
         mass=half[:, None] + np.repeat(np.array(clamps), counts, axis=0),

@@ -22,6 +22,7 @@ from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
 from .spans import spans_of
 from .static import StaticShape
+from .stitches import moving, stitches_of
 from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
@@ -46,8 +47,8 @@ def constants(
     own: defects of the contact wire itself, at positions along the whole line; a travelling window cannot
     have any. Raises InputError for more nodes than ``MOST_NODES``.
     """
-    differ = bool(data.sequence)
-    strides = data.spans if differ else spans
+    differ = data.one_by_one
+    strides = data.spans if data.sequence else spans
     window = min(resolution.window or strides, strides)
     per_stride = nodes_per_span(data, resolution.spacing)
     dx = data.stride / per_stride
@@ -61,13 +62,15 @@ def constants(
         )
     x = dx * (np.arange(count) - PAD)
     each = spans_of(data, covered).each
+    stitches = moving(stitches_of(data, covered), covered)
     masts = (
         np.array(data.alignment(covered).supports[1:-1]) / dx
         if differ
         else 1.0 * per_stride * np.arange(1, covered)
     )
     springs = springs_of(each[1:], masts, resolution.time_step, own.springs_of_nodes(x, dx))
-    grid = on_grid(data, shape, springs, links_of(data, each, shape), x, resolution.time_step, own)
+    links = links_of(data, each, shape, stitches)
+    grid = on_grid(data, shape, springs, links, stitches, x, resolution.time_step, own)
     real = np.float32 if numerics.precision == "single" else np.float64
     rows = per_stride * window // WIDTH
     masts_of_window = per_stride * np.arange(1, window) if not differ else np.zeros(0, dtype=np.int64)
@@ -134,7 +137,7 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
     """Wires of all lanes in their static shape, at the line's start."""
     wires, real = line.mobility.shape, line.stencil.dtype
     own = room_for(line, lanes)
-    apart = own.links.node.shape[1], 2 * own.masts.node.shape[1]  # sets
+    apart = own.links.node.shape[1] + own.hung.node.shape[1], 2 * own.masts.node.shape[1]  # sets
     sets, springs = len(line.link_row) + apart[0], len(line.spring_row) + apart[1]
     each = lanes if line.scattered.mobility.size else 1
 

@@ -175,7 +175,7 @@ class FlexibleCatenary:
     def _links(self, lane: int) -> tuple[Index, Array]:
         """Numbers of the droppers in a lane's window, (n,), in their order, and their tension (N)."""
         line, wire = self.line, self.wire
-        if line.scattered.links.first.size:
+        if line.scattered.mobility.size:
             return present(line, wire, lane)
         links = line.link_set.size
         first = int(wire.travelled[lane]) * (links // line.window)

@@ -9,12 +9,14 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.arrays import Array, Index
-from .arrays import CONTACT, LOWER, PAD, UPPER
+from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .attached import Links, Nodes, Springs
 from .grid import missing_yield
 from .schema import FlexibleCatenaryData
 from .segments import places
 from .static import StaticShape
+from .stitch_grid import StitchGrid, stitch_grid
+from .stitches import Stitches
 from .wire_defects import WireDefects
 
 STIFFEST = 1e8
@@ -36,6 +38,8 @@ class OnGrid(NamedTuple):
     link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
     stiffness: Array  # (links,): in tension, with the grid's missing compliance (N/m)
     room: Array  # (links,): designed distance of the ends (m)
+    slope_mobility: Array  # (wires, 1): displacement of a bare node in a step by a tension, per slope (1/N)
+    ropes: StitchGrid
 
 
 def on_grid(
@@ -43,20 +47,27 @@ def on_grid(
     shape: StaticShape,
     springs: Springs,
     links: Links,
+    stitches: Stitches,
     x: Array,
     step: float,
     own: WireDefects,
 ) -> OnGrid:
-    """x: positions of the nodes from node -PAD on (m). step: s. own: defects of the contact wire itself."""
+    """stitches: those that move. x: positions of the nodes from node -PAD on (m). step: s. own: defects of the
+    contact wire itself.
+    """
     damping, wires, dx = data.damping, data.wires, float(x[PAD + 1])
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
+    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
+    room = np.where(links.stitch < 0, room, np.tile(stretched, len(room) // len(stretched)))
     at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
     bare = np.array([[wire.mass * dx] for wire in wires])
-    added = np.zeros((len(wires), len(x)))
-    for end in (LOWER, UPPER):
-        np.add.at(
-            added, (links.wires[:, end, None], at_links.four), at_links.shares * links.mass[:, end, None]
-        )
+    added, ropes = np.zeros((len(wires), len(x))), stitch_grid(data, stitches, links, x, step)
+    on = links.stitch >= 0  # a stitch wire
+    for end, ours in ((LOWER, slice(None)), (UPPER, ~on)):
+        nodes = links.wires[ours, end, None], at_links.four[ours]
+        np.add.at(added, nodes, at_links.shares[ours] * links.mass[ours, end, None])
+    clamped = np.repeat(stitches.clamp_mass, 2)[:, None]
+    np.add.at(added[MESSENGER], ropes.clamps.four, ropes.clamps.shares * clamped)
     np.add.at(added, (springs.wire[:, None], at_springs.four), at_springs.shares * springs.mass[:, None])
     added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
     mass = bare + added
@@ -65,15 +76,21 @@ def on_grid(
 
     # The compliance that the wires lack on the grid is added to the links.
     weights = at_links.weights
-    ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
+    ends = [((links.wires == w) & ~(on[:, None] & [False, True])).sum(axis=1) for w in range(len(wires))]
     missing = sum(
         count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
     )
+    missing = missing + ropes.missing_yield
     stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
     move = np.stack(
         [mobility[links.wires[:, end, None], at_links.four] * weights for end in (LOWER, UPPER)], axis=1
     )
     relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
+    move[on, UPPER] = 0.0
+    two = ropes.mobility[links.stitch[on, None], ropes.node[on, None] + [0, 1]]
+    move[on, UPPER, :2] = two * ropes.shares[on]
+    relative[on] = 0.5 * (weights * move[:, LOWER])[on].sum(axis=1)
+    relative[on] += 0.5 * (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
     early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
     held = mobility[springs.wire[:, None], at_springs.four]
     return OnGrid(
@@ -89,6 +106,8 @@ def on_grid(
         link_yield=relative,
         stiffness=stiffness,
         room=room,
+        slope_mobility=step**2 / bare / (1.0 + damping.alpha * step / 2) / dx,
+        ropes=ropes,
     )
 
 

@@ -14,7 +14,18 @@ from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
-from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Overlap, Span, SteadyArm, StitchWire, Support, check_inside
+from .parts import (
+    CLOSEST,
+    Droppers,
+    Encumbrance,
+    EndSupport,
+    Overlap,
+    Span,
+    SteadyArm,
+    StitchWire,
+    Support,
+    check_inside,
+)
 from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 
@@ -151,6 +162,11 @@ class FlexibleCatenaryData(CatenaryData):
     def ends(self) -> bool:
         """Whether no wire goes on after the line's own spans: where a sequence ends, none does."""
         return bool(self.sequence)
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether what hangs on the wires is laid out on the grid one by one, not in rows alike in all spans."""
+        return bool(self.sequence) or self.stitch_wire is not None
 
     @property
     def period(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,13 @@ SETTLED, USABLE = 1e-12, 1e-9
 """Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
 
 
+class Rope(NamedTuple):
+    """A stitch wire at rest."""
+
+    places: Array  # of its clamps and droppers (m), along the line or about a support that repeats at 0
+    heights: Array  # m
+
+
 @dataclass(frozen=True, eq=False)
 class StaticShape:
     """Spans in equilibrium that repeat; dropper arrays are in their order along the line."""
@@ -32,6 +39,7 @@ class StaticShape:
     dropper_stiffness: Array  # N/m
     dropper_mass: Array  # kg, without clamps
     spans: int = 1  # number of spans that repeat: all of the line's where they differ
+    ropes: tuple[Rope, ...] = ()  # stitch wires
 
 
 def settled(name: str, length: Array, cut: Callable[[Array], tuple[Array, R]]) -> tuple[Array, R]:

@@ -20,6 +20,8 @@ from .parts import Span
 from .schema import FlexibleCatenaryData
 from .shape import StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
+from .stitched_static import StitchedMessenger
+from .stitches import Stitches, stitches_of
 from .whole_line import settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
@@ -170,6 +172,7 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
     if line.steady_arm.holds_wire:
         held, heights = np.append(hung, support), np.append(heights, 0.0)
     lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
+    stitched = _stitched(line, x)
     contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
     lift, arm_force = lifts[: len(x)], float(lifts[len(x) :].sum())
 
@@ -177,6 +180,9 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
         dropper_mass = droppers.mass * length
         tension = lift + GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
         pulled = tension + GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
+        if stitched is not None:
+            above = stitched.hang(np.array([line.encumbrance]), -pulled)
+            return unloaded(droppers, above[stitched.tops] + sag, tension), (above, tension, dropper_mass)
         carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
         top = np.array([line.encumbrance - carried / line.support.stiffness])
         above, _ = upper.hang(top, np.append(0.0, -pulled))
@@ -184,6 +190,27 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
     length, (above, tension, mass) = settled(line.name, np.full(len(x), line.encumbrance), cut)
     stiffness = stiffness_of(droppers, length)
+    profile, ropes = upper.profile, ()
+    if stitched is not None:
+        profile, ropes = stitched.profile, stitched.shapes(above)
     return StaticShape(
-        lower.profile(contact), upper.profile(above), arm_force, tension, length, stiffness, mass
+        lower.profile(contact), profile(above), arm_force, tension, length, stiffness, mass, ropes=ropes
+    )
+
+
+def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
+    """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
+    found = stitches_of(line, 1)
+    if not len(found.support):
+        return None
+    at_start = Stitches(*(values[:1] for values in found[:-1]), carrying=np.minimum(found.carrying, 0))
+    half = line.span_length / 2
+    return StitchedMessenger(
+        line.messenger_wire,
+        at_start,
+        np.where(x > half, x - line.span_length, x),
+        np.zeros(1),
+        np.array([line.support.stiffness]),
+        (-half, half),
+        None,
     )

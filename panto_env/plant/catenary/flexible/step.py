@@ -23,7 +23,7 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
+from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
 from .links import difference, follow_links, measure_extensions, pull_links
 from .scattered import (
     apply_masts,
@@ -36,6 +36,7 @@ from .scattered import (
 )
 from .scattered_arrays import LINK
 from .segments import shift_nodes
+from .stitched import advance_stitches, pull_clamps, stretch_of_hung
 from .wires import (
     apply_springs,
     deflection,
@@ -98,13 +99,15 @@ def _place(line, wire, lane, contact, x):
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
     u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
-    masts, springs = wire.scattered.masts, line.spring_row.size
+    held, masts, springs = wire.scattered, wire.scattered.masts, line.spring_row.size
     keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
     keep_past_of_masts(line.scattered, masts, lane, d, spring_past, springs)
     measure_extensions(line, wire, lane)
     stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
+    advance_stitches(held, lane, u, d, stencil[MESSENGER])
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], inertia[w], stencil[w])
+        leapfrog(u[w], d[w], inertia[w], held.deficit[lane, w], stencil[w])
+    pull_clamps(held, lane, u, d)
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
     pull_links(line, wire, lane)
@@ -181,6 +184,16 @@ def _ending(line, wire, lane):
         touching = stretch_at(u, node, table) < -load_row(table, LINK.ROOM)
         if any_of(touching):
             closing = stretch_at(d, node, table)
+            quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
+            return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
+    hung = wire.scattered.hung
+    for s in range(hung.node.shape[1]):
+        node, table = hung.node[lane, s], hung.constants[lane, s]
+        touching = stretch_of_hung(u, wire.scattered.displacement[lane], node, table) < -load_row(
+            table, LINK.ROOM
+        )
+        if any_of(touching):
+            closing = stretch_of_hung(d, wire.scattered.increment[lane], node, table)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     return ENDING.NONE
