@@ -46,7 +46,7 @@ BARE = {"stitch_wire": {"length": 0.0}}
 SHORTER = {"stitch_wire": {"length": 12.0, "tension": 2.0e3}}
 SOME_STITCHED = STITCHED_330 | {
     "sequence": [
-        {"span_length": length, "droppers": {"spacing": 6.5, "first": 2.5}} | changes
+        {"span_length": length, "droppers": {"spacing": 5.0, "first": 2.5}} | changes
         for length, changes in zip(
             LENGTHS, ({}, {}, BARE, {}, BARE, BARE, {}, {}, SHORTER, BARE, {}, {}, {}, {}), strict=True
         )
