@@ -55,6 +55,11 @@ SOME_STITCHED = STITCHED_330 | {
 """Spans of all lengths; some supports have a stitch wire, one of them a shorter one, and some have none."""
 
 
+def overlap(first_span: int, *rises: float) -> dict[str, Any]:
+    """Fourteen spans all alike but for an overlap."""
+    return {"sequence": [{}] * 14, "overlaps": [{"first_span": first_span, "rises": rises}]}
+
+
 @dataclass(frozen=True)
 class Section:
     """A line, the pantograph that runs along it, and the spans whose figures are compared."""
@@ -138,4 +143,15 @@ def sections() -> dict[str, Section]:
         "stitched-330": Section(stitched("re330", STITCHED_330), pantograph("cx"), 300.0, spans=(4, 9)),
         "stitched-250": Section(stitched("re250", STITCHED_250), pantograph("dsa250"), 200.0, spans=(4, 9)),
         "some-stitched": Section(line_of("re330", SOME_STITCHED), pantograph("cx"), 250.0),
+        "overlap-2002": Section(
+            line_of("en50318-2002", overlap(6, 0.1, 0.5)), pantograph("en50318-2002"), 250.0
+        ),
+        "overlap-2002-long": Section(
+            line_of("en50318-2002", overlap(5, 0.06, 0.3, 0.8)), pantograph("en50318-2002"), 300.0
+        ),
+        "overlap-330": Section(line_of("re330", overlap(6, 0.1, 0.5)), pantograph("cx"), 300.0),
+        "overlap-330-long": Section(line_of("re330", overlap(5, 0.06, 0.3, 0.8)), pantograph("cx"), 250.0),
+        "overlap-stitched": Section(
+            stitched("re330", STITCHED_330 | overlap(6, 0.1, 0.5)), pantograph("cx"), 250.0
+        ),
     }
