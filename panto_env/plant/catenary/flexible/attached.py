@@ -22,6 +22,7 @@ class Springs(NamedTuple):
     """Springs and dampers between wires and the ground: two at each mast, then hard spots."""
 
     masts: int
+    number: Index  # (masts,): of the support along the line, counted from 0; -1 where uplift is not recorded
     wire: Index  # (springs,)
     place: Array  # (springs,): along the line, in nodes
     levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
@@ -91,6 +92,7 @@ def springs_of(each: Sequence[Span], places: Array, step: float, spots: Array) -
     arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
     return Springs(
         masts=len(each),
+        number=np.arange(len(each)),
         wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
         place=np.append(np.repeat(places, 2), hard - PAD),
         levels=np.array([*levels, *held]).reshape(-1, 3),

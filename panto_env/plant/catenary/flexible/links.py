@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
 from ...state import own_row
-from .arrays import CONTACT, LOWER, MESSENGER, UPPER
+from .arrays import LOWER, MESSENGER, UPPER
 from .scattered import move_nodes, stretch_at
 from .scattered_arrays import LINK
 from .segments import move, read
@@ -115,8 +115,8 @@ def pull_links(line, wire, lane):
         stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
         pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
         store_row(change, number, pull)
-        move_nodes(u[CONTACT], d[CONTACT], node, table, LINK.MOVE, pull)
-        move_nodes(u[MESSENGER], d[MESSENGER], node, table, LINK.MOVE + 4, -pull)
+        move_nodes(u, d, node, table, LINK.MOVE, pull)
+        move_nodes(u[MESSENGER:], d[MESSENGER:], node, table, LINK.MOVE + 4, -pull)
     held, first = wire.scattered, first + links.node.shape[1]
     for s in range(held.hung.node.shape[1]):
         node, table, number = held.hung.node[lane, s], held.hung.constants[lane, s], first + s

@@ -14,7 +14,7 @@ from ....backend import (
     store_row,
 )
 from ...state import own_row
-from .arrays import CONTACT, MESSENGER, PAD
+from .arrays import MESSENGER, PAD
 from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of
 
@@ -31,10 +31,10 @@ def displacement_at(x, node, constants):
 @inlined
 def stretch_at(x, node, constants):
     """Displacement or increment of the upper wire minus that of the lower one at links of a set (m)."""
-    lower, upper = x[CONTACT], x[MESSENGER]
-    total = load_row(constants, 0) * (gather(upper, node, 0) - gather(lower, node, 0))
+    upper = x[MESSENGER:]
+    total = load_row(constants, 0) * (gather(upper, node, 0) - gather(x, node, 0))
     for k in range(1, 4):
-        total += load_row(constants, k) * (gather(upper, node, k) - gather(lower, node, k))
+        total += load_row(constants, k) * (gather(upper, node, k) - gather(x, node, k))
     return total
 
 
@@ -52,8 +52,8 @@ def keep_past_of_masts(scattered, masts, lane, d, past, first):
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            store_row(past, first + s, displacement_at(d[CONTACT], node, table))
-        store_row(past, first + sets + s, displacement_at(d[MESSENGER], node, table))
+            store_row(past, first + s, displacement_at(d, node, table))
+        store_row(past, first + sets + s, displacement_at(d[MESSENGER:], node, table))
 
 
 @inlined
@@ -63,8 +63,9 @@ def apply_masts(scattered, masts, lane, u, d, past, first):
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            _apply_spring(u[CONTACT], d[CONTACT], node, table, MAST.ARM, load_row(past, first + s))
-        _apply_spring(u[MESSENGER], d[MESSENGER], node, table, MAST.SUPPORT, load_row(past, first + sets + s))
+            _apply_spring(u, d, node, table, MAST.ARM, load_row(past, first + s))
+        above, its_d = u[MESSENGER:], d[MESSENGER:]
+        _apply_spring(above, its_d, node, table, MAST.SUPPORT, load_row(past, first + sets + s))
 
 
 @inlined
@@ -85,12 +86,14 @@ def record_scattered(line, wire, lane, uplift, tension):
     sets = masts.node.shape[1]
     for s in range(sets if uplift.size > 0 else 0):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        moved = displacement_at(u[CONTACT], node, table) - 0.5 * displacement_at(d[CONTACT], node, table)
+        moved = displacement_at(u, node, table) - 0.5 * displacement_at(d, node, table)
         store_row(past, s, moved)
         for j in range(WIDTH):
             n = masts.number[lane, j * sets + s]
             if n >= 0:
-                uplift[n & NOT_NEGATIVE] = past[s, j]
+                number = line.scattered.masts.number[n & NOT_NEGATIVE]
+                if number >= 0:
+                    uplift[number & NOT_NEGATIVE] = past[s, j]
     if tension.size > 0:
         first = line.link_row.size
         _record_links(line.scattered.links, links, wire, lane, first, tension)
@@ -139,7 +142,7 @@ def take_window(line, wire, lane):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
                 _rest(line, wire, lane, scattered.links, held.links, n, first)
             n += 1
-        if scattered.deficit.shape[1] > 0:
+        if scattered.deficit.size > 0:
             _take_stitches(line, wire, lane, start, end, at_start, at_end)
 
 
@@ -148,12 +151,12 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
     """Take in stitch wires, and the droppers that hang from them."""
     scattered, held = line.scattered, wire.scattered
     deficit, last = held.deficit[lane], line.rows * WIDTH
-    for w in range(deficit.shape[0]):
+    for pair in range(deficit.shape[0]):
         for i in range(deficit.shape[1]):
             for j in range(WIDTH):
                 local = j * line.rows + i - PAD
                 inside = local > 0 and local < last
-                deficit[w, i, j] = scattered.deficit[w, start + local + PAD] if inside else 0.0
+                deficit[pair, i, j] = scattered.deficit[pair, start + local + PAD] if inside else 0.0
     _leave(scattered.stitches, held.stitches, lane, start, at_start)
     n = held.stitches.begin[lane] & NOT_NEGATIVE
     sets, nodes = held.stitches.node.shape[1], scattered.stitches.empty.size - STITCH.INERTIA
@@ -227,7 +230,8 @@ def _enter(along, held, lane, n, start, rows):
         for k in range(4):
             local = along.first[n, p] + k - start
             segment = segment_of(local, rows)
-            held.node[lane, s, 4 * p + k, j] = row_of(local, segment, rows) * WIDTH + segment
+            row = along.wire[n] * (rows + 2 * PAD) + row_of(local, segment, rows)
+            held.node[lane, s, 4 * p + k, j] = row * WIDTH + segment
     new = held.number[lane, slot] != n
     if new:
         held.number[lane, slot] = n

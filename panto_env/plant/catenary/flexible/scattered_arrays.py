@@ -72,6 +72,7 @@ class AlongLine(NamedTuple):
     leaves: Index  # (things,): first of the nodes that must be within a window
     enters: Index  # (things,): last one
     number: Index  # (things,): along the line, of its kind
+    wire: Index  # (things,): of the contact wire on which, or over which, it hangs
     constants: Array  # (things, rows)
     empty: Array  # (rows,): of a slot that holds none, which then has no effect
 
@@ -81,7 +82,9 @@ class InWindow(NamedTuple):
 
     begin: Index  # (lanes,): number of the first thing
     number: Index  # (lanes, sets times WIDTH): of the thing in each slot; -1 for none
-    node: Index  # (lanes, sets, nodes, WIDTH): its nodes, each as row times WIDTH plus segment
+    # Its nodes on the contact wire, each as row times WIDTH plus segment, behind those of the wires before it;
+    # the nodes on the messenger beside them are one wire further.
+    node: Index  # (lanes, sets, nodes, WIDTH)
     constants: Array  # (lanes, sets, rows, WIDTH)
 
 
@@ -96,9 +99,8 @@ class Scattered(NamedTuple):
     stitches: AlongLine
     upper: Index  # (hung,): node of the stitch wire before the upper end
     carrying: Index  # (hung,): number of the stitch wire
-    deficit: (
-        Array  # (wires, nodes): weight of a slope in a node's step, for missing tension (-); none if none
-    )
+    deficit: Array  # (pairs, nodes): weight in a node's step of a messenger's slope from the node before, by
+    # the tension that stitch wires take from it (-); none without them
     stiff_arms: bool  # whether any steady arm is a spring
 
 
@@ -109,9 +111,9 @@ class ScatteredWindow(NamedTuple):
     links: InWindow
     hung: InWindow
     stitches: InWindow
-    deficit: (
-        Array  # (lanes, wires, rows + 2 PAD, WIDTH), as ``Scattered`` has it; no rows without stitch wires
-    )
+    # Of messengers, as ``Scattered`` has it, and a node's step by it; no pairs without stitch wires.
+    deficit: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH)
+    missing: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH): scratch (m)
     # Nodes of stitch wires, from clamp to clamp, those of set after set.
     displacement: Array  # (lanes, sets times nodes, WIDTH): m
     increment: Array  # (lanes, sets times nodes, WIDTH): m

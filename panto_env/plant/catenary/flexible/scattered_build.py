@@ -8,7 +8,7 @@ import numpy as np
 
 from ....backend import WIDTH, bind, pack
 from ....base.arrays import Array, Index
-from .arrays import MESSENGER, PAD, FlexibleLine, FlexibleWire
+from .arrays import LOWER, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .on_grid import OnGrid
 from .scattered import take_start
 from .scattered_arrays import (
@@ -34,7 +34,9 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     links[[LINK.YIELD, LINK.STIFFNESS, LINK.ROOM]] = 1.0  # a slot without a link has none that could be slack
     if grid is None:
         none, bare = np.zeros(0, dtype=np.int64), np.zeros((2, 0))
-        without = [_along(none[:, None], np.zeros((0, len(empty))), empty) for empty in (masts, links)]
+        without = [
+            _along(none[:, None], np.zeros((0, len(empty))), empty, none, none) for empty in (masts, links)
+        ]
         return Scattered(
             inertia=bare.astype(real),
             mobility=bare,
@@ -44,7 +46,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             stitches=without[0],
             upper=none,
             carrying=none,
-            deficit=bare.astype(real),
+            deficit=np.zeros((0, 0), real),
             stiff_arms=False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
@@ -76,14 +78,21 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
         mobility=grid.mobility,
-        masts=_along(first[::2, None], of_masts, masts),
-        links=_along(at_links.first[on_messenger, None], of_links[on_messenger], links, number=on_messenger),
+        masts=_along(first[::2, None], of_masts, masts, grid.springs.wire[pairs][::2], grid.springs.number),
+        links=_along(
+            at_links.first[on_messenger, None],
+            of_links[on_messenger],
+            links,
+            grid.links.wires[on_messenger, LOWER],
+            on_messenger,
+        ),
         # A dropper on a stitch wire needs it in the window.
         hung=_along(
             at_hung[:, None],
             of_links[hung],
             links,
-            number=hung,
+            grid.links.wires[hung, LOWER],
+            hung,
             leaves=np.minimum(at_hung, stitches.leaves[carrying]),
             enters=np.maximum(at_hung + NODES - 1, stitches.enters[carrying]),
         ),
@@ -99,16 +108,20 @@ def _along(
     first: Index,
     rows: Array,
     empty: Array,
-    number: Index | None = None,
+    wire: Index,
+    number: Index,
     leaves: Index | None = None,
     enters: Index | None = None,
 ) -> AlongLine:
-    """Things along the line, in the precision of ``empty``; by default numbered, and needing their own nodes."""
+    """Things in their order along the line, in the precision of ``empty``; by default they need their nodes."""
+    begin, end = (first[:, 0], first[:, -1] + NODES - 1) if leaves is None else (leaves, enters)
     return AlongLine(
         first=np.ascontiguousarray(first),
-        leaves=first[:, 0].copy() if leaves is None else leaves,
-        enters=first[:, -1] + NODES - 1 if enters is None else enters,
-        number=np.arange(len(first)) if number is None else number,
+        # A thing never leaves or enters before the one that comes before it.
+        leaves=np.minimum.accumulate(begin[::-1])[::-1].copy(),
+        enters=np.maximum.accumulate(end),
+        number=number.copy(),
+        wire=wire.copy(),
         constants=np.ascontiguousarray(rows, dtype=empty.dtype),
         empty=empty,
     )
@@ -118,7 +131,8 @@ def _stitches(grid: OnGrid, real: Any) -> AlongLine:
     """Stitch wires along the line."""
     ropes, count = grid.ropes, len(grid.ropes.spacing)
     empty = np.zeros(STITCH.INERTIA + ropes.intervals + 1, real)
-    move = grid.mobility[MESSENGER, ropes.clamps.four] * ropes.clamps.weights
+    above = np.repeat(ropes.stitches.wire, 2)[:, None] + MESSENGER
+    move = grid.mobility[above, ropes.clamps.four] * ropes.clamps.weights
     pull = ropes.stitches.tension / ropes.spacing
     rows = np.concatenate(
         [
@@ -130,16 +144,13 @@ def _stitches(grid: OnGrid, real: Any) -> AlongLine:
         ],
         axis=1,
     )
-    return _along(ropes.clamps.first.reshape(count, 2), rows, empty)
+    return _along(ropes.clamps.first.reshape(count, 2), rows, empty, ropes.stitches.wire, np.arange(count))
 
 
 def _deficit(grid: OnGrid, real: Any) -> Array:
     """Weights of slopes for the tension that stitch wires take from the messenger."""
-    if not grid.ropes.intervals:
-        return np.zeros((2, 0), real)
-    weights = np.zeros(grid.mobility.shape)
-    weights[MESSENGER] = grid.ropes.deficit
-    return np.asarray(weights * grid.slope_mobility, dtype=real)
+    missing = grid.ropes.deficit * grid.slope_mobility[MESSENGER::2]
+    return np.asarray(missing if grid.ropes.intervals else missing[:0], dtype=real)
 
 
 def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
@@ -148,13 +159,14 @@ def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
     stitches = _room(line, along.stitches, lanes, 2 * NODES)
     sets = stitches.node.shape[1]
     nodes = sets * (along.stitches.empty.size - STITCH.INERTIA)
-    rows = line.rows + 2 * PAD if along.deficit.size else 0
+    pairs, rows = len(along.deficit), line.rows + 2 * PAD
     return ScatteredWindow(
         masts=_room(line, along.masts, lanes),
         links=_room(line, along.links, lanes),
         hung=_room(line, along.hung, lanes, HUNG_NODES),
         stitches=stitches,
-        deficit=np.zeros((lanes, 2, rows, WIDTH), real),
+        deficit=np.zeros((lanes, pairs, rows, WIDTH), real),
+        missing=np.zeros((lanes, pairs, rows, WIDTH), real),
         displacement=np.zeros((lanes, nodes, WIDTH), real),
         increment=np.zeros((lanes, nodes, WIDTH), real),
         clamp_force=np.zeros((lanes, 2 * sets, WIDTH), real),

@@ -36,7 +36,7 @@ from .scattered import (
 )
 from .scattered_arrays import LINK
 from .segments import shift_nodes
-from .stitched import advance_stitches, pull_clamps, stretch_of_hung
+from .stitched import advance_stitches, pull_messenger, stretch_of_hung
 from .wires import (
     apply_springs,
     deflection,
@@ -106,8 +106,8 @@ def _advance(line, wire, lane):
     stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
     advance_stitches(held, lane, u, d, stencil[MESSENGER])
     for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], inertia[w], held.deficit[lane, w], stencil[w])
-    pull_clamps(held, lane, u, d)
+        leapfrog(u[w], d[w], inertia[w], stencil[w])
+    pull_messenger(held, lane, u, d, inertia)
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
     pull_links(line, wire, lane)
@@ -164,9 +164,9 @@ def _ending(line, wire, lane):
     masts, links = wire.scattered.masts, wire.scattered.links
     for s in range(masts.node.shape[1]):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        over = displacement_at(u[CONTACT], node, table) > line.free_uplift
+        over = displacement_at(u, node, table) > line.free_uplift
         if any_of(over):
-            moving = displacement_at(d[CONTACT], node, table)
+            moving = displacement_at(d, node, table)
             quickest = choose(over, larger(moving, -moving), 0.0 * moving)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.STOP
     # The wires are nearest to each other at a dropper: between two, the contact wire sags.

@@ -29,6 +29,7 @@ class Stitches(NamedTuple):
     tension: Array  # (stitches,): N
     mass: Array  # (stitches,): kg/m
     clamp_mass: Array  # (stitches,): of each clamp (kg)
+    wire: Index  # (stitches,): number of the contact wire under each
     carrying: Index  # (droppers,): number of the stitch wire that each dropper hangs from; -1 the messenger
 
     @property
@@ -69,6 +70,7 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
         np.array([stitch.tension for stitch in wires]),
         np.array([stitch.mass for stitch in wires]),
         np.array([stitch.clamp_mass for stitch in wires]),
+        np.zeros(len(there), dtype=np.int64),
         carrying,
     )
     _check(line, stitches, x)

@@ -80,12 +80,11 @@ def yield_of_place(mobility, row, segment, weight):
 
 
 @inlined
-def leapfrog(u, d, inertia, deficit, stencil):
+def leapfrog(u, d, inertia, stencil):
     """One step of one bare wire: d <- keep d + S (u + lag d), u <- u + d, with the stencil S.
 
     S is near (second difference) + far (difference over two nodes), written in second differences: weights
-    that only nearly add up to 0 would be a spring, in single precision. Where tension is missing from a node
-    to the next one, the slope there counts less by ``deficit``.
+    that only nearly add up to 0 would be a spring, in single precision.
     """
     near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
     # A tiny load on every node keeps wires at rest away from subnormal numbers, which are slow.
@@ -101,8 +100,6 @@ def leapfrog(u, d, inertia, deficit, stencil):
         slope_ahead = ahead - after
         bend_after = slope_ahead - slope
         force = middle * bend + far * (bend_before + bend_after)
-        if deficit.shape[0] > 0:
-            force -= load_row(deficit, i + 1) * slope - load_row(deficit, i) * (slope - bend)
         if inertia.shape[0] > 0:
             force = load_row(inertia, i - PAD) * force
         step = (keep * load_row(d, i) - quiet) + force
