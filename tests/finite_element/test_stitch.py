@@ -7,6 +7,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.schema import StitchWire
 from panto_env.plant.catenary.flexible.spans import spans_of
 
+from . import differences
 from .energy import balance
 from .figures import figures
 from .rest import at_rest
@@ -168,6 +169,26 @@ def test_lengths_and_stiffnesses_of_droppers_hold_the_designed_shape():
     np.testing.assert_allclose(again.contact, shape.contact, atol=1e-8)
     np.testing.assert_allclose(again.hanger, shape.hanger, atol=1e-8)
     np.testing.assert_allclose(again.dropper_tension, shape.dropper_tension, atol=1e-3)
+
+
+TILTED = {
+    "sequence": [
+        {"contact_height": 0.05, "encumbrance": 1.7},
+        {"contact_height": 0.1, "stitch_wire": {"clamp_mass": 0.5}},
+        {"contact_height": 0.05, "stitch_wire": {"length": 0.0}},
+        {"contact_height": -0.05, "stitch_wire": {"length": 14.0, "tension": 2.5e3}},
+    ],
+    "end_support": {"contact_height": -0.2, "encumbrance": 1.65},
+}
+"""Both wires are cut on gradients, half a stitch wire with them."""
+
+
+@pytest.mark.parametrize("name", ["stitched-330", "stitched-250", "some-stitched", "tilted"])
+def test_the_simulator_s_line_at_rest_is_the_same(name):
+    line = stitched("re330", STITCHED_330 | TILTED) if name == "tilted" else sections()[name].line
+    found = differences.at_rest(line)
+    assert max(found.contact, found.messenger, found.length) < 5e-4
+    assert found.force < 1.0
 
 
 def test_energy_is_balanced_under_stitch_wires():
