@@ -231,8 +231,10 @@ def test_the_force_passes_from_one_wire_to_the_other_in_the_middle_span(name, ca
 @pytest.mark.slow
 @pytest.mark.parametrize("name", OVERLAPS)
 def test_half_of_element_and_step_change_the_figures_little(name):
+    """Extremes by a share of the mean force: the minimum converges last."""
     section = sections()[name]
     coarse, fine = (figures(section.by_finite_elements(element), section.spans) for element in (0.5, 0.25))
-    for key, share in {"std": 0.005, "maximum": 0.005, "minimum": 0.02, "mean": 0.005}.items():
-        assert getattr(coarse, key) == pytest.approx(getattr(fine, key), rel=share)
+    assert (coarse.std, coarse.mean) == pytest.approx((fine.std, fine.mean), rel=0.005)
+    extremes = coarse.maximum, coarse.minimum
+    assert extremes == pytest.approx((fine.maximum, fine.minimum), abs=0.012 * fine.mean)
     assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)
