@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.elasticity import elasticity
@@ -16,6 +17,7 @@ from .rest import at_rest
 from .sections import STITCHED_330, sections, stitched
 from .simulation import simulate
 from .static import GRAVITY, static_shape
+from .stitch import Stitch, Upper
 from .system import build
 from .whole_line import ClosedLine, built, designed
 
@@ -103,6 +105,19 @@ def test_supports_carry_the_weight_of_everything(holds):
         droppers.mass * shape.dropper_length.sum() / 2 + len(droppers.sag) * droppers.contact_clamp_mass
     )
     assert carried == pytest.approx(GRAVITY * own + shape.dropper_tension.sum() - lower, rel=1e-7)
+
+
+def test_a_stitch_wire_alone_has_a_string_s_frequency_and_mass():
+    wire, stitch = load_catenary("re330").messenger_wire, StitchWire(length=18.0, tension=3.5e3, mass=0.31)
+    upper = Upper(np.linspace(0.0, 40.0, 401), wire, [Stitch(20.0, stitch)])
+    own = np.arange(2 * 401, upper.size)  # between its clamps
+    stiffness, mass = (each[own][:, own].toarray() for each in (upper.stiffness, upper.mass))
+    frequencies = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:3]) / (2 * np.pi)
+    expected = np.sqrt(stitch.tension / stitch.mass) / (2 * stitch.length) * np.arange(1, 4)
+    assert frequencies == pytest.approx(expected, rel=1e-3)
+    level = np.append(np.tile([1.0, 0.0], 401), np.ones(own.size))
+    assert level @ upper.mass @ level == pytest.approx(40.0 * wire.mass + 18.0 * stitch.mass, rel=1e-12)
+    assert upper.stiffness @ level == pytest.approx(0, abs=1e-6)
 
 
 def test_a_stitch_wire_of_no_tension_without_droppers_is_none():
