@@ -10,23 +10,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 
 from .figures import Figures, figures, stretch
 from .hermite import Array
+from .solvers import complementarity, narrow
 from .static import StaticShape, static_shape
 from .system import LineSystem, build
 
 __all__ = ["Figures", "Result", "StaticShape", "figures", "simulate", "static_shape", "stretch"]
-
-NARROW = 5  # two neighbouring nodes: messenger height of one to messenger slope of the next
-TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -138,7 +134,7 @@ class _Contact:
             raise NotImplementedError("the finite-element model needs an elastic contact")
         self.system, self.wires, self.speed = system, wires, speed
         self.k, self.c = float(pantograph.contact_stiffness), pantograph.contact_damping
-        self.order, bands = _narrow(sparse.csr_array(wires.matrix))
+        self.order, bands = narrow(sparse.csr_array(wires.matrix))
         self.factor = (cholesky_banded(bands), False)
 
         mass, damping, stiffness = _chain(pantograph)
@@ -230,44 +226,6 @@ class _Contact:
         found = np.empty_like(right)
         found[self.order] = cho_solve_banded(self.factor, right[self.order], check_finite=False)
         return found
-
-
-def _narrow(matrix: sparse.csr_array) -> tuple[Any, Array]:
-    """An order in which a symmetric matrix is narrow, and its bands from the upmost to the diagonal so.
-
-    Stitch wires' unknowns come last; they are put beside those that they act on.
-    """
-    order = slice(None)
-    if (near := _width(matrix)) > NARROW:
-        order = reverse_cuthill_mckee(sparse.csr_matrix(matrix), symmetric_mode=True)
-        matrix = matrix[order][:, order]
-        near = _width(matrix)
-    return order, np.array([np.append(np.zeros(d), matrix.diagonal(d)) for d in range(near, -1, -1)])
-
-
-def _width(matrix: sparse.csr_array) -> int:
-    rows, columns = matrix.tocoo().coords
-    return int(np.abs(rows - columns).max())
-
-
-def complementarity(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Solve rest = matrix q + offset with q >= 0, rest >= 0 and q rest = 0; return q and rest (N).
-
-    ``active`` (where q may exceed 0) is the first guess and is updated in place.
-    """
-    for iteration in range(1000):
-        chosen = np.flatnonzero(active)
-        q = np.zeros(offset.size)
-        q[chosen] = np.linalg.solve(matrix[np.ix_(chosen, chosen)], -offset[chosen])
-        rest = matrix[:, chosen] @ q[chosen] + offset
-        rest[chosen] = 0.0
-        wrong = np.flatnonzero((q < -TOLERANCE) | (rest < -TOLERANCE))
-        if wrong.size == 0:
-            return np.maximum(q, 0.0), np.maximum(rest, 0.0)
-        # Changing all at once is quick but may cycle; one at a time (Murty) cannot.
-        change = wrong if iteration < 20 else wrong[-1:]
-        active[change] = ~active[change]
-    raise ArithmeticError("slack droppers and contact found no consistent state")
 
 
 def _chain(pantograph: PantographData) -> tuple[Array, Array, Array]:
