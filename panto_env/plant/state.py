@@ -39,8 +39,11 @@ class Row(IntEnum):
     WIRE_BEFORE = 14  # height of the wire where it is touched, at the step's start (m)
     WIRE_MIDDLE = 15  # its height at mid-step, without the forces of this step (m)
     LIFT = 16  # static force and aerodynamic uplift on the lowest mass (N), at the speed of this step
+    SECOND_BEFORE = 17  # as WIRE_BEFORE and WIRE_MIDDLE, of the second wire where there is one (m)
+    SECOND_MIDDLE = 18
+    SECOND_FORCE = 19  # contact force on the second wire, part of CONTACT_FORCE (N)
     # An even number, for processors compute states in pairs.
-    STATE = 18  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
+    STATE = 20  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
     # same at the step's end, without the contact force
 
 

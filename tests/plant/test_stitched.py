@@ -67,9 +67,7 @@ def test_forces_are_in_balance_at_clamps_and_along_the_stitch_wire(line):
     rope, stitch = shape.ropes[k], line.stitch_wire
     slopes = np.diff(rope.heights) / np.diff(rope.places)  # each piece hangs in a parabola about that slope
     weight = 9.81 * stitch.mass * np.diff(rope.places)
-    pulled = [
-        stitch.tension * (b - a) - (p + q) / 2 for a, b, p, q in zip(slopes, slopes[1:], weight, weight[1:])
-    ]
+    pulled = stitch.tension * np.diff(slopes) - (weight[1:] + weight[:-1]) / 2
     number = np.flatnonzero(stitches_of(line).carrying == k) if k else np.array([8, 9, 0, 1])
     mass = shape.dropper_mass[number] / 2 + line.droppers.messenger_clamp_mass
     np.testing.assert_allclose(pulled, shape.dropper_tension[number] + 9.81 * mass, rtol=1e-6)
@@ -138,6 +136,7 @@ def energy(line, wire, data, step):
         scattered.hung.first[:, 0],
         scattered.upper,
         scattered.carrying,
+        strict=True,
     ):
         row, column = k % sets * nodes + upper, k // sets
         rope = held.displacement[0] - held.increment[0] / 2

@@ -126,6 +126,15 @@ def advance_wire(line: Any, wire: Any, lane: int) -> None:
 
 
 @operation
+def has_second_wire(line: Any) -> Any:
+    """Whether a collector may touch a second contact wire, for which it has a contact point of its own.
+
+    These follow the contact points of all collectors with their first wire, in the same order.
+    """
+    return False
+
+
+@operation
 def place_contact(line: Any, wire: Any, lane: int, contact: int, x: float) -> Any:
     """Place a contact point at x (m), its position at mid-step.
 

@@ -253,6 +253,11 @@ def _own(counts: Sequence[int], span: int) -> str:
     return f"and span {last} has {counts[last - 1]} droppers"
 
 
+def check_places(data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition) -> None:
+    """Raise InputError for a dropper or support that a line has not; counts: of the droppers of each span."""
+    _locate(data, counts, condition)
+
+
 def _locate(
     data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
 ) -> tuple[Any, Array, Array]:

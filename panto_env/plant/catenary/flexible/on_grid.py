@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from ....base.arrays import Array, Index
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .attached import Links, Nodes, Springs
 from .grid import missing_yield
+from .overlaps import TensionLength, pairs_of, tension_lengths
 from .schema import FlexibleCatenaryData
 from .segments import places
 from .static import StaticShape
@@ -48,17 +50,20 @@ def on_grid(
     springs: Springs,
     links: Links,
     stitches: Stitches,
+    spans: int,
     x: Array,
     step: float,
-    own: WireDefects,
+    own: Sequence[WireDefects],
 ) -> OnGrid:
-    """stitches: those that move. x: positions of the nodes from node -PAD on (m). step: s. own: defects of the
-    contact wire itself.
+    """stitches: those that move. x: positions of the nodes from node -PAD on (m). step: s. own: defects of
+    the contact wire of each tension length.
     """
-    damping, wires, dx = data.damping, data.wires, float(x[PAD + 1])
+    parts = tension_lengths(data, spans)
+    damping, wires, dx = data.damping, data.wires * pairs_of(data), float(x[PAD + 1])
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
     stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
-    room = np.where(links.stitch < 0, room, np.tile(stretched, len(room) // len(stretched)))
+    usual = (links.stitch < 0) & (len(parts) == 1)
+    room = np.where(usual, room, np.tile(stretched, len(room) // len(stretched)))
     at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
     bare = np.array([[wire.mass * dx] for wire in wires])
     added, ropes = np.zeros((len(wires), len(x))), stitch_grid(data, stitches, links, x, step)
@@ -67,11 +72,14 @@ def on_grid(
         nodes = links.wires[ours, end, None], at_links.four[ours]
         np.add.at(added, nodes, at_links.shares[ours] * links.mass[ours, end, None])
     clamped = np.repeat(stitches.clamp_mass, 2)[:, None]
-    np.add.at(added[MESSENGER], ropes.clamps.four, ropes.clamps.shares * clamped)
+    above = np.repeat(stitches.wire, 2)[:, None] + MESSENGER
+    np.add.at(added, (above, ropes.clamps.four), ropes.clamps.shares * clamped)
     np.add.at(added, (springs.wire[:, None], at_springs.four), at_springs.shares * springs.mass[:, None])
-    added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
+    for part, defects in zip(parts, own, strict=True):
+        added[part.wire + CONTACT] += defects.mass_of_nodes(x, dx, data.contact_wire)
     mass = bare + added
-    mobility = step**2 / mass / (1.0 + damping.alpha * step / 2)
+    held = _held(parts, len(wires), x)
+    mobility = np.where(held, 0.0, step**2 / mass / (1.0 + damping.alpha * step / 2))
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
 
     # The compliance that the wires lack on the grid is added to the links.
@@ -92,13 +100,13 @@ def on_grid(
     relative[on] = 0.5 * (weights * move[:, LOWER])[on].sum(axis=1)
     relative[on] += 0.5 * (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
     early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
-    held = mobility[springs.wire[:, None], at_springs.four]
+    moved = mobility[springs.wire[:, None], at_springs.four]
     return OnGrid(
-        inertia=bare / mass,
+        inertia=np.where(held, 0.0, bare / mass),
         mobility=mobility,
         springs=springs,
         at_springs=at_springs,
-        spring_yield=(at_springs.weights**2 * held).sum(axis=1)[:, None],
+        spring_yield=(at_springs.weights**2 * moved).sum(axis=1)[:, None],
         links=links,
         at_links=at_links,
         move=move,
@@ -109,6 +117,21 @@ def on_grid(
         slope_mobility=step**2 / bare / (1.0 + damping.alpha * step / 2) / dx,
         ropes=ropes,
     )
+
+
+def _held(parts: Sequence[TensionLength], wires: int, x: Array) -> Any:
+    """Whether nodes of wires are beyond their anchors, (wires, nodes); those of the line's ends move."""
+    if len(parts) == 1:
+        return np.zeros((wires, len(x)), dtype=bool)
+    held = np.ones((wires, len(x)), dtype=bool)
+    for number, part in enumerate(parts):
+        inside = np.ones(len(x), dtype=bool)
+        if number > 0:
+            inside &= x > part.begin + (x[1] - x[0]) / 2
+        if number < len(parts) - 1:
+            inside &= x < part.end - (x[1] - x[0]) / 2
+        held[part.wire : part.wire + 2, inside] = False
+    return held
 
 
 class Sets:

@@ -82,7 +82,7 @@ class InWindow(NamedTuple):
 
     begin: Index  # (lanes,): number of the first thing
     number: Index  # (lanes, sets times WIDTH): of the thing in each slot; -1 for none
-    # Its nodes on the contact wire, each as row times WIDTH plus segment, behind those of the wires before it;
+    # Its nodes on the contact wire, each as row times WIDTH plus segment, behind those of the wires before;
     # the nodes on the messenger beside them are one wire further.
     node: Index  # (lanes, sets, nodes, WIDTH)
     constants: Array  # (lanes, sets, rows, WIDTH)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,11 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     of_springs = np.concatenate([mobility * weights, pull], axis=1)
     of_masts = np.concatenate([weights[::2], of_springs[::2], of_springs[1::2]], axis=1)
     ropes, hung = grid.ropes, np.flatnonzero(grid.links.stitch >= 0)
-    on_messenger, carrying = np.flatnonzero(grid.links.stitch < 0), grid.links.stitch[hung]
+    on_messenger = np.flatnonzero(grid.links.stitch < 0)
+    hung, on_messenger = (
+        each[np.argsort(at_links.first[each], kind="stable")] for each in (hung, on_messenger)
+    )
+    carrying = grid.links.stitch[hung]
     stitches = _stitches(grid, real)
     of_links[hung, HUNG.UPPER : HUNG.MOVE] = ropes.shares[hung]
     of_links[hung, HUNG.MOVE : LINK.EARLY] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
@@ -113,8 +118,9 @@ def _along(
     leaves: Index | None = None,
     enters: Index | None = None,
 ) -> AlongLine:
-    """Things in their order along the line, in the precision of ``empty``; by default they need their nodes."""
-    begin, end = (first[:, 0], first[:, -1] + NODES - 1) if leaves is None else (leaves, enters)
+    """Things in their order along the line, in the precision of ``empty``; they need their nodes at least."""
+    begin = first[:, 0] if leaves is None else leaves
+    end = first[:, -1] + NODES - 1 if enters is None else enters
     return AlongLine(
         first=np.ascontiguousarray(first),
         # A thing never leaves or enters before the one that comes before it.
@@ -219,3 +225,14 @@ def present(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, A
     number, tension = np.concatenate(numbers), np.concatenate(tensions)
     order = np.argsort(number)
     return number[order], tension[order]
+
+
+def rope_nodes(line: FlexibleLine, wire: FlexibleWire, lane: int) -> Iterator[tuple[int, Array]]:
+    """Number of each stitch wire in a lane's window, and displacements of its nodes (m); 0 at its clamps."""
+    own = wire.scattered
+    sets = own.stitches.node.shape[1]
+    moved = own.displacement[lane] - 0.5 * own.increment[lane]
+    for slot in np.flatnonzero(own.stitches.number[lane] >= 0).tolist():
+        nodes = len(moved) // sets
+        number = int(own.stitches.number[lane, slot])
+        yield number, moved[slot % sets * nodes : (slot % sets + 1) * nodes, slot // sets]

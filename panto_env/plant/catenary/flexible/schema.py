@@ -74,7 +74,8 @@ class FlexibleCatenaryData(CatenaryData):
     span_types: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
         description="types of spans by name: tables of what differs from the line's own span_length, "
-        "encumbrance, droppers, support, steady_arm and stitch_wire, and contact_height at the span's first support",
+        "encumbrance, droppers, support, steady_arm and stitch_wire, and contact_height at the span's first "
+        "support",
     )
     sequence: tuple[str | dict[str, Any], ...] = Field(
         (),
@@ -165,7 +166,7 @@ class FlexibleCatenaryData(CatenaryData):
 
     @property
     def one_by_one(self) -> bool:
-        """Whether what hangs on the wires is laid out on the grid one by one, not in rows alike in all spans."""
+        """Whether what hangs on the wires is laid out on the grid one by one, not in equal rows."""
         return bool(self.sequence) or self.stitch_wire is not None
 
     @property

@@ -16,12 +16,13 @@ from ....base.errors import InputError
 from ....base.remember import remembered
 from ....base.shown import beside
 from .beams import GRAVITY, PeriodicWire
+from .overlaps import joined, tension_lengths
 from .parts import Span
 from .schema import FlexibleCatenaryData
 from .shape import StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
 from .stitched_static import StitchedMessenger
-from .stitches import Stitches, stitches_of
+from .stitches import stitches_of
 from .whole_line import settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
@@ -48,6 +49,8 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
     height 0 and yields under the load. Raises InputError where no shape is found. The shape may be one that
     no line can have, such as with a dropper that pushes; ``hang`` refuses that.
     """
+    if line.overlaps:
+        return joined(line, [solve(part.line) for part in tension_lengths(line)])
     with np.errstate(over="ignore", invalid="ignore"):
         return settle_line(line) if line.sequence else _settle(line)
 
@@ -60,6 +63,10 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
     the support, where it can't.
     """
     shape = solve(line)
+    if line.overlaps:
+        for part in tension_lengths(line):
+            hang(part.line)
+        return shape
     _check_supports(line, shape)
     for each in _each(line):
         _check_droppers(each, shape)
@@ -190,11 +197,15 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
     length, (above, tension, mass) = settled(line.name, np.full(len(x), line.encumbrance), cut)
     stiffness = stiffness_of(droppers, length)
-    profile, ropes = upper.profile, ()
-    if stitched is not None:
-        profile, ropes = stitched.profile, stitched.shapes(above)
     return StaticShape(
-        lower.profile(contact), profile(above), arm_force, tension, length, stiffness, mass, ropes=ropes
+        lower.profile(contact),
+        upper.profile(above) if stitched is None else stitched.profile(above),
+        arm_force,
+        tension,
+        length,
+        stiffness,
+        mass,
+        ropes=() if stitched is None else stitched.shapes(above),
     )
 
 
@@ -203,7 +214,7 @@ def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
     found = stitches_of(line, 1)
     if not len(found.support):
         return None
-    at_start = Stitches(*(values[:1] for values in found[:-1]), carrying=np.minimum(found.carrying, 0))
+    at_start = found.some(slice(1), np.minimum(found.carrying, 0))
     half = line.span_length / 2
     return StitchedMessenger(
         line.messenger_wire,

@@ -9,6 +9,7 @@ import numpy as np
 from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from .attached import Links, Nodes
+from .overlaps import pairs_of
 from .schema import FlexibleCatenaryData
 from .stitches import Stitches
 
@@ -32,7 +33,7 @@ class StitchGrid(NamedTuple):
     bare_mobility: Array  # (stitches,): the same of a node without a dropper (m/N)
     node: Index  # (links,): of those on a stitch wire, the node before
     share: Array  # (links,): how far they are on from there to the next one, in intervals
-    deficit: Array  # (nodes,): by how much the messenger's tension is less from the node before to it (N)
+    deficit: Array  # (pairs, nodes): by how much a messenger's tension is less from the node before to it (N)
 
     @property
     def shares(self) -> Array:
@@ -60,7 +61,7 @@ def stitch_grid(
     none, settle = np.zeros((0, 1)), 1.0 + data.damping.alpha * step / 2
     hung = np.full(len(links.position), -1)
     if not count:
-        nothing, nodes = np.zeros(0), np.zeros(len(x))
+        nothing, nodes = np.zeros(0), np.zeros((pairs_of(data), len(x)))
         nowhere = Nodes.about(nothing)
         return StitchGrid(stitches, 0, nothing, nowhere, none, none, nothing, hung, 0.0 * hung, nodes)
     length = stitches.end - stitches.begin
@@ -71,9 +72,9 @@ def stitch_grid(
     longest = length.max() / length.min() * COARSEST * dx
     if intervals < FEWEST or spacing.max() > longest:
         raise InputError(
-            f"A grid of {dx:.3g} m and a time step of {1e3 * step:.3g} ms are too coarse for the stitch wires "
-            f"of line '{data.name}', {length.min():g} m long with waves at {speed.max():.3g} m/s; give a "
-            "smaller spacing and time_step, or longer and heavier stitch wires."
+            f"A grid of {dx:.3g} m and a time step of {1e3 * step:.3g} ms are too coarse for the stitch "
+            f"wires of line '{data.name}', {length.min():g} m long with waves at {speed.max():.3g} m/s; give "
+            "a smaller spacing and time_step, or longer and heavier stitch wires."
         )
     places = np.stack([stitches.begin, stitches.end], axis=1).ravel()
     on = links.stitch >= 0
@@ -98,5 +99,5 @@ def stitch_grid(
         bare_mobility=step**2 / bare[:, 0] / settle,
         node=node,
         share=share,
-        deficit=stitches.deficit(x - dx, x),
+        deficit=np.stack([stitches.over(2 * k).deficit(x - dx, x) for k in range(pairs_of(data))]),
     )

@@ -30,8 +30,10 @@ class StitchedMessenger:
         ends: tuple[float, float],
         slopes: tuple[float, float] | None,
     ) -> None:
-        """x: of droppers (m), (droppers,). supports: (m), (n,); springs: their stiffness (N/m), (n,). ends: of
-        what is solved (m). slopes: there, as ``LongWire`` has them; None where one end is the other one again.
+        """x: of droppers (m), (droppers,). supports: (m), (n,); springs: their stiffness (N/m), (n,).
+
+        ends: of what is solved (m). slopes: there, as ``LongWire`` has them; None where one end is the other
+        one again.
         """
         from scipy.sparse.linalg import splu  # slow to import
 

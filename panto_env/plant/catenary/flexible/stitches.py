@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ..schema import Wire
+from .overlaps import tension_lengths
 from .parts import CLOSEST
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
@@ -36,6 +38,23 @@ class Stitches(NamedTuple):
     def clamps(self) -> Array:
         """Places of all clamps (m), (2 stitches,)."""
         return np.sort(np.append(self.begin, self.end))
+
+    def over(self, wire: int) -> Stitches:
+        """Those over a contact wire, without their droppers."""
+        return self.some(self.wire == wire, self.carrying[:0])
+
+    def some(self, which: Any, carrying: Index) -> Stitches:
+        """Some of them, in another order, that carry droppers in this way."""
+        return Stitches(
+            self.support[which],
+            self.begin[which],
+            self.end[which],
+            self.tension[which],
+            self.mass[which],
+            self.clamp_mass[which],
+            self.wire[which],
+            carrying,
+        )
 
     def deficit(self, begin: Array, end: Array) -> Array:
         """By how much the messenger's tension is less (N), the mean from ``begin`` to ``end`` (m), (n,)."""
@@ -77,12 +96,47 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
     return stitches
 
 
+@remembered
+def moving_stitches(line: FlexibleCatenaryData, spans: int) -> Stitches:
+    """The stitch wires of a line of so many spans that move, of all tension lengths, in their order."""
+    parts = tension_lengths(line, spans)
+    each = [
+        placed(moving(stitches_of(part.line, part.spans), part.spans), part.begin, part.wire)
+        for part in parts
+    ]
+    return together(each, [part.droppers for part in parts])
+
+
+def placed(stitches: Stitches, begin: float, wire: int) -> Stitches:
+    """Those of a tension length that begins at a place of the line (m), over a contact wire."""
+    return stitches._replace(
+        begin=stitches.begin + begin, end=stitches.end + begin, wire=stitches.wire + wire
+    )
+
+
+def together(each: Sequence[Stitches], droppers: Sequence[Index]) -> Stitches:
+    """Those of several tension lengths, in their order along the line.
+
+    droppers: of each tension length, their numbers along the line.
+    """
+    if len(each) == 1:
+        return each[0]
+    firsts = np.append(0, np.cumsum([len(own.support) for own in each]))
+    all_of_them = Stitches(*(np.concatenate(found) for found in zip(*each, strict=True)))
+    order = np.argsort(all_of_them.begin, kind="stable")
+    rank = np.append(np.argsort(order), -1)  # the last entry is that of droppers on a messenger
+    carrying = np.full(sum(len(numbers) for numbers in droppers), -1)
+    for first, own, numbers in zip(firsts, each, droppers, strict=False):
+        carrying[numbers] = rank[np.where(own.carrying < 0, -1, first + own.carrying)]
+    return all_of_them.some(order, carrying)
+
+
 def moving(stitches: Stitches, spans: int) -> Stitches:
     """Those of a line of so many spans that move: at its ends droppers hang from the anchored messenger."""
     inner = np.flatnonzero((stitches.support > 0) & (stitches.support < spans))
     number = np.full(len(stitches.support) + 1, -1)
     number[inner] = np.arange(len(inner))  # the last entry is that of droppers on the messenger
-    return Stitches(*(values[inner] for values in stitches[:-1]), carrying=number[stitches.carrying])
+    return stitches.some(inner, number[stitches.carrying])
 
 
 def _check(line: FlexibleCatenaryData, stitches: Stitches, x: Array) -> None:

@@ -15,6 +15,7 @@ from ....base.arrays import Array
 from ....base.remember import remembered
 from ...line_condition import LineCondition
 from .beams import GRAVITY
+from .overlaps import joined, tension_lengths
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import StaticShape, solve
@@ -51,6 +52,9 @@ def with_tension_left(
 @remembered
 def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
     """Static shape of a line for its remaining tension, with the mass and stiffness of the real droppers."""
+    if designed.overlaps:
+        both = zip(tension_lengths(designed), tension_lengths(left), strict=True)
+        return joined(left, [shape_left(own.line, now.line) for own, now in both])
     was = solve(designed)
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 

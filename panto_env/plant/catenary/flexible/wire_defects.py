@@ -53,6 +53,17 @@ class WireDefects(NamedTuple):
     def __bool__(self) -> bool:
         return bool(self.spots or self.stretches)
 
+    def within(self, begin: float, end: float) -> WireDefects:
+        """Those that begin from one position of the line up to before another (m); the end cuts stretches."""
+        return WireDefects(
+            tuple(spot for spot in self.spots if begin <= spot.position < end),
+            tuple(
+                stretch._replace(end=min(stretch.end, end))
+                for stretch in self.stretches
+                if begin <= stretch.begin < end
+            ),
+        )
+
     @property
     def lightest(self) -> float:
         """Mass of the most worn wire as a share of a new one's."""
