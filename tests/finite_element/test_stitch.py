@@ -5,16 +5,13 @@ import pytest
 from scipy.linalg import eigh
 
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.schema import StitchWire
-from panto_env.plant.catenary.flexible.static import hang
 
-from . import differences
 from .energy import balance
 from .figures import figures
 from .pairs import pairs_of
 from .rest import at_rest
-from .sections import STITCHED_330, sections, stitched
+from .sections import BARE, STITCHED_330, sections, stitched
 from .simulation import simulate
 from .static import GRAVITY, static_shape
 from .stitch import Stitch, Upper
@@ -107,6 +104,17 @@ def test_supports_carry_the_weight_of_everything(holds):
     assert carried == pytest.approx(GRAVITY * own + shape.dropper_tension.sum() - lower, rel=1e-7)
 
 
+def test_a_stitch_wire_goes_on_from_one_span_to_the_next():
+    """Under droppers that are not alike on both sides of a support."""
+    line = repeated(positions=(2.0, 7.0, 20.0, 32.5, 45.0, 61.5), sag=(0.0,) * 6)
+    shape, stitch = static_shape(line, 0.5), line.stitch_wire
+    assert shape.hanger[0] == pytest.approx(shape.hanger[-1], abs=1e-12)
+    bend = np.diff(shape.hanger)[[0, -1]] / np.diff(shape.x)[[0, -1]]
+    load = stitch.mass * GRAVITY * np.diff(shape.x)[[0, -1]].sum() / 2
+    assert stitch.tension * (bend[0] - bend[1]) == pytest.approx(load, rel=1e-6)
+    assert abs(bend.sum()) > 1e-4  # and its deepest place is not at the support
+
+
 def test_a_stitch_wire_alone_has_a_string_s_frequency_and_mass():
     wire, stitch = load_catenary("re330").messenger_wire, StitchWire(length=18.0, tension=3.5e3, mass=0.31)
     upper = Upper(np.linspace(0.0, 40.0, 401), wire, [Stitch(20.0, stitch)])
@@ -153,28 +161,38 @@ def test_equal_stitched_spans_of_a_sequence_move_as_one_span_repeated():
 
 def test_every_support_has_its_own_span_s_stitch_wire_and_the_ends_have_none_in_motion():
     """Droppers hang from it between its clamps, elsewhere from the messenger; clamps' masses are there."""
-    other = {"stitch_wire": {"length": 12.0, "clamp_mass": 1.0}}
-    none = {"stitch_wire": {"length": 0.0}}
-    line = stitched("re330", CLAMPED | {"sequence": [{}, {}, other, none, {}]})
+
+    def line_of(clamp_mass, other, dropper_clamp=0.0):
+        usual = {"stitch_wire": STITCHED_330["stitch_wire"] | {"clamp_mass": clamp_mass}}
+        sequence = [{}, {}, {"stitch_wire": {"length": 12.0, "clamp_mass": other}}, BARE, {}]
+        line = stitched("re330", usual | {"sequence": sequence})
+        droppers = {"messenger_clamp_mass": dropper_clamp}
+        return stitched(
+            "re330", usual | {"sequence": [{"droppers": droppers} | span for span in line.sequence]}
+        )
+
+    line = line_of(0.4, 1.0)
     system, (rest,) = build(line, 5, 1.0), at_rest(line, 5, 1.0)
-    upper_end = [
-        row.indices[row.data > 0][0] for row in (system.extension[[k]] for k in range(len(rest.droppers)))
-    ]
-    from_stitch = np.array(upper_end) >= 4 * rest.nodes.size
+    rows = (system.extension[[k]] for k in range(len(rest.droppers)))
+    upper_end = np.array([row.indices[row.data > 0][0] for row in rows])
     x = rest.nodes[rest.droppers]
     within = (abs(x - 65) < 9) | (abs(x - 130) < 6) | (abs(x - 260) < 9)
-    assert from_stitch.tolist() == within.tolist()
+    assert (upper_end >= 4 * rest.nodes.size).tolist() == within.tolist()
     assert within.sum() == 10  # at 12 m only those at 2.5 m
-    bare = build(line.model_copy(update={"messenger_wire": line.messenger_wire}), 5, 1.0)
-    assert bare.free.size == system.free.size
-    plain = {key: {**value, "clamp_mass": 0.0} for key, value in (("stitch_wire", CLAMPED["stitch_wire"]),)}
-    light = {"stitch_wire": {"length": 12.0}}
-    lighter = build(stitched("re330", CLAMPED | plain | {"sequence": [{}, {}, light, none, {}]}), 5, 1.0)
-    added = (system.mass - lighter.mass).diagonal()
-    where = np.flatnonzero(abs(added) > 1e-9)
+    assert upper_end[~within].tolist() == (4 * rest.droppers[~within]).tolist()
+
+    def heavier(*more):
+        """Unknowns whose mass is less without something, and by how much."""
+        added = (build(line_of(*more), 5, 1.0).mass - build(line_of(0.0, 0.0), 5, 1.0).mass).diagonal()
+        return np.flatnonzero(abs(added) > 1e-9), added[abs(added) > 1e-9]
+
+    where, by = heavier(0.4, 1.0)
     assert (where % 4 == 0).all()
     assert rest.nodes[where // 4] == pytest.approx([56, 74, 124, 136, 251, 269])
-    assert added[where] == pytest.approx([0.4, 0.4, 1.0, 1.0, 0.4, 0.4])
+    assert by == pytest.approx([0.4, 0.4, 1.0, 1.0, 0.4, 0.4])
+    where, by = heavier(0.0, 0.0, 0.3)
+    assert where.tolist() == sorted(upper_end)
+    assert by == pytest.approx(0.3)
 
 
 def test_lengths_and_stiffnesses_of_droppers_hold_the_designed_shape():
@@ -186,45 +204,6 @@ def test_lengths_and_stiffnesses_of_droppers_hold_the_designed_shape():
     np.testing.assert_allclose(again.contact, shape.contact, atol=1e-8)
     np.testing.assert_allclose(again.hanger, shape.hanger, atol=1e-8)
     np.testing.assert_allclose(again.dropper_tension, shape.dropper_tension, atol=1e-3)
-
-
-TILTED = {
-    "sequence": [
-        {"contact_height": 0.05, "encumbrance": 1.7},
-        {"contact_height": 0.1, "stitch_wire": {"clamp_mass": 0.5}},
-        {"contact_height": 0.05, "stitch_wire": {"length": 0.0}},
-        {"contact_height": -0.05, "stitch_wire": {"length": 14.0, "tension": 2.5e3}},
-    ],
-    "end_support": {"contact_height": -0.2, "encumbrance": 1.65},
-}
-"""Both wires are cut on gradients, half a stitch wire with them."""
-
-
-@pytest.mark.parametrize("name", ["stitched-330", "stitched-250", "some-stitched", "tilted"])
-def test_the_simulator_s_line_at_rest_is_the_same(name):
-    line = stitched("re330", STITCHED_330 | TILTED) if name == "tilted" else sections()[name].line
-    found = differences.at_rest(line)
-    assert max(found.contact, found.messenger, found.length) < 5e-4
-    assert found.force < 1.0
-
-
-def test_the_simulator_s_elasticity_is_the_same():
-    """Of a force so small that every dropper stays taut."""
-    line = sections()["some-stitched"].line
-    places, yields = elasticity(line, 5.0)
-    (pair,), shape = pairs_of(line), hang(line)
-    closed = ClosedLine(pair.spans, pair.end, line.wires, 0.25)
-    droppers = shape.dropper_length, shape.dropper_stiffness
-    rest = built(closed, *droppers)
-    for place in range(50, len(places) - 50, 23):
-        node = int(np.searchsorted(rest.x, places[place]))
-        lifts = []
-        for each in (node - 1, node):
-            lifted = built(closed, *droppers, pushed=(each, 5.0))
-            assert lifted.dropper_tension.min() > 0
-            lifts.append((lifted.contact[each] - rest.contact[each]) / 5.0)
-        theirs = np.interp(places[place], rest.x[node - 1 : node + 1], lifts)
-        assert yields[place] == pytest.approx(theirs, rel=0.01)
 
 
 def test_energy_is_balanced_under_stitch_wires():
