@@ -266,7 +266,7 @@ def test_groups_are_copied_with_their_state():
     ("lanes", "settings", "message"),
     [
         (2, {"lines": 3} | FAMILY, "2 lanes are too few for 3 lines"),
-        (2, {"lines": 2} | SHORT, "lines are drawn from a list or a family"),
+        (2, {"lines": 2} | SHORT, "lines are drawn from a list, a family or a section"),
         (2, {"episodes_per_line": 0} | FAMILY, "episodes_per_line must be a whole number from 1"),
     ],
 )
