@@ -61,6 +61,11 @@ class DrawnLines(Settings):
     def fastest_kmh(self) -> float:
         """Maximum speed of trains on any of the lines (km/h)."""
 
+    @property
+    @abstractmethod
+    def fewest_spans(self) -> int | None:
+        """Number of spans after which a line ends at the earliest; None where none of the lines ends."""
+
     @abstractmethod
     def speeds(self, wave_speed: float, speed_kmh: Speeds | None = None) -> Speeds:
         """Lowest and highest speed of trains (km/h) by the wave speed of the contact wire (m/s).

@@ -63,6 +63,11 @@ class LineFamily(DrawnLines):
         """As ``DrawnLines.fastest_kmh``."""
         return self.max_speed_kmh
 
+    @property
+    def fewest_spans(self) -> None:
+        """As ``DrawnLines.fewest_spans``."""
+        return None
+
     def draw_once(self, random: np.random.Generator, speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
         """A line; None for one that cannot hang, or whose droppers, tensions or speeds do not fit."""
         return self._line(self._values(random), speed_kmh)

@@ -241,7 +241,10 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
 def _base(source: str) -> Any:
     """The line, or the family of lines, whose wires a section has."""
     kind, name = drawn_kind(source) or ("catenary", source)
-    base = _load(kind, name)
+    try:
+        base = _load(kind, name)
+    except InputError as error:
+        raise _TableError(f"key 'base' names no line: {str(error).rstrip('.')}") from error
     if not isinstance(base, FlexibleCatenaryData | LineFamily):
         raise _TableError(f"key 'base' must be a flexible line or a family of them (given: {shown(source)})")
     return base

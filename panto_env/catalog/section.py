@@ -21,9 +21,12 @@ from .en50119 import ROUNDING, gradient_limits, gradients
 from .family import LineFamily
 from .line_ranges import Length, Range
 from .section_parts import Bridges, Curves, Masts, Obstacles, lowered
+from .values import values_of
 
 PLACES, HEIGHTS = 3, 4
 """Decimals of lengths of spans and of heights (m), as of a survey."""
+REPLACED = ("spans", "droppers.positions", "droppers.sag")
+"""Values of the base line that the section has its own of, besides the sequence."""
 
 
 class DropperRule(Settings):
@@ -74,6 +77,11 @@ class LineSection(DrawnLines):
     def fastest_kmh(self) -> float:
         """As ``DrawnLines.fastest_kmh``."""
         return self.speed_kmh[1]
+
+    @property
+    def fewest_spans(self) -> int:
+        """As ``DrawnLines.fewest_spans``."""
+        return self.spans[0]
 
     @property
     def _limits(self) -> tuple[float, float]:
@@ -137,7 +145,7 @@ class LineSection(DrawnLines):
         return table | {
             "name": self.full_name,
             "description": f"Drawn from a section. {self.description}",
-            "sources": base.sources | {"sequence": f"drawn from {self.full_name}"},
+            "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
             "droppers": self._droppers(random, base),
             **_sequence(lengths, heights.round(HEIGHTS), encumbrances.round(HEIGHTS)),
         }
@@ -163,7 +171,10 @@ class LineSection(DrawnLines):
         steepest, change = self._limits
         legal = (np.abs(slopes) <= steepest + ROUNDING).all() and (np.abs(changes) <= change + ROUNDING).all()
         shortest = hang(line).dropper_length.min()
-        return line if legal and shortest >= self.droppers.shortest else None
+        if not legal or shortest < self.droppers.shortest:
+            return None
+        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
+        return line.model_copy(update={"sources": sources})
 
 
 def _sequence(lengths: Array, heights: Array, encumbrances: Array) -> dict[str, Any]:

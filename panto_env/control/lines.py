@@ -21,6 +21,15 @@ def draws_line(settings: RunSettings) -> bool:
     return not isinstance(settings.catenary, CatenaryData)
 
 
+def fewest_spans(settings: RunSettings) -> int | None:
+    """Number of spans after which a line ends at the earliest, whichever is drawn; None where none ends."""
+    lines = settings.catenary
+    if isinstance(lines, DrawnLines):
+        return lines.fewest_spans
+    given = lines if isinstance(lines, tuple) else (lines,)
+    return min((line.spans for line in given if line.ends), default=None)
+
+
 def line_generator(random: np.random.Generator) -> np.random.Generator:
     """The child of an episode's generator from which its line is drawn."""
     (own,) = random.spawn(1)
