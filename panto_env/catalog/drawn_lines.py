@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Annotated, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -19,8 +19,6 @@ from ..base.settings import Settings
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from .line_ranges import Length, Range, Share
 
-MOST_DRAWS = 1000
-"""Draws after which a description counts as one without lines; one in two or three draws is taken."""
 DRAWN = ("family", "section")
 """Kinds of descriptions."""
 
@@ -45,6 +43,9 @@ class Bands(Settings):
 
 class DrawnLines(Settings):
     """Lines to draw from: what all kinds have."""
+
+    most_draws: ClassVar[int]
+    """Draws after which a description counts as one without lines; one in two or three draws is taken."""
 
     kind: str
     name: str = Field(description="name in the catalogue")
@@ -99,8 +100,8 @@ class DrawnLines(Settings):
     def drawn(
         self, random: np.random.Generator, speed_kmh: Speeds | None = None
     ) -> Iterator[FlexibleCatenaryData | None]:
-        """``MOST_DRAWS`` draws: a line, or None for one that is to be drawn again."""
-        for _ in range(MOST_DRAWS):
+        """``most_draws`` draws: a line, or None for one that is to be drawn again."""
+        for _ in range(self.most_draws):
             yield self.draw_once(random, speed_kmh)
 
 

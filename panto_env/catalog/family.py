@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +14,7 @@ from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, PowerSystem
-from .drawn_lines import MOST_DRAWS, Bands, DrawnLines, Speeds, in_words
+from .drawn_lines import Bands, DrawnLines, Speeds, in_words
 from .line_ranges import (
     DampingRanges,
     DropperRanges,
@@ -30,6 +30,8 @@ from .values import values_of
 
 class LineFamily(DrawnLines):
     """Ranges of the values of flexible lines, and of the speeds of their trains."""
+
+    most_draws: ClassVar[int] = 1000
 
     kind: Literal["family"] = "family"
     speed_share: Range[Share] = Field(
@@ -76,8 +78,8 @@ class LineFamily(DrawnLines):
         """As ``DrawnLines.none_found``."""
         if speed_kmh is None:
             return (
-                f"No line of family '{self.name}' was found in {MOST_DRAWS:,} draws: they don't hang, their "
-                "droppers are too short, or their tensions don't go together; change the ranges."
+                f"No line of family '{self.name}' was found in {self.most_draws:,} draws: they don't hang, "
+                "their droppers are too short, or their tensions don't go together; change the ranges."
             )
         low, high = (f"{100 * share:g}" for share in self.speed_share)
         return (

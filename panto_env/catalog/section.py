@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,7 +16,7 @@ from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS
-from .drawn_lines import MOST_DRAWS, Bands, DrawnLines, Speeds, in_words
+from .drawn_lines import Bands, DrawnLines, Speeds, in_words
 from .en50119 import ROUNDING, gradient_limits, gradients
 from .family import LineFamily
 from .line_ranges import Length, Range
@@ -46,6 +46,8 @@ class DropperRule(Settings):
 
 class LineSection(DrawnLines):
     """Ranges of the spans of a line, one by one, on the wires of a line or of a family of lines."""
+
+    most_draws: ClassVar[int] = 100  # each takes a hundredth of a second
 
     kind: Literal["section"] = "section"
     base: FlexibleCatenaryData | LineFamily = Field(
@@ -107,18 +109,19 @@ class LineSection(DrawnLines):
                 f"{in_words(self.speed_kmh)} km/h; change the speed."
             )
         return (
-            f"No line of section '{self.name}' was found in {MOST_DRAWS:,} draws: they don't hang, their "
+            f"No line of section '{self.name}' was found in {self.most_draws} draws: they don't hang, their "
             "droppers are too short, or there is no room for the ramps to their bridges; change the ranges."
         )
 
     def draw_once(self, random: np.random.Generator, speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
-        """A line; None for one that cannot hang, has too short droppers or gradients that are too steep."""
+        """A line; None for one that cannot hang, has too short droppers or gradients that are too steep.
+
+        Raises InputError where the family of its base has no line for these speeds.
+        """
         low, high = self._own_speeds(speed_kmh)
         if not low <= high:
             return None
-        base = self.base.draw_once(random, (low, high)) if isinstance(self.base, LineFamily) else self.base
-        if base is None:
-            return None
+        base = self.base.draw(random, (low, high))[0] if isinstance(self.base, LineFamily) else self.base
         table = self._table(random, base)
         return None if table is None else self._line(table)
 

@@ -12,7 +12,6 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.analysis.family import drawn_line
-from panto_env.analysis.sweep import sweep
 from panto_env.catalog import available, load_catenary, load_drawn, load_family, load_lines
 from panto_env.catalog.loader import text_of
 from panto_env.control.lines import on_drawn_line
@@ -177,13 +176,11 @@ def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message):
 
 @pytest.mark.plain
 def test_where_one_line_is_needed_a_family_or_a_list_is_refused(tmp_path):
-    for source, speed_kmh in DRAWN.items():
+    for source in DRAWN:
         with pytest.raises(InputError, match="One line is needed here, not a list, a family or a section"):
             _ = run_settings({"catenary": source}).line
         with pytest.raises(InputError, match=f"One line is needed here, not the .* '{source}' to draw from"):
             load_catenary(source)
-        with pytest.raises(InputError, match="One line is needed here"):
-            sweep({"speed_kmh": list(speed_kmh)}, catenary=source)
     with pytest.raises(InputError, match="A list of lines must have one line"):
         run_settings({"catenary": []})
     for source in DRAWN:
