@@ -15,8 +15,7 @@ from ..base.units import to_kmh
 from ..catalog.en50119 import gradients
 from ..catalog.family import LineFamily
 from ..catalog.section import LineSection
-from ..control.lines import line_generator, on_drawn_line
-from ..control.settings import run_settings
+from ..control.lines import line_generator, line_of_seed
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from ..plant.catenary.flexible.spans import spans_of
@@ -88,14 +87,12 @@ OF_SECTIONS = ("length", "shortest_span", "longest_span", "gradient", "gradient_
 
 def drawn_line(lines: Drawn, seed: int) -> DrawnLine:
     """The line of a seed, the one that an environment with this seed has, and a run on it."""
-    settings = run_settings({"catenary": lines, "speed_kmh": (0.0, lines.fastest_kmh)})
     begun = time.perf_counter()
-    drawn = on_drawn_line(settings, lambda: np.random.default_rng(seed))
+    line, (_, speed_kmh) = line_of_seed(lines, seed)
     milliseconds = 1e3 * (time.perf_counter() - begun)
-    line, (_, speed_kmh) = drawn.line, drawn.speed_kmh
     assert isinstance(line, FlexibleCatenaryData)
     own = line_generator(np.random.default_rng(seed))
-    draws = 1 + next(k for k, one in enumerate(lines.drawn(own, settings.speed_kmh)) if one is not None)
+    draws = 1 + next(k for k, one in enumerate(lines.drawn(own, (0.0, lines.fastest_kmh))) if one is not None)
     run = simulate(line, lines.plausible.pantograph, speed_kmh, record_droppers=False)
     figures = None if run.terminated else run.summary()
     _, yields = elasticity(line, run.nominal_force)

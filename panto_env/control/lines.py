@@ -9,7 +9,7 @@ import numpy as np
 
 from ..catalog.drawn_lines import DrawnLines
 from ..plant.catenary import CatenaryData
-from .settings import RunSettings
+from .settings import RunSettings, run_settings
 
 R = TypeVar("R", bound=RunSettings)
 EXAMPLE = 4_000_000_000
@@ -52,6 +52,13 @@ def on_drawn_line(settings: R, random: Callable[[], np.random.Generator]) -> R:
         line, speed_kmh = lines.draw(own, settings.speed_kmh)
         return settings.model_copy(update={"catenary": line, "speed_kmh": speed_kmh})
     return settings.model_copy(update={"catenary": lines[own.integers(len(lines))]})
+
+
+def line_of_seed(lines: DrawnLines, seed: int) -> tuple[CatenaryData, tuple[float, float]]:
+    """The line that the first episode with a seed has, and the speeds of trains on it (km/h)."""
+    settings = run_settings({"catenary": lines, "speed_kmh": (0.0, lines.fastest_kmh)})
+    drawn = on_drawn_line(settings, lambda: np.random.default_rng(seed))
+    return drawn.line, drawn.speed_kmh
 
 
 def on_example(settings: R) -> R:
