@@ -31,9 +31,16 @@ def values_of(entry: Any) -> list[Value]:
 
 
 def _source(sources: Mapping[str, str], key: str, given: bool) -> str:
-    """Source of a value, or else of the table or list in which it is given."""
+    """Source of a value, or else of what it is a table of, or of the table or list in which it is given."""
     if key in sources or not given:
         return sources.get(key, BY_DEFAULT)
+    inner = {
+        name.removeprefix(f"{key}."): text for name, text in sources.items() if name.startswith(f"{key}.")
+    }
+    if inner:
+        return "; ".join(f"{name}: {text}" for name, text in inner.items())
+    if key == "spans" and "sequence" in sources:  # which gives their number
+        return sources["sequence"]
     while key not in sources and "." in key:
         key = key.rpartition(".")[0]
     return sources.get(key, "")

@@ -132,8 +132,8 @@ class RunSettings(Numerics):
     catenary: Annotated[Lines, BeforeValidator(load_lines)] = Field(
         "en50318-2002",
         validate_default=True,
-        description="line: a name of the catalogue or a TOML file; from a list of lines, or from a family of "
-        'them such as "family:high-speed", one is drawn per episode',
+        description="line: a name of the catalogue or a TOML file; from a list of lines, a family of them "
+        'such as "family:high-speed" or a section such as "section:main-line", one is drawn per episode',
     )
     pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
         "en50318-2002",
@@ -252,7 +252,9 @@ class RunSettings(Numerics):
     def line(self) -> CatenaryData:
         """The line. Raises InputError where one is yet to be drawn."""
         if not isinstance(self.catenary, CatenaryData):
-            raise InputError("One line is needed here, not a list or a family to draw from; name a line.")
+            raise InputError(
+                "One line is needed here, not a list, a family or a section to draw from; name a line."
+            )
         return self.catenary
 
     @property

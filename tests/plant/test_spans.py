@@ -9,7 +9,7 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
-from panto_env.catalog import available, load_catenary
+from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -18,7 +18,8 @@ from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 
-FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
+from ..uniform_lines import UNIFORM
+
 FILE = """
 kind = "flexible"
 description = "of a test"
@@ -57,7 +58,7 @@ def spelt_out(name, count=6):
     return table | {"span_types": {"usual": own}, "sequence": ["usual", own, *["usual"] * (count - 2)]}
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_equal_spans_written_out_are_the_uniform_line(name):
     line = load_catenary(name).model_copy(update={"spans": 6})
     for table in (spelt_out(name), json.loads(json.dumps(spelt_out(name)))):
