@@ -20,7 +20,7 @@ from .drawn_lines import Bands, DrawnLines, Speeds, in_words
 from .en50119 import ROUNDING, gradient_limits, gradients
 from .family import LineFamily
 from .line_ranges import Length, Range
-from .section_parts import Bridges, Curves, Masts, Obstacles, lowered
+from .section_parts import Bridges, Curves, Masts, Obstacles, Overlaps, lowered
 from .values import values_of
 
 PLACES, HEIGHTS = 3, 4
@@ -62,6 +62,7 @@ class LineSection(DrawnLines):
     obstacles: Obstacles
     masts: Masts
     bridges: Bridges
+    overlaps: Overlaps | None = Field(None, description="none by default: wires reach from end to end")
     droppers: DropperRule
     plausible: Bands
 
@@ -150,6 +151,7 @@ class LineSection(DrawnLines):
             "description": f"Drawn from a section. {self.description}",
             "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
             "droppers": self._droppers(random, base),
+            "overlaps": self.overlaps.draw(random, lengths) if self.overlaps else [],
             **_sequence(lengths, heights.round(HEIGHTS), encumbrances.round(HEIGHTS)),
         }
 

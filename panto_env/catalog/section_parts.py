@@ -1,4 +1,4 @@
-"""What decides the spans of a section one by one: curves, obstacles, masts as built, bridges.
+"""What decides the spans of a section one by one: curves, obstacles, masts as built, bridges, overlaps.
 
 Each part has the ranges of what is drawn and one method that draws it; ``section.py`` puts them together.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, NamedTuple, Self, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from ..base.arrays import Array
 from ..base.ranges import Between
 from ..base.settings import Settings
-from ..plant.catenary.schema import LONGEST_SPAN, SHORTEST_SPAN, SpanLength
+from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, SHORTEST_SPAN, SpanLength
 from .line_ranges import Length, Range, Share
 
 Radius: TypeAlias = Annotated[float, Between(50, 100_000, "m")]
@@ -112,6 +112,36 @@ class Masts(Settings):
         """Lengths of spans with planned ones (m), (spans,), between masts as built."""
         errors = random.uniform(-self.position_error, self.position_error, len(lengths) + 1)
         return lengths + np.diff(errors)
+
+
+class Overlaps(Settings):
+    """Where one pair of wires ends and the next begins, and how they rise out of reach."""
+
+    distance: Range[Annotated[float, Between(100, 5000, "m")]] = Field(
+        description="from the middle of one overlap to that of the next, and from the line's start (m)"
+    )
+    spans: Literal[1, 3, 5] = Field(description="number of spans of an overlap: 1, 3 or 5")
+    rise: Range[Annotated[float, Between(0.02, 1, "m")]] = Field(
+        description="of the wire out of use at the support beside the middle span (m); on from there it is "
+        "straight"
+    )
+
+    def draw(self, random: np.random.Generator, lengths: Array) -> list[dict[str, Any]]:
+        """Overlaps of a line with spans of these lengths (m), as its table has them."""
+        supports, found = np.append(0.0, np.cumsum(lengths)), list[dict[str, Any]]()
+        side, middle = self.spans // 2, random.uniform(*self.distance)
+        while True:
+            span = int(np.searchsorted(supports, middle)) - 1
+            begin, last = span - side, span + side
+            behind = found[-1]["first_span"] - 1 if found else 0
+            if last > len(lengths) - FEWEST_SPANS or last - behind + 1 < FEWEST_SPANS:
+                return found
+            rise = random.uniform(*self.rise)
+            slope = 4 * rise / lengths[span]  # of the parabola at the support, which begins in the middle
+            beyond = [0.0, *np.cumsum(lengths[last - side + 1 : last + 1]).tolist()]
+            rises = [round(rise + slope * way, 3) for way in beyond]
+            found.append({"first_span": begin + 1, "rises": rises})
+            middle += random.uniform(*self.distance)
 
 
 class Bridge(NamedTuple):

@@ -13,6 +13,7 @@ from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
 from panto_env.catalog.section_parts import Bridge, Masts, lowered
+from panto_env.plant.catenary.flexible.overlaps import tension_lengths
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 
@@ -37,6 +38,23 @@ def own(tmp_path, *changes, name="main-line"):
     path = tmp_path / "mine.toml"
     path.write_text(text)
     return path
+
+
+def overlaps_are_described(described, line):
+    """Each at its distance from the one before, with wires that go straight on from the parabola."""
+    supports, behind = line.alignment().supports, 0.0
+    assert line.overlaps
+    for overlap in line.overlaps:
+        assert overlap.spans == described.spans
+        assert described.rise[0] - 1e-3 <= overlap.rises[0] <= described.rise[1] + 1e-3
+        span = overlap.first_span - 1 + overlap.spans // 2
+        begin, end = supports[span], supports[span + 1]
+        assert begin - behind - line.span_length < described.distance[1]
+        assert end - behind + line.span_length > described.distance[0]
+        slopes = np.diff(overlap.rises) / line.alignment().lengths[span + 1 : span + len(overlap.rises)]
+        np.testing.assert_allclose(slopes, 4 * overlap.rises[0] / (end - begin), rtol=0.05)
+        behind = (begin + end) / 2
+    assert supports[-1] - behind < described.distance[1] + 4 * line.span_length
 
 
 @pytest.mark.plain
@@ -72,6 +90,7 @@ def test_drawn_lines_are_what_the_section_describes(name):
             x = np.array(span.droppers.positions)
             assert first[0] - 1e-9 <= x[0] <= first[1] + 1e-9
             assert 0.8 * spacing[0] < np.diff(x).min() <= np.diff(x).max() < 1.2 * spacing[1]
+        overlaps_are_described(section.overlaps, line)
     assert with_ramps > 8 or bridges.lowering[1] == 0
 
 
@@ -252,7 +271,7 @@ def test_a_section_may_have_any_line_of_one_s_own_as_its_base(tmp_path):
 def test_a_section_of_the_catalogue_has_all_values_of_its_base_line(name):
     """Only its spans are its own, so that a value that is corrected there is corrected here."""
     mine, base = (tomllib.loads(file_of(each).read_text()) for each in (name, FIXED[name][0]))
-    words = {"description", "spans", "sequence", "span_types"}
+    words = {"description", "spans", "sequence", "span_types", "overlaps"}
     assert {key: mine[key] for key in mine.keys() - words} == {key: base[key] for key in base.keys() - words}
     line = load_catenary(name)
     assert 2000.0 < line.alignment().length < 4000.0
@@ -260,6 +279,8 @@ def test_a_section_of_the_catalogue_has_all_values_of_its_base_line(name):
     assert len(set(lengths)) >= 4
     assert 40.0 <= lengths.min() < lengths.max() <= 65.0
     assert f"{line.alignment().length / 1e3:.1f} km" in line.description
+    wires = [part.end - part.begin for part in tension_lengths(line)]
+    assert 1000.0 < max(wires[:-1]) <= max(wires) <= 1400.0
 
 
 @pytest.mark.parametrize(
