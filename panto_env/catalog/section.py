@@ -20,11 +20,13 @@ from .drawn_lines import Bands, DrawnLines, Speeds, in_words
 from .en50119 import ROUNDING, gradient_limits, gradients
 from .family import LineFamily
 from .line_ranges import Length, Range
-from .section_parts import Bridges, Curves, Masts, Obstacles, Overlaps, lowered
+from .section_parts import Bridge, Bridges, Curves, Masts, Obstacles, Overlaps, lowered
 from .values import values_of
 
 PLACES, HEIGHTS = 3, 4
 """Decimals of lengths of spans and of heights (m), as of a survey."""
+FLAT = 1e-6
+"""Height of the contact wire (m) below which it counts as not lowered."""
 REPLACED = ("spans", "droppers.positions", "droppers.sag")
 """Values of the base line that the section has its own of, besides the sequence."""
 
@@ -151,9 +153,20 @@ class LineSection(DrawnLines):
             "description": f"Drawn from a section. {self.description}",
             "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
             "droppers": self._droppers(random, base),
-            "overlaps": self.overlaps.draw(random, lengths) if self.overlaps else [],
+            "overlaps": self._overlaps(random, lengths, heights, bridges),
             **_sequence(lengths, heights.round(HEIGHTS), encumbrances.round(HEIGHTS)),
         }
+
+    def _overlaps(
+        self, random: np.random.Generator, lengths: Array, heights: Array, bridges: list[Bridge]
+    ) -> list[dict[str, Any]]:
+        """Overlaps of a line, none of them under a bridge or on a ramp to it, nor beside."""
+        if self.overlaps is None:
+            return []
+        level = (np.abs(heights[1:]) < FLAT) & (np.abs(heights[:-1]) < FLAT)
+        for bridge in bridges:
+            level[max(bridge.span - 1, 0) : bridge.span + 2] = False
+        return self.overlaps.draw(random, lengths, level)
 
     def _droppers(self, random: np.random.Generator, base: FlexibleCatenaryData) -> dict[str, Any]:
         """The line's table of droppers, by the rule that all its spans follow."""

@@ -126,22 +126,36 @@ class Overlaps(Settings):
         "straight"
     )
 
-    def draw(self, random: np.random.Generator, lengths: Array) -> list[dict[str, Any]]:
-        """Overlaps of a line with spans of these lengths (m), as its table has them."""
-        supports, found = np.append(0.0, np.cumsum(lengths)), list[dict[str, Any]]()
-        side, middle = self.spans // 2, random.uniform(*self.distance)
+    def draw(self, random: np.random.Generator, lengths: Array, free: Any) -> list[dict[str, Any]]:
+        """Overlaps of a line with spans of these lengths (m), as its table has them.
+
+        free: whether each span may be part of one, (spans,): the nearest place where all are is taken.
+        """
+        supports, side = np.append(0.0, np.cumsum(lengths)), self.spans // 2
+        middles, found = (supports[1:] + supports[:-1]) / 2, list[dict[str, Any]]()
+        behind, least = (
+            0.0,
+            FEWEST_SPANS,
+        )  # where the last one is (m), and spans that wires reach over at least
         while True:
-            span = int(np.searchsorted(supports, middle)) - 1
-            begin, last = span - side, span + side
-            behind = found[-1]["first_span"] - 1 if found else 0
-            if last > len(lengths) - FEWEST_SPANS or last - behind + 1 < FEWEST_SPANS:
+            first = found[-1]["first_span"] - 1 + self.spans if found else 0
+            spans = [
+                span
+                for span in range(
+                    max(first + side, least - side - 1), len(lengths) - max(side, least - side - 1)
+                )
+                if free[span - side : span + side + 1].all() and middles[span] > behind + self.distance[0] / 2
+            ]
+            wanted = behind + random.uniform(*self.distance)
+            if not spans or wanted > supports[-1] - self.distance[0] / 4:
                 return found
+            span = min(spans, key=lambda each: abs(float(middles[each]) - wanted))
             rise = random.uniform(*self.rise)
             slope = 4 * rise / lengths[span]  # of the parabola at the support, which begins in the middle
-            beyond = [0.0, *np.cumsum(lengths[last - side + 1 : last + 1]).tolist()]
+            beyond = [0.0, *np.cumsum(lengths[span + 1 : span + side + 1]).tolist()]
             rises = [round(rise + slope * way, 3) for way in beyond]
-            found.append({"first_span": begin + 1, "rises": rises})
-            middle += random.uniform(*self.distance)
+            found.append({"first_span": span - side + 1, "rises": rises})
+            behind = float(middles[span])
 
 
 class Bridge(NamedTuple):
