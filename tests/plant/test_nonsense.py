@@ -89,7 +89,15 @@ def case_of(seed):
         "line_condition": conditions[random.integers(3)],
         "sequence": sequence_of(np.random.default_rng([seed, 1])),
     }
+    case |= {"stitch": stitch_of(np.random.default_rng([seed, 3])), "at_overlap": seed % 2 == 0}
     return case | drawn_section(np.random.default_rng([seed, 2]), case["line"][1])
+
+
+def stitch_of(random):
+    """Of a third of the lines, stitch wires: droppers on each side, share of the tension, mass (kg/m)."""
+    if random.random() > 1 / 3:
+        return None
+    return int(random.integers(1, 3)), random.uniform(0.05, 0.4), random.uniform(0.1, 0.8)
 
 
 def drawn_section(random, changed):
@@ -115,6 +123,14 @@ def sequence_of(random):
 def made(case):
     """Line and pantograph of a case. Raises ValueError where no line or pantograph has such values."""
     line, pantograph = (scaled(*case[name]) for name in ("line", "pantograph"))
+    if case["stitch"]:
+        hung, share, mass = case["stitch"]
+        x, tension = line.droppers.positions, float(np.clip(share * line.messenger_wire.tension, 500, 20e3))
+        stitch = {"length": x[hung - 1] + x[hung], "tension": tension, "mass": mass, "clamp_mass": 0.2}
+        table = line.model_dump(exclude={"sources"}, exclude_none=True)
+        if line.sequence:
+            del table["spans"]
+        line = type(line).model_validate(table | {"stitch_wire": stitch})
     if case["sequence"]:
         spans = [
             {"span_length": length * line.span_length, "contact_height": height}
@@ -123,6 +139,14 @@ def made(case):
         table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
         line = type(line).model_validate(table | {"sequence": spans})
     return line, pantograph
+
+
+def place_in(line, spans, at_overlap):
+    """Spans of the same number that begin with an overlap, or else with a bridge's ramp."""
+    if at_overlap and line.overlaps:
+        first = max(line.overlaps[0].first_span, spans[0])
+        return first, first + spans[1] - spans[0]
+    return bridge_in(line, spans)
 
 
 def bridge_in(line, spans):
@@ -173,8 +197,8 @@ def check(case):
         return "schema"
     section = line.name.startswith("section:")
     spans = USUAL_SPANS if case["speed_kmh"] > SLOW else SLOW_SPANS
-    if section:  # where its bridge begins, if it has one
-        spans = bridge_in(line, spans)
+    if section:  # where its bridge or its overlap begins, if it has one
+        spans = place_in(line, spans, case["at_overlap"])
     numbers = {
         "line_condition": case["line_condition"],
         "record_droppers": False,
@@ -200,6 +224,7 @@ def check(case):
         return "ended"
     fine = finer(line, pantograph, case, run, **numbers)
     where = ", spans that differ" * bool(case["sequence"]) + ", drawn section" * section
+    where += ", stitched" * bool(case["stitch"])
     assert not fine.terminated
     ours, true = run.summary(spans), fine.summary(spans)
     if pantograph.hard_contact:
