@@ -63,6 +63,11 @@ class Plant:
             numerics=numerics or Numerics(),
             runs=runs,
         )
+        if bilateral and self.model.wires_per_collector > 1:
+            raise InputError(
+                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has overlaps "
+                "of two; take a line without overlaps."
+            )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         count, actuator = len(train.collectors), train.first.actuator

@@ -296,6 +296,16 @@ def test_overlaps_that_the_line_has_no_room_for_are_refused(overlaps, message):
         hang(line_of(overlaps))
 
 
+def test_what_knows_one_wire_refuses_overlaps():
+    with pytest.raises(
+        InputError, match=r"may pull \(bilateral\) has one wire, and line 're330' has overlaps"
+    ):
+        run(line_of(), bilateral=True)
+    rig = load_catenary("rig-flexible")
+    with pytest.raises(InputError, match="follows one contact wire, and its line has overlaps of two"):
+        simulate(rig.model_copy(update={"line": line_of()}), "dsa380", 200.0, distance=100.0)
+
+
 def test_a_uniform_line_has_no_overlaps():
     with pytest.raises(ValueError, match="needs a sequence of its spans"):
         FlexibleCatenaryData.model_validate(

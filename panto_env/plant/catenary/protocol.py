@@ -48,6 +48,7 @@ class CatenaryModel(Protocol):
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: the wire's state in all lanes
     massless: bool  # whether the contact wire has no mass of its own
+    wires_per_collector: int  # maximum number of contact wires that a collector touches at a time
     contact_gain: float  # inverse of the stiffness at which an explicit contact law is unstable (m/N)
     grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it

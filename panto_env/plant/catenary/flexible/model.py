@@ -73,6 +73,7 @@ class FlexibleCatenary:
         self.time_step = chosen.time_step
         self.line = constants(data, shape, spans, numerics, chosen, own)
         self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
+        self.wires_per_collector = self.line.pairs
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
         self.alignment = alignment = data.alignment(spans)
