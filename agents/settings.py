@@ -63,8 +63,8 @@ class Training(Settings):
     )
     lines: Count | None = Field(
         None,
-        description="lines side by side where the environment's catenary is a list or a family; by default "
-        "one per lane",
+        description="lines side by side where the environment's catenary is a list, a family or a section; "
+        "by default one per lane",
     )
     episodes_per_line: Count = Field(
         1, description="episodes in each lane, on average, before the next line is drawn"

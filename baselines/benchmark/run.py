@@ -17,10 +17,11 @@ from panto_env.base.table_file import TABLES, write_rows
 from panto_env.base.version import __version__
 from panto_env.cluster import spread
 from panto_env.control import Task
-from panto_env.control.lines import on_example
+from panto_env.control.lines import fewest_spans, on_example
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.labels import HEADINGS
 from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.plant.catenary.schema import CLEAR
 
 from ..oracle.stored import stored_ratio
 from . import actions, apart
@@ -162,8 +163,11 @@ def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]])
 def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
-    task = Task(far_enough(on_example(run_settings(given))))
+    chosen = run_settings(given)
+    task = Task(far_enough(on_example(chosen)))
     last = task.plant.alignment.last_whole_span(task.length.distance)
+    if (shortest := fewest_spans(chosen)) is not None:  # whose end reflects waves
+        last = min(last, shortest - CLEAR)
     first, last = line.spans or (FIRST_SETTLED, last)
     where = f"on line '{line.catenary}', where every run covers {task.length.distance:g} m"
     if not 1 <= first <= last:

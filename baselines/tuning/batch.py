@@ -100,7 +100,7 @@ def _low_passed(task: Task) -> Array:
     time_step, alignment = task.plant.time_step, task.plant.alignment
     force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
     middle = np.arange(force.shape[1]) + 0.5
-    spans = chosen_spans(None, task.length.distance, alignment)
+    spans = chosen_spans(None, task.length.distance, alignment, task.plant.catenary.ends)
     assert spans is not None  # None stands for the choice "all" only
     inside = [alignment.within(task.plant.position(lane, middle), spans) for lane in range(task.lanes)]
     count = min(int(own.sum()) for own in inside)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.table import Table
+from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
 from ..metrics.criterion import Criterion
-from ..metrics.en50119 import SOURCE, gradient_limits, highest_speed
 from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
 from ..plant.catenary.flexible.elasticity import PLACES, elasticity, non_uniformity
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -95,9 +95,8 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
     droppers = droppers_at_rest(line)
     places, elasticities = elasticity(line, force)
     spans, heights, _ = spans_of(line)
-    supports = np.array(line.alignment().supports)
-    gradients = 1e3 * np.diff(heights) / np.diff(supports)
-    changes = np.diff(gradients, prepend=gradients[:1])
+    supports = line.alignment().supports
+    slopes, changes = gradients(heights, supports)
     per_span = elasticities.reshape(-1, PLACES + 1)
     inner = range(len(spans)) if not line.sequence else range(1, len(spans) - 1)
     yields = {k: per_span[n if line.sequence else 0] for n, k in enumerate(inner)}
@@ -108,11 +107,11 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
         found.append(
             SpanCheck(
                 k + 1,
-                float(supports[k]),
+                supports[k],
                 span.span_length,
                 span.encumbrance,
                 span.contact_height,
-                float(gradients[k]),
+                float(slopes[k]),
                 float(changes[k]),
                 max(span.droppers.sag),
                 min(forces),

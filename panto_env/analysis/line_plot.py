@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.colours import BLUE, GREEN, SUPPORT, VERMILION
+from ..base.colours import BLUE, GREEN, ORANGE, SUPPORT, VERMILION
 from ..base.marks import POSITION, mark_supports
+from ..plant.catenary.flexible.attached import dropper_positions
+from ..plant.catenary.flexible.overlaps import profiles
 from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.flexible.static import hang
 from .line_check import LineCheck
@@ -38,7 +40,8 @@ def plot_line(found: LineCheck) -> Figure:
     spans, heights, encumbrances = spans_of(line) if line.sequence else spans_of(line, SHOWN)
     supports = np.array(line.alignment(len(spans)).supports)
     between = [np.linspace(*ends, POINTS) for ends in pairwise(supports)]
-    droppers = np.concatenate([supports[k] + span.droppers.positions for k, span in enumerate(spans)])
+    parts = profiles(line, shape, len(spans))
+    droppers = dropper_positions(line, len(spans))
     x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
     width = min(max(9.0, supports[-1] / PER_INCH), WIDEST)
     figure = Figure(figsize=(width, 8.2), layout="constrained")
@@ -47,22 +50,33 @@ def plot_line(found: LineCheck) -> Figure:
         mark_supports(axis, supports.tolist())
     tops = np.array(heights) + encumbrances
     wires.vlines(supports, min(heights) - 0.15, tops, color=SUPPORT, linewidth=2.5, label="support")
-    wires.plot(x, shape.messenger.height(x), color=GREEN, label="messenger wire")
-    wires.plot(x, shape.contact.height(x), color=BLUE, label="contact wire")
-    ends = shape.contact.height(droppers), shape.messenger.height(droppers)
-    wires.vlines(droppers, *ends, color="0.3", linewidth=0.8, label="dropper")
+    bottoms = np.zeros(len(droppers))
+    for part, lower, upper in parts:
+        own = x[(x >= part.begin) & (x <= part.end)]
+        wires.plot(own, upper.height(own - part.begin), color=GREEN, label="messenger wire")
+        wires.plot(own, lower.height(own - part.begin), color=BLUE, label="contact wire")
+        bottoms[part.droppers] = lower.height(droppers[part.droppers] - part.begin)
+    for rope in shape.ropes:
+        for begin in [0.0] if line.sequence else supports:
+            wires.plot(begin + rope.places, rope.heights, color=ORANGE, linewidth=1.0, label="stitch wire")
+    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
+    tops_of_droppers = bottoms + np.tile(stretched, len(droppers) // len(stretched))
+    wires.vlines(droppers, bottoms, tops_of_droppers, color="0.3", linewidth=0.8, label="dropper")
     for k, span in enumerate(spans):
         wires.annotate(
-            f"{k + 1}\n{span.span_length:g} m",
+            f"{k + 1}\n{span.span_length:.3g} m",
             ((supports[k] + supports[k + 1]) / 2, tops.max()),
             ha="center",
             va="top",
             fontsize="x-small",
         )
     wires.set(ylabel="height (m)", title=_title(found))
-    figure.legend(*wires.get_legend_handles_labels(), loc="outside upper right", ncols=4, fontsize="small")
-    contact.plot(x, 1e3 * shape.contact.height(x), color=BLUE)
-    contact.plot(droppers, 1e3 * shape.contact.height(droppers), ".", color=BLUE)
+    named = dict(zip(*reversed(wires.get_legend_handles_labels()), strict=True))  # each name once
+    figure.legend(named.values(), named, loc="outside upper right", ncols=5, fontsize="small")
+    for part, lower, _ in parts:
+        own = x[(x >= part.begin) & (x <= part.end)]
+        contact.plot(own, 1e3 * lower.height(own - part.begin), color=BLUE)
+    contact.plot(droppers, 1e3 * bottoms, ".", color=BLUE)
     contact.set(ylabel="contact wire (mm)")
     elasticity.plot(*_elasticity(found, supports), color=VERMILION)
     elasticity.set(xlabel=POSITION, ylabel=f"elasticity\nat {found.force:g} N (mm/N)", xlim=(0, supports[-1]))

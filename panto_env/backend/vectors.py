@@ -140,8 +140,8 @@ def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -
     return builder.bitcast(first, ir.VectorType(data.type.pointee, count).as_pointer())
 
 
-def _is_table(array: Any) -> bool:
-    return isinstance(array, types.Array) and array.ndim == 2 and array.layout == "C"
+def _is_table(array: Any, dimensions: tuple[int, ...] = (2,)) -> bool:
+    return isinstance(array, types.Array) and array.ndim in dimensions and array.layout == "C"
 
 
 def _load_plain(rows: Any, i: int) -> Any:
@@ -237,10 +237,10 @@ def _number(k: int) -> Any:
 
 @in_python(_gather_plain)
 def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
-    """``gather(rows, places, i)``: the numbers of a table (rows, WIDTH), counted row by row, at the places in
-    row i of ``places``, (n, WIDTH), as a vector.
+    """``gather(rows, places, i)``: the numbers of a table (..., rows, WIDTH), counted row by row, at the
+    places in row i of ``places``, (n, WIDTH), as a vector.
     """
-    if not (_is_table(rows) and _are_places(places) and isinstance(i, types.Integer)):
+    if not (_is_table(rows, (2, 3)) and _are_places(places) and isinstance(i, types.Integer)):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
@@ -259,7 +259,7 @@ def scatter_add(typing: Any, first: Any, second: Any, places: Any, i: Any, vecto
     """``scatter_add(first, second, places, i, vector)``: add a vector to the numbers of two tables that
     ``gather`` reads at these places.
     """
-    tables = _is_table(first) and _is_table(second) and _are_places(places)
+    tables = _is_table(first, (2, 3)) and _is_table(second, (2, 3)) and _are_places(places)
     if not (tables and isinstance(i, types.Integer)):
         return None
 

@@ -1,5 +1,23 @@
-"""Published pantographs and lines, and families of lines: TOML files, each value with its source."""
+"""Published pantographs and lines, families of lines and sections: TOML files, each value with its source."""
 
-from .loader import available, load_catenary, load_family, load_lines, load_pantograph, unusual
+from .loader import (
+    available,
+    load_catenary,
+    load_drawn,
+    load_family,
+    load_lines,
+    load_pantograph,
+    load_section,
+    unusual,
+)
 
-__all__ = ["available", "load_catenary", "load_family", "load_lines", "load_pantograph", "unusual"]
+__all__ = [
+    "available",
+    "load_catenary",
+    "load_drawn",
+    "load_family",
+    "load_lines",
+    "load_pantograph",
+    "load_section",
+    "unusual",
+]

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ..base.errors import InputError
 from ..base.ranges import Between
-from ..base.settings import Settings
 from ..base.units import to_kmh
 from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, PowerSystem
+from .drawn_lines import Bands, DrawnLines, Speeds, in_words
 from .line_ranges import (
     DampingRanges,
     DropperRanges,
-    Length,
     PreSagRange,
     Range,
     Share,
@@ -30,37 +27,13 @@ from .line_ranges import (
 )
 from .values import values_of
 
-PREFIX = "family:"
-"""Beginning of the name of a family where a line is expected, and of the names of lines drawn from it."""
-MOST_DRAWS = 1000
-"""Draws after which a family counts as one without lines; one in two or three draws is taken."""
 
-Speeds: TypeAlias = tuple[float, float]
-
-
-class Bands(Settings):
-    """What a passive run and the elasticity of a drawn line may be; `panto family` checks it."""
-
-    pantograph: str = Field(description="of that run, which is at the highest speed of the line's trains")
-    force_deviation: Range[Share] = Field(
-        description="standard deviation of the contact force over its mean (-)"
-    )
-    uplift: Range[Length] = Field(description="maximum uplift at a support (m)")
-    elasticity: Range[Annotated[float, Between(0, 0.1, "m/N")]] = Field(
-        description="maximum static uplift per newton along a span (m/N)"
-    )
-    non_uniformity: Range[Annotated[float, Between(0, 100, "%")]] = Field(
-        description="EN 50119's non-uniformity of the elasticity (%)"
-    )
-
-
-class LineFamily(Settings):
+class LineFamily(DrawnLines):
     """Ranges of the values of flexible lines, and of the speeds of their trains."""
 
+    most_draws: ClassVar[int] = 1000
+
     kind: Literal["family"] = "family"
-    name: str = Field(description="name in the catalogue")
-    description: str = Field(description="what the lines are and how the ranges were chosen")
-    sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
     speed_share: Range[Share] = Field(
         description="speeds of trains, as shares of the wave speed of the contact wire (-)"
     )
@@ -87,43 +60,35 @@ class LineFamily(Settings):
     damping: DampingRanges
     plausible: Bands
 
-    def draw(
-        self, random: np.random.Generator, speed_kmh: Speeds | None = None
-    ) -> tuple[FlexibleCatenaryData, Speeds]:
-        """A line, and the speeds of trains on it (km/h).
+    @property
+    def fastest_kmh(self) -> float:
+        """As ``DrawnLines.fastest_kmh``."""
+        return self.max_speed_kmh
 
-        A line is drawn again where it cannot hang, a dropper is too short, the tensions do not go together,
-        or no speed of ``speed_kmh`` (km/h) is one for this line; the returned speeds are those of
-        ``speed_kmh`` that are. Raises InputError where no line is found.
-        """
-        for line in self.drawn(random, speed_kmh):
-            if line is not None:
-                return line, self.speeds(line.contact_wire.wave_speed, speed_kmh)
+    @property
+    def fewest_spans(self) -> None:
+        """As ``DrawnLines.fewest_spans``."""
+        return None
+
+    def draw_once(self, random: np.random.Generator, speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
+        """A line; None for one that cannot hang, or whose droppers, tensions or speeds do not fit."""
+        return self._line(self._values(random), speed_kmh)
+
+    def none_found(self, speed_kmh: Speeds | None) -> str:
+        """As ``DrawnLines.none_found``."""
         if speed_kmh is None:
-            raise InputError(
-                f"No line of family '{self.name}' was found in {MOST_DRAWS:,} draws: they don't hang, their "
-                "droppers are too short, or their tensions don't go together; change the ranges."
+            return (
+                f"No line of family '{self.name}' was found in {self.most_draws:,} draws: they don't hang, "
+                "their droppers are too short, or their tensions don't go together; change the ranges."
             )
         low, high = (f"{100 * share:g}" for share in self.speed_share)
-        raise InputError(
-            f"Family '{self.name}' has no line for {' to '.join(f'{v:g}' for v in sorted(set(speed_kmh)))} "
-            f"km/h: its trains run at {low} to {high} % of the wave speed, and at most at "
-            f"{self.max_speed_kmh:g} km/h; change the speed."
+        return (
+            f"Family '{self.name}' has no line for {in_words(speed_kmh)} km/h: its trains run at {low} to "
+            f"{high} % of the wave speed, and at most at {self.max_speed_kmh:g} km/h; change the speed."
         )
 
-    def drawn(
-        self, random: np.random.Generator, speed_kmh: Speeds | None = None
-    ) -> Iterator[FlexibleCatenaryData | None]:
-        """``MOST_DRAWS`` draws: a line, or None for one that is to be drawn again."""
-        for _ in range(MOST_DRAWS):
-            yield self._line(self._values(random), speed_kmh)
-
     def speeds(self, wave_speed: float, speed_kmh: Speeds | None = None) -> Speeds:
-        """Lowest and highest speed of trains (km/h) by the wave speed (m/s).
-
-        speed_kmh: speeds to choose from (km/h), by default any. The lowest is above the highest where there
-        is none.
-        """
+        """As ``DrawnLines.speeds``."""
         low, high = (share * to_kmh(wave_speed) for share in self.speed_share)
         least, most = speed_kmh or (0.0, math.inf)
         return max(least, low), min(most, high, self.max_speed_kmh)  # in this order nan stays nan
@@ -162,15 +127,14 @@ class LineFamily(Settings):
         least, most = self.tension_ratio
         if not low <= high or not least <= messenger["tension"] / contact["tension"] <= most:
             return None
-        name = f"{PREFIX}{self.name}"
         try:
             line = FlexibleCatenaryData.model_validate(
-                {"name": name, "description": f"Drawn from a family. {self.description}", **values}
+                {"name": self.full_name, "description": f"Drawn from a family. {self.description}", **values}
             )
             check_line(line)
         except ValueError:  # InputError too
             return None
         if hang(line).dropper_length.min() < self.droppers.shortest:
             return None
-        sources = {each.key: each.source or f"drawn from {name}" for each in values_of(line)}
+        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
         return line.model_copy(update={"sources": sources})

@@ -19,30 +19,35 @@ from ..base.names import nearest, suggest
 from ..base.settings import Settings
 from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.build import check_at_rest
 from ..plant.pantograph.schema import PantographData
-from .family import PREFIX, LineFamily
+from .drawn_lines import DRAWN, DrawnLines
+from .family import LineFamily
+from .section import LineSection
 from .unusual import Ranges, ranges_of, remarks
 
 E = TypeVar("E", CatenaryData, PantographData)
 
-Lines = CatenaryData | tuple[CatenaryData, ...] | LineFamily
-"""A line, lines to choose from, or a family to draw from."""
+Lines = CatenaryData | tuple[CatenaryData, ...] | LineFamily | LineSection
+"""A line, lines to choose from, or a family or a section to draw from."""
 FOLDERS = {
     "catenary": Path(__file__).parent / "catenaries",
     "pantograph": Path(__file__).parent / "pantographs",
     "family": Path(__file__).parent / "families",
+    "section": Path(__file__).parent / "sections",
 }
 SCHEMAS: dict[str, Mapping[str, type[Settings]]] = {
     "catenary": {name: kind.schema for name, kind in CATENARIES.items()},
     "pantograph": {"pantograph": PantographData},
     "family": {"family": LineFamily},
+    "section": {"section": LineSection},
 }
-"""Schemas of each family by the value of ``kind``."""
+"""Schemas of each part of the catalogue by the value of ``kind``."""
 
 
 def available(family: str) -> tuple[str, ...]:
-    """Names in the catalogue; ``family`` is "catenary", "pantograph" or "family" (of lines)."""
+    """Names in the catalogue; ``family`` is "catenary", "pantograph", "family" (of lines) or "section"."""
     return tuple(sorted(path.stem for path in FOLDERS[family].glob("*.toml")))
 
 
@@ -52,8 +57,8 @@ def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
     Raises InputError, naming the file and the key, where it cannot be read or is not valid. Warns of values
     far from the catalogue's.
     """
-    if isinstance(source, str) and source.startswith(PREFIX):
-        raise InputError(f"One line is needed here, not the family '{source}' to draw from; name a line.")
+    if drawn := drawn_kind(source):
+        raise InputError(f"One line is needed here, not the {drawn[0]} '{source}' to draw from; name a line.")
     return _checked(source if isinstance(source, CatenaryData) else _load("catenary", source), source)
 
 
@@ -72,32 +77,56 @@ def load_family(source: str | Path | LineFamily) -> LineFamily:
     Raises InputError, naming the file and the key, where it cannot be read, is not valid, or has no lines.
     Warns of values of an example line that are far from the catalogue's.
     """
-    if isinstance(source, LineFamily):
-        return source
-    family: LineFamily = _load("family", source)
-    if source != family.name:
-        _checked(family.draw(np.random.default_rng(0))[0], source)
+    family: LineFamily = source if isinstance(source, LineFamily) else _load_drawn("family", source)
     return family
 
 
+def load_section(source: str | Path | LineSection) -> LineSection:
+    """Section to draw from, from a catalogue name, a TOML file, or one already loaded; as ``load_family``."""
+    section: LineSection = source if isinstance(source, LineSection) else _load_drawn("section", source)
+    return section
+
+
+def load_drawn(source: Any) -> LineFamily | LineSection:
+    """A family or a section, by its name or TOML file with or without its kind before it, or already loaded.
+
+    Raises InputError as ``load_family`` does.
+    """
+    if isinstance(source, LineFamily | LineSection):
+        return source
+    kind, name = drawn_kind(source) or (_kind_of(source), source)
+    return load_section(name) if kind == "section" else load_family(name)
+
+
 def load_lines(source: Any) -> Lines:
-    """A line, a list of lines, or a family by its name or TOML file after "family:".
+    """A line, a list of lines, or a family or a section by its kind, a colon and its name or TOML file.
 
     Raises InputError as ``load_catenary`` and ``load_family`` do, and for an empty list.
     """
-    if isinstance(source, LineFamily):
+    if isinstance(source, LineFamily | LineSection):
         return source
     if isinstance(source, list | tuple):
         if not source:
             raise InputError("A list of lines must have one line or more.")
         return tuple(load_catenary(each) for each in source)
-    if isinstance(source, str) and source.startswith(PREFIX):
-        return load_family(source.removeprefix(PREFIX))
-    return load_catenary(source)
+    return load_drawn(source) if drawn_kind(source) else load_catenary(source)
+
+
+def drawn_kind(source: Any) -> tuple[str, str] | None:
+    """Kind and name, or file, of "family:name" or "section:name"; None for anything else."""
+    kind, colon, name = source.partition(":") if isinstance(source, str) else ("", "", "")
+    return (kind, name) if colon and kind in DRAWN else None
+
+
+def _kind_of(source: Any) -> str:
+    """Kind of a family or a section without it: the file's, or where the catalogue has its name."""
+    if str(source).endswith(".toml"):
+        return str(read_toml(source).get("kind"))
+    return next((kind for kind in DRAWN if source in available(kind)), DRAWN[0])
 
 
 def text_of(name: str) -> str:
-    """Text of the TOML file of a line, a pantograph or a family of the catalogue, as a start for your own.
+    """Text of the TOML file of a line, pantograph, family or section of the catalogue, as a start for yours.
 
     Raises InputError where the catalogue does not have this name.
     """
@@ -106,7 +135,7 @@ def text_of(name: str) -> str:
             return (FOLDERS[family] / f"{name}.toml").read_text(encoding="utf-8")
     known = [each for family in FOLDERS for each in available(family)]
     raise InputError(
-        f"No line, pantograph or family of the catalogue is called '{name}': {suggest(name, known)}."
+        f"No line, pantograph, family or section of the catalogue is called '{name}': {suggest(name, known)}."
     )
 
 
@@ -128,6 +157,13 @@ def _checked(entry: E, source: Any) -> E:
         for sentence in unusual(entry):
             warnings.warn(sentence, UnusualWarning, stacklevel=3)
     return entry
+
+
+def _load_drawn(kind: str, source: Any) -> Any:
+    found = _load(kind, source)
+    if source != found.name:
+        _checked(found.draw(np.random.default_rng(0))[0], source)
+    return found
 
 
 def _load(family: str, source: str | Path) -> Any:
@@ -183,6 +219,8 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
         schema = _schema(family, table)
         if "line" in schema.model_fields and isinstance(table.get("line"), str):
             table["line"] = _load("catenary", table["line"])  # a rig may name its computed line
+        if "base" in schema.model_fields and isinstance(table.get("base"), str):
+            table["base"] = _base(table["base"])
         entry = schema.model_validate(table)
     except ValidationError as error:
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
@@ -191,13 +229,25 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
     try:
         if isinstance(entry, CatenaryData):
             check_line(entry)
-        elif isinstance(entry, LineFamily):
+        elif isinstance(entry, DrawnLines):
             entry.draw(np.random.default_rng(0))
         elif isinstance(entry, PantographData):
             check_at_rest(entry)
     except InputError as error:
         raise InputError(f"{path} is not a valid entry: {error}") from error
     return entry
+
+
+def _base(source: str) -> Any:
+    """The line, or the family of lines, whose wires a section has."""
+    kind, name = drawn_kind(source) or ("catenary", source)
+    try:
+        base = _load(kind, name)
+    except InputError as error:
+        raise _TableError(f"key 'base' names no line: {str(error).rstrip('.')}") from error
+    if not isinstance(base, FlexibleCatenaryData | LineFamily):
+        raise _TableError(f"key 'base' must be a flexible line or a family of them (given: {shown(source)})")
+    return base
 
 
 def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
@@ -208,8 +258,11 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
         return next(iter(schemas.values()))
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
-    if family == "catenary" and table["kind"] == "family":
-        raise _TableError(f"it is a family of lines, so give it with '{PREFIX}' before its path")
+    if family in ("catenary", *DRAWN) and table["kind"] in DRAWN and table["kind"] != family:
+        what = (
+            f"a {table['kind']} of lines" if table["kind"] == "family" else f"a {table['kind']} to draw from"
+        )
+        raise _TableError(f"it is {what}, so give it with '{table['kind']}:' before its path")
     if not isinstance(table["kind"], str) or table["kind"] not in schemas:
         raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
     return schemas[table["kind"]]

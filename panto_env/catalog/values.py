@@ -31,9 +31,16 @@ def values_of(entry: Any) -> list[Value]:
 
 
 def _source(sources: Mapping[str, str], key: str, given: bool) -> str:
-    """Source of a value, or else of the table or list in which it is given."""
+    """Source of a value, or else of what it is a table of, or of the table or list in which it is given."""
     if key in sources or not given:
         return sources.get(key, BY_DEFAULT)
+    inner = {
+        name.removeprefix(f"{key}."): text for name, text in sources.items() if name.startswith(f"{key}.")
+    }
+    if inner:
+        return "; ".join(f"{name}: {text}" for name, text in inner.items())
+    if key == "spans" and "sequence" in sources:  # which gives their number
+        return sources["sequence"]
     while key not in sources and "." in key:
         key = key.rpartition(".")[0]
     return sources.get(key, "")
@@ -54,7 +61,7 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
         value, own = getattr(entry, key), given and key in entry.model_fields_set
         if isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{key}.", own)
-        elif key in ("span_types", "sequence"):
+        elif key in ("span_types", "sequence", "overlaps"):
             items = value.items() if isinstance(value, Mapping) else enumerate(value, start=1)
             meanings = chain([field.description or ""], repeat(""))
             for (name, item), meaning in zip(items, meanings, strict=False):
@@ -64,7 +71,8 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
 
 
 def _inline(value: Any) -> str:
-    """A span or a type of spans in one line."""
+    """A span, a type of spans or an overlap in one line."""
+    value = value.model_dump() if isinstance(value, BaseModel) else value
     if isinstance(value, Mapping):
         return ", ".join(
             f"{key} ({_inline(item)})" if isinstance(item, Mapping) else f"{key} {item}"

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from ..base.errors import InputError
 from ..base.files import finite, read_toml
 from ..base.names import suggest
-from ..catalog import available, load_catenary, load_family, load_pantograph
-from ..catalog.family import LineFamily
+from ..catalog import available, load_catenary, load_family, load_pantograph, load_section
+from ..catalog.drawn_lines import DrawnLines
 from ..catalog.loader import SCHEMAS
 from ..catalog.values import by_value, values_of
 from ..plant.actuators import ACTUATOR_PRESETS
@@ -24,11 +24,12 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SENSOR_PRESETS
 from ..policies import maker_of, parameters_of, policy_names
 
-Entry = CatenaryData | PantographData | LineFamily
+Entry = CatenaryData | PantographData | DrawnLines
 LOADERS: Mapping[str, Callable[[str], Entry]] = {
     "catenary": load_catenary,
     "pantograph": load_pantograph,
     "family": load_family,
+    "section": load_section,
 }
 PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
     "line_condition": LINE_CONDITIONS,

@@ -1,4 +1,4 @@
-"""``panto family``: lines drawn from a family under many seeds, and whether each is plausible."""
+"""``panto family``: lines drawn from a family or a section under many seeds; whether each is plausible."""
 
 from __future__ import annotations
 
@@ -6,27 +6,29 @@ from typing import Annotated
 
 import typer
 
-from ..catalog import load_family
-from ..catalog.family import PREFIX
+from ..catalog import load_drawn
 from ..terminal import Json, alert, console, counting, print_json, print_table
 
 MOST_SEEDS = 100_000
 
 
 def family(
-    name: Annotated[str, typer.Argument(help="Family, of the catalogue or a TOML file.")] = "high-speed",
+    name: Annotated[
+        str, typer.Argument(help="Family or section, of the catalogue or a TOML file.")
+    ] = "high-speed",
     seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
     first: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     json: Json = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the table for a document.")] = False,
 ) -> None:
-    """Draw lines from a family, run a passive pantograph on each at its highest speed, and print the ranges.
+    """Draw lines from a family or a section, run a passive pantograph on each, and print the ranges.
 
-    Exits with 1 if a line is outside the family's own bands of what is plausible.
+    Each runs at the highest speed of its trains. Exits with 1 if a line is outside the family's or the
+    section's own bands of what is plausible.
     """
     from ..analysis.family import drawn_lines, facts, table
 
-    chosen = load_family(name.removeprefix(PREFIX))
+    chosen = load_drawn(name)
     with counting("running") as progress:
         lines = drawn_lines(chosen, range(first, first + seeds), progress)
     outside = [one for one in lines if one.outside(chosen)]

@@ -11,8 +11,9 @@ import typer
 from ..analysis.requirements import print_criteria
 from ..base.errors import InputError
 from ..base.files import write_whole
-from ..catalog import load_catenary
-from ..catalog.loader import parse_catenary
+from ..catalog import load_catenary, load_drawn
+from ..catalog.loader import drawn_kind, parse_catenary
+from ..control.lines import line_of_seed
 from ..plant.catenary.flexible.dropper_table import dropper_table
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
@@ -21,7 +22,13 @@ FORCE = 100.0
 
 
 def line(
-    name: Annotated[str, typer.Argument(help="Line: a name of the catalogue or a TOML file.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Line: a name of the catalogue, a TOML file, or what to draw one from, such as "
+            "section:main-line."
+        ),
+    ],
     masts: Annotated[
         str | None,
         typer.Option(
@@ -29,6 +36,7 @@ def line(
             "encumbrance (m); type, a name in span_types. Wires, droppers and supports are the line's."
         ),
     ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed with which a line is drawn.")] = 0,
     speed: Annotated[
         float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
     ] = None,
@@ -50,7 +58,7 @@ def line(
 
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
-    chosen, text = _line(name, masts, output)
+    chosen, text = _line(name, seed, masts, output)
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
@@ -87,8 +95,10 @@ def line(
         raise typer.Exit(1)
 
 
-def _line(name: str, masts: str | None, output: str | None) -> tuple[Any, str | None]:
+def _line(name: str, seed: int, masts: str | None, output: str | None) -> tuple[Any, str | None]:
     """The line, and the text of its TOML file where it is made from masts."""
+    if masts is None and drawn_kind(name):
+        return line_of_seed(load_drawn(name), seed)[0], None
     if masts is None:
         return load_catenary(name), None
     from ..catalog.masts import line_from_masts

@@ -19,15 +19,17 @@ def spans(settings: RunSettings) -> int | None:
     if settings.spans is not None or settings.distance is None:
         more = 0 if line.ends else math.ceil(settings.settle)
         return line.spans + more if settings.spans is None and more else settings.spans
-    last: int = math.ceil(line.alignment().in_spans(settings.distance) + settings.run_in + settings.settle)
+    before = settings.run_in + settings.settle
+    last: int = math.ceil(line.alignment().in_spans(settings.distance) + before)
     most, clear = (line.spans, 0) if line.ends else (MOST_SPANS, 1)  # a train may run up to a line's end
     if not line.ends and last >= line.spans:
         clear = line.clear_spans(settings.numerics, settings.runs, last)
     needed = last + clear
     if needed > most:
-        longest = line.alignment().support(most - clear)
+        longest = line.alignment().support(max(math.floor(most - clear - before), 0))
+        behind = f", behind {before:g} spans before the run," if before else ""
         raise InputError(
-            f"distance must be at most {longest:,g} m on line '{line.name}', not "
+            f"distance must be at most {longest:,g} m on line '{line.name}'{behind} not "
             f"{beside(settings.distance, longest, ',.6g')} m."
         )
     return max(line.spans, needed)

@@ -9,17 +9,18 @@ from typing import Any
 from ..backend import cache_folder, source_hash
 from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
-from ..catalog.family import PREFIX
+from ..catalog.loader import drawn_kind
 
 
 def kept(folder: str, line: str, inputs: Any, compute: Callable[[], Any]) -> Any:
     """Result of ``compute`` for these inputs, both plain data; from the disk where it is cached already.
 
     The cache is a folder beside the compiled kernels of the same sources; without one nothing is cached, nor
-    for a line drawn from a family, by its name: a training draws thousands, and hardly meets one again.
+    for a line drawn from a family or a section, by its name: a training draws thousands, and hardly meets
+    one again.
     """
     cache = cache_folder()
-    if cache is None or line.startswith(PREFIX):
+    if cache is None or drawn_kind(line):
         return compute()
     made_of = checksum([source_hash(), inputs])
     file = cache / folder / f"{made_of}.json"

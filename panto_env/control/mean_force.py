@@ -66,8 +66,11 @@ def trim_of_pass(
 ) -> Trim | None:
     """Trim of one pass on its own line: without a policy its mean over the spans is the required one.
 
-    None where no mean is required, or the speed is yet to be drawn. Raises InputError if it cannot be met.
+    It is trimmed in still air, as a pantograph is set: wind is not trimmed away. None where no mean is
+    required, or the speed is yet to be drawn. Raises InputError if it cannot be met.
     """
+    still = tuple(condition.in_still_air for condition in settings.line_condition)
+    settings = settings.model_copy(update={"line_condition": still})
     low, high = settings.speeds
     if low != high or target_mean(settings, low) is None:
         return None

@@ -132,8 +132,8 @@ class RunSettings(Numerics):
     catenary: Annotated[Lines, BeforeValidator(load_lines)] = Field(
         "en50318-2002",
         validate_default=True,
-        description="line: a name of the catalogue or a TOML file; from a list of lines, or from a family of "
-        'them such as "family:high-speed", one is drawn per episode',
+        description="line: a name of the catalogue or a TOML file; from a list of lines, a family of them "
+        'such as "family:high-speed" or a section such as "section:main-line", one is drawn per episode',
     )
     pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
         "en50318-2002",
@@ -165,9 +165,9 @@ class RunSettings(Numerics):
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
-        description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values and '
-        'defects such as "worn:wear_depth=1e-3,broken_droppers=[(4, 5)]", or a table; from a list one is '
-        "drawn per run",
+        description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values, '
+        'defects and weather such as "worn:broken_droppers=[(4, 5)],wind=15,ice=0.3", or a table; from a '
+        "list one is drawn per run",
     )
     mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
         None,
@@ -252,7 +252,9 @@ class RunSettings(Numerics):
     def line(self) -> CatenaryData:
         """The line. Raises InputError where one is yet to be drawn."""
         if not isinstance(self.catenary, CatenaryData):
-            raise InputError("One line is needed here, not a list or a family to draw from; name a line.")
+            raise InputError(
+                "One line is needed here, not a list, a family or a section to draw from; name a line."
+            )
         return self.catenary
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..plant.drift import draw_drift
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.build import with_scatter
 from ..plant.pantograph.schema import PantographData
+from ..plant.wind import draw_wind
 from .settings import RunSettings
 
 LaneGenerators = np.random.Generator | Callable[[int], np.random.Generator]
@@ -53,6 +55,7 @@ def draw_starts(
     rms = settings.drift
     if not (low < high or lines_differ or scatter or run_in or rms):
         return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way, None)
+    windy = any(condition.wind for condition in conditions)
     line, pantograph, drift = [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
@@ -65,4 +68,7 @@ def draw_starts(
             way[k] = alignment.support(own.uniform(0, run_in))
         if rms > 0:
             drift.append(draw_drift(rms, time_step, own))
+        if windy:  # drawn last: all else is as in still air
+            wind = draw_wind(line[k].condition.weather, time_step, own)
+            line[k] = replace(line[k], wind=wind)
     return Starts(speed, line, pantograph, way, np.array(drift) if drift else None)

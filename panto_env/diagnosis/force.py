@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from ..base.units import to_kmh
 from ..estimation.estimate import filter_motion, gains_of, model_of
-from ..estimation.motion import Motion, measure, on_frame
+from ..estimation.motion import Motion, measure, on_frame, warn_of_wind
 from ..estimation.plausibility import check_motion
 from ..estimation.settings import EstimatorSettings
 from ..estimation.smoother import smooth_force
@@ -71,6 +71,7 @@ def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | Non
     likely mistake, where no force can be estimated.
     """
     known = known_pantograph(run) if pantograph is None else pantograph
+    warn_of_wind(run)
     check_motion(_as_recorded(run), known)  # before there is noise, which would hide a dead sensor
     none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
     seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)

@@ -104,7 +104,9 @@ def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | Lane
     """The lanes of a vector environment, in a group for each line. Raises InputError for bad settings."""
     count = settings.groups
     if settings.lines is not None and not draws_line(settings):
-        raise InputError("lines are drawn from a list or a family: give one as catenary, or no lines.")
+        raise InputError(
+            "lines are drawn from a list, a family or a section: give one as catenary, or no lines."
+        )
     if count == 1:
         usual = Episodes(settings, lanes=settings.num_envs, keep_samples=keep_samples)
         return VectorLanes(usual, settings.episodes_per_line)

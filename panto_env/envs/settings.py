@@ -51,13 +51,13 @@ class VectorSettings(RunSettings):
     )
     lines: Annotated[int, Between(1, MOST_LANES)] | None = Field(
         None,
-        description="number of lines side by side where catenary is a list or a family, each with an equal "
-        "share of the lanes, which is faster; by default one per lane",
+        description="number of lines side by side where catenary is a list, a family or a section, each with "
+        "an equal share of the lanes, which is faster; by default one per lane",
     )
     episodes_per_line: Annotated[int, Between(1, 10**9)] = Field(
         1,
         description="episodes that begin in each lane, on average, before the next line is drawn where "
-        "catenary is a list or a family",
+        "catenary is a list, a family or a section",
     )
     max_episode_steps: Annotated[int, Between(1, 10**12)] | None = Field(
         None, description="steps after which an episode is truncated; by default the line's end"

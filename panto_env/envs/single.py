@@ -86,7 +86,8 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
 
     ## Starting State
     At the start of the line, at rest under the nominal force; with `run_in`, up to that many spans later.
-    Where `catenary` is a list or a family, on a line drawn for this episode, which `context` describes.
+    Where `catenary` is a list, a family or a section, on a line drawn for this episode, which `context`
+    describes.
 
     ## Episode End
     Truncated at the end of the line (or of `distance`). Terminated when the head leaves +-0.3 m, contact

@@ -47,10 +47,10 @@ class PantographVectorEnv(
     same as a single environment with that seed. `autoreset_mode` is "NextStep" (Gymnasium's default),
     "SameStep" or "Disabled"; `max_episode_steps` truncates episodes as Gymnasium's `TimeLimit` does.
 
-    Where `catenary` is a list or a family, each lane draws its own line for each episode, as the single
-    environment does. Faster is `lines=8`: eight lines side by side, each shared by an equal number of lanes
-    and drawn by the generator of the first of them, `episodes_per_line` times as seldom. `context(lane)` has
-    a lane's line.
+    Where `catenary` is a list, a family or a section, each lane draws its own line for each episode, as the
+    single environment does. Faster is `lines=8`: eight lines side by side, each shared by an equal number of
+    lanes and drawn by the generator of the first of them, `episodes_per_line` times as seldom.
+    `context(lane)` has a lane's line.
 
     `reset(options=...)` takes the options of the single environment, for the episodes that it begins. With
     the option "reset_mask", an array of bool, it begins them only in the marked lanes.

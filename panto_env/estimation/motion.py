@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.errors import AccuracyWarning
+from ..base.units import to_kmh
 from ..metrics.trajectory import Trajectory
 
 RATE = 1000.0
@@ -55,6 +58,20 @@ def on_frame(run: Trajectory) -> Array:
     return run.frame_force + (run.lift - run.nominal_force)
 
 
+def warn_of_wind(run: Trajectory) -> None:
+    """Warn where a run was in wind, whose lift an estimator does not know."""
+    if not run.wind:
+        return
+    coefficient = run.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
+    more = coefficient * (to_kmh(run.speed + run.wind) ** 2 - run.speed_kmh**2)
+    warnings.warn(
+        f"A run was in wind of {run.wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, "
+        "is missing in the force that is estimated from the motion.",
+        AccuracyWarning,
+        stacklevel=1,  # one place for all runs: the sentence comes once
+    )
+
+
 def measure(
     run: Trajectory,
     *,
@@ -67,10 +84,11 @@ def measure(
 
     The motion is taken from a cubic spline through the run's samples; forces are means over the sampling
     interval: those of actuators from a sample to the next, as a filter holds them, and the true contact force
-    about the sample. seed: of the noise.
+    about the sample. seed: of the noise. Warns where the lift is not known, because the run was in wind.
     """
     from scipy.interpolate import CubicSpline  # slow to import
 
+    warn_of_wind(run)
     step = 1 / rate
     first, last = run.time[0] + step, run.time[-1] - step
     time = first + step * np.arange(int((last - first) * rate) + 1)

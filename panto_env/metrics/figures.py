@@ -53,7 +53,12 @@ def cost_function(force: Array, nominal_force: float | Array, stride: float | Ar
 
 
 def contact_loss(force: Array) -> float:
-    """CL (%), Eq. 13 of paper 1: share of the distance without contact."""
+    """CL (%), Eq. 13 of paper 1: share of the distance without contact.
+
+    Samples are equally spaced in time, and so in distance, in spans of any length. Where the speed drifts it
+    is the share of the time, whose ratio to that of the distance differs from 1 by at most the drift over the
+    speed: 3 % of CL for a drift of 10 km/h at 300 km/h.
+    """
     return float(100 * np.mean(force <= 0))
 
 

@@ -19,6 +19,8 @@ from .droppers import moving_droppers
 from .labels import HEADINGS, LABELS
 from .low_pass import low_pass
 from .spans import SpanChoice, in_words
+from .stretches import HEADINGS as BY_STRETCH
+from .stretches import by_stretch
 from .trajectory import SERIES, Trajectory
 
 FILTERED = "contact_force_filtered"
@@ -99,6 +101,12 @@ def of_spans(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     return Sheet.of_rows("by span", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_SPAN})
 
 
+def of_stretches(run: Trajectory, spans: SpanChoice = None) -> Sheet:
+    """Figures of overlaps, behind them and elsewhere. Raises InputError as ``Trajectory.summary`` does."""
+    rows = [_of_run(run, spans) | each._asdict() for each in by_stretch(run, spans)]
+    return Sheet.of_rows("overlaps", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_STRETCH})
+
+
 def facts(run: Trajectory, without: str = "") -> Sheet:
     """What a run is: line, pantograph, settings, and where it ended, as text.
 
@@ -125,6 +133,8 @@ def save_tables(run: Trajectory, path: str | Path, spans: SpanChoice = None) -> 
         sheets = [figures([run], spans)]
         if run.spans_differ:
             sheets.append(of_spans(run, spans))
+            if by_stretch(run, spans):
+                sheets.append(of_stretches(run, spans))
         if run.dropper_force.size:
             sheets.append(droppers([run], spans))
     except InputError as error:

@@ -101,14 +101,20 @@ class Trajectory:
     @property
     def spans_differ(self) -> bool:
         """Whether the line is a sequence of spans, not one that is repeated."""
-        return self.alignment.pitch is None or bool(self.design.get("catenary", {}).get("sequence"))
+        return self.alignment.pitch is None or self.line_ends
+
+    @property
+    def line_ends(self) -> bool:
+        """Whether the line ends with its own spans, as a sequence does; else wires go on behind them."""
+        return bool(self.design.get("catenary", {}).get("sequence"))
 
     def summary(self, spans: SpanChoice = None) -> Figures:
         """Figures over spans (first, last), counted from 1 (EN 50318 takes 5 and 6), or "all".
 
-        By default the spans are those after the start has died out. Uplift is the maximum at all supports of
-        these spans, both ends included. Raises InputError where the run does not cover the spans, is too
-        short for its start to die out, or ended early and no earlier spans are given.
+        By default the spans are those after the start has died out and, where a sequence of spans ends,
+        before its end is felt. Uplift is the maximum at all supports of these spans, both ends included.
+        Raises InputError where the run does not cover the spans, is too short for its start to die out, or
+        ended early and no earlier spans are given.
         """
         covered = self.spans(spans)
         inside = self.inside(spans)
@@ -177,6 +183,12 @@ class Trajectory:
         return bool(self.settings.get("speed_drift"))
 
     @property
+    def wind(self) -> float:
+        """Mean wind along the track in which the run may have been made, the strongest (m/s); 0: none."""
+        conditions = self.settings.get("line_condition") or ()
+        return max((each.get("wind", 0.0) for each in conditions), key=abs, default=0.0)
+
+    @property
     def speeds(self) -> Array:
         """Speed of the train at each sample, (n,) (m/s)."""
         if not self.drifts or len(self.time) < FEWEST:
@@ -185,7 +197,7 @@ class Trajectory:
 
     @property
     def lift(self) -> Array:
-        """Static force and aerodynamic uplift as applied in each step, (n,) (N)."""
+        """Static force and aerodynamic uplift in each step, (n,) (N), in still air: wind adds to it."""
         coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
         more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.drifts else 0.0
         return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)
@@ -212,7 +224,7 @@ class Trajectory:
         """
         if choice is None and self.terminated:
             raise InputError(f"{self.ending} It has figures only for earlier spans, which must be given.")
-        spans = chosen_spans(choice, self.distance, self.alignment)
+        spans = chosen_spans(choice, self.distance, self.alignment, self.line_ends)
         if spans is None:
             return None
         _, end = self.alignment.limits(spans)

@@ -1,4 +1,4 @@
-"""Condition of the line: irregularity of the contact wire, defects of wires, droppers and supports."""
+"""Condition of the line: irregularity of the contact wire, defects of wires, droppers, supports; wind."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 from ..base.arrays import Array
 from ..base.ranges import Between
 from ..base.settings import Settings
+from .wind import Wind
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a smooth wire (seen in one toy model). It
 # is that of a wire just strung: makers keep short waves of contact wires within 0.1 mm (seen: nkt cables,
@@ -29,6 +30,12 @@ Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
 Length = Annotated[float, Between(2, 2000, "m")]
 Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
 Lost = Annotated[float, Between(0, 0.5)]
+# Ice loads of standards reach 1.5 kg/m (recalled).
+Ice = Annotated[float, Between(0, 5, "kg/m")]
+# From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
+Temperature = Annotated[float, Between(-80, 80, "K")]
+# A hurricane blows with 33 m/s; trains are stopped well before.
+WindSpeed = Annotated[float, Between(-40, 40, "m/s")]
 
 
 class LineCondition(Settings):
@@ -84,6 +91,27 @@ class LineCondition(Settings):
     lost_messenger_tension: Lost = Field(
         0.0, description="share of the messenger wire's tension that is lost, along the whole line (-)"
     )
+    wind: WindSpeed = Field(
+        0.0, description="mean wind along the track, at 10 m over the ground; a head wind is positive (m/s)"
+    )
+    # That of open country, 0.03 m rough, at 10 m by Davenport's spectrum: sqrt(6) 0.4 / ln(10 / 0.03).
+    turbulence: Annotated[float, Between(0, 0.5)] = Field(
+        0.17,
+        description="standard deviation of the gusts along the track over the mean wind; they are drawn at "
+        "random from Davenport's spectrum (-)",
+    )
+
+    ice: Ice = Field(
+        0.0,
+        description="ice on both wires of a flexible line, which was built without it (kg/m); a coat of "
+        "10 mm on a wire of 13 mm is 0.65 kg/m at 900 kg/m^3",
+    )
+
+    temperature: Temperature = Field(
+        0.0,
+        description="temperature of the wires less that at which the line was built (K); it acts on wires "
+        "that are fixed at both ends (axial_stiffness)",
+    )
 
     @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
     @classmethod
@@ -97,7 +125,18 @@ class LineCondition(Settings):
     @property
     def random(self) -> bool:
         """Whether two lines in this condition differ."""
-        return self.irregularity > 0 or self.scatters or (self.wear_drawn and self.wear_depth > 0)
+        uneven = self.irregularity > 0 or (self.wear_drawn and self.wear_depth > 0)
+        return uneven or self.scatters or self.weather.gusts
+
+    @property
+    def weather(self) -> Wind:
+        """The wind."""
+        return Wind(self.wind, self.turbulence)
+
+    @property
+    def in_still_air(self) -> LineCondition:
+        """The same line without wind."""
+        return self.model_copy(update={"wind": 0.0}) if self.wind else self
 
     @property
     def scatters(self) -> bool:
@@ -128,12 +167,14 @@ class LineCondition(Settings):
 
     @property
     def of_wires(self) -> tuple[Any, ...]:
-        """Defects of the wires themselves, which all lanes of a plant share."""
+        """Defects of the wires themselves, and what weather does to them: all lanes of a plant share it."""
         return (
             self.hard_spots,
             self.worn_stretches,
             self.lost_contact_tension,
             self.lost_messenger_tension,
+            self.ice,
+            self.temperature,
         )
 
 
@@ -186,6 +227,7 @@ class DrawnLine:
     heights: Array | None = None  # (supports,): height errors of messenger supports (m); None for none
     tensions: tuple[float, float] = (1.0, 1.0)
     """Tensions of contact and messenger wire, relative to those in the condition."""
+    wind: Array | None = None  # (GUST_ROWS,): with its gusts; None for the condition's mean wind
 
 
 def draw(

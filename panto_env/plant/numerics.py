@@ -13,6 +13,7 @@ from ..base.ranges import Between
 from ..base.settings import Settings
 from ..base.units import from_kmh, to_kmh
 from .line_condition import LineCondition
+from .wind import SHORTEST_GUST
 
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
@@ -73,7 +74,13 @@ class Runs(NamedTuple):
 
     def wave_step(self, samples: float) -> float:
         """Time step (s) with this number of steps in the shortest wave, for the fastest train."""
-        return self.shortest_wave / self.speeds[1] / samples
+        return min(self.shortest_wave / self.speeds[1], self._shortest_gust) / samples
+
+    @property
+    def _shortest_gust(self) -> float:
+        """Time (s) in which the fastest train passes the shortest gust, infinite where there are none."""
+        winds = [condition.wind for condition in self.conditions if condition.weather.gusts]
+        return SHORTEST_GUST / (self.speeds[1] + max(winds)) if winds else math.inf
 
     def carried_step(self, usual: float) -> float:
         """A usual time step (s), shortened to divide the control interval and to resolve all waves."""
@@ -81,6 +88,11 @@ class Runs(NamedTuple):
 
     def check_wave(self, time_step: float) -> None:
         """Raise InputError where the wire has waves that a time step (s) cannot resolve."""
+        if time_step > self._shortest_gust / 2:
+            raise InputError(
+                f"A time step of {1e3 * time_step:g} ms cannot resolve gusts of {SHORTEST_GUST:g} m at "
+                f"{to_kmh(self.speeds[1]):g} km/h. Take one below {1e3 * self.wave_step(2):.2g} ms."
+            )
         if time_step > self.wave_step(2):
             raise InputError(
                 f"A time step of {1e3 * time_step:g} ms cannot resolve waves of {self.shortest_wave:g} m at "

@@ -23,6 +23,7 @@ from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples
 from .step import advance
 from .train import Train
+from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
 
 
 class Plant:
@@ -52,6 +53,8 @@ class Plant:
         self.spans = check_span_count(catenary.spans if spans is None else spans)
         self.alignment = catenary.alignment(self.spans)
         self.runs = runs
+        winds = [condition.weather for condition in runs.conditions if condition.wind]
+        check_wind(winds, runs.speeds[0], self.pantograph)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
             lanes=lanes,
@@ -60,6 +63,11 @@ class Plant:
             numerics=numerics or Numerics(),
             runs=runs,
         )
+        if bilateral and self.model.wires_per_collector > 1:
+            raise InputError(
+                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has overlaps "
+                "of two; take a line without overlaps."
+            )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         count, actuator = len(train.collectors), train.first.actuator
@@ -78,6 +86,7 @@ class Plant:
             ),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
+            wind=aligned_zeros((lanes, GUST_ROWS if winds else 0)),
             lowest_force=-np.inf if bilateral else 0.0,
         )
         copy_whole(*self.arrays)
@@ -153,6 +162,7 @@ class Plant:
             own_waves[: line.waves.size] = line.waves.ravel()
         run.waves[lanes] = waves
         run.drift[lanes] = 0.0 if drift is None else drift
+        wind = self._blow(lanes, drawn)
         height, wire, spring = self.model.start_point
         heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
         strip = float(self.pantographs.table[0, 0, Part.STRIP_COMPLIANCE])  # all have the same strips
@@ -163,7 +173,8 @@ class Plant:
         strides = speeds * self.time_step
         now = strides + gain(run.drift[lanes], 0.0)
         lifts = nominal_forces + run.aerodynamic[0] * (now**2 - strides**2)
-        state = rest_state(pantographs or self.pantograph, lifts, heights, compliance)
+        by_wind = run.aerodynamic[0] * wind * (2 * now + wind)
+        state = rest_state(pantographs or self.pantograph, lifts + by_wind, heights, compliance)
         check_compression(self.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         if not self.model.massless:
@@ -173,6 +184,7 @@ class Plant:
         table[:, Row.STRIDE] = strides
         table[:, Row.NOMINAL_FORCE] = nominal_forces
         table[:, Row.LIFT] = lifts
+        table[:, Row.WIND] = by_wind
         table[:, Row.CONTACT_FORCE] = forces
         table[:, Row.STATE : Row.STATE + state.shape[1]] = state
         table[:, Row.HEAD_HEIGHT] = state[:, 0]
@@ -180,6 +192,17 @@ class Plant:
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
         run.table[:, lanes] = table
         self.actuators.table[:, lanes] = 0.0
+
+    def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> Array:
+        """Let the wind of the drawn lines blow in lanes, (n,); its speed against a train at the start, (n,)
+        (m per step).
+        """
+        if not self.run.wind.shape[1]:
+            return np.zeros(len(lanes))
+        mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
+        rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
+        self.run.wind[lanes] = rows
+        return winds_at(np.array(rows), 0.0, 0.0)
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""

@@ -33,14 +33,18 @@ class Row(IntEnum):
     HEAD_FORCE = 7  # of the actuator on the head (N)
     STEP = 8  # steps since the start
     STRIDE = 9  # distance covered in one step (m), the mean where the speed drifts
-    NOMINAL_FORCE = 10  # static force and aerodynamic uplift on the lowest mass (N), at the mean speed
+    NOMINAL_FORCE = 10  # static force and uplift in still air on the lowest mass (N), at the mean speed
     COMMAND = 11  # of the actuators (N), a row per ``Place``
     IRREGULARITY = 13  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 14  # height of the wire where it is touched, at the step's start (m)
     WIRE_MIDDLE = 15  # its height at mid-step, without the forces of this step (m)
-    LIFT = 16  # static force and aerodynamic uplift on the lowest mass (N), at the speed of this step
+    LIFT = 16  # static force and aerodynamic uplift in still air on the lowest mass (N), at this step's speed
+    SECOND_BEFORE = 17  # as WIRE_BEFORE and WIRE_MIDDLE, of the second wire where there is one (m)
+    SECOND_MIDDLE = 18
+    SECOND_FORCE = 19  # contact force on the second wire, part of CONTACT_FORCE (N)
+    WIND = 20  # what wind adds to LIFT (N), which no sensor sees
     # An even number, for processors compute states in pairs.
-    STATE = 18  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
+    STATE = 22  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
     # same at the step's end, without the contact force
 
 
@@ -57,6 +61,7 @@ class Run(NamedTuple):
     aerodynamic: tuple[float, ...]  # uplift of each collector per squared distance covered in a step (N/m^2)
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
+    wind: Array  # (lanes, GUST_ROWS): mean and gusts; no rows where none blows
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 

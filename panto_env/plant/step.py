@@ -8,15 +8,16 @@ from .catenary.protocol import (
     advance_wire,
     apply_force,
     end_step,
+    has_second_wire,
     look_at_contact,
     place_contact,
     record_wire,
     rise_at_contact,
 )
-from .contact import contact_force
+from .contact import contact_force, shared_forces
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
-from .train import lift, mean_stride, position
+from .train import lift, lift_by_wind, mean_stride, position
 from .trigonometry import cosine_of_turns
 
 
@@ -35,6 +36,8 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
     own = run.table[contact, lane]
     if run.drift.shape[1] > 0:
         own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
+    if run.wind.shape[1] > 0:
+        own[ROW.WIND] = lift_by_wind(run, contact, lane, own[ROW.STEP] + 0.5)
     drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
     move_freely(pantographs, contact, own, lane)
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)
@@ -42,16 +45,20 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
     before, middle = place_contact(line, wire, lane, contact, x)
     own[ROW.WIRE_BEFORE] = before
     own[ROW.WIRE_MIDDLE] = middle
+    if has_second_wire(line):
+        before, middle = place_contact(line, wire, lane, len(run.distance) + contact, x)
+        own[ROW.SECOND_BEFORE] = before
+        own[ROW.SECOND_MIDDLE] = middle
 
 
 @inlined
-def rise_along(line, wire, run, contact, own, lane):
-    """Rise of the wire along the distance of the step (m), for the contact's damper."""
+def rise_along(line, wire, run, contact, point, own, lane):
+    """Rise of the wire at a contact point along the distance of the step (m), for the contact's damper."""
     x0 = position(run, contact, lane, own[ROW.STEP])
     x1 = position(run, contact, lane, own[ROW.STEP] + 1.0)
     way = mean_stride(run, contact, lane, 1.0)
     uneven = irregularity(run, x1, lane) - irregularity(run, x0, lane)
-    return uneven + rise_at_contact(line, wire, lane, contact, x0, x0 + way)
+    return uneven + rise_at_contact(line, wire, lane, point, x0, x0 + way)
 
 
 @inlined
@@ -64,7 +71,7 @@ def meet(line, wire, pantographs, run, contact, lane):
     x = position(run, contact, lane, own[ROW.STEP] + 0.5)
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
-        rise = rise_along(line, wire, run, contact, own, lane)
+        rise = rise_along(line, wire, run, contact, contact, own, lane)
     free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, contact, x)
     before, irregular = own[ROW.WIRE_BEFORE], own[ROW.IRREGULARITY]
     head = own[ROW.STATE]
@@ -79,10 +86,66 @@ def meet(line, wire, pantographs, run, contact, lane):
         wire_yield - contact_input,
         run.lowest_force,
     )
-    own[ROW.CONTACT_FORCE] = force
-    own[ROW.HEAD_HEIGHT] = 0.5 * (head + free_head + contact_input * force)
+    total = force
     own[ROW.WIRE_HEIGHT] = middle + irregular + (middle_yield + spring) * force
+    if has_second_wire(line):
+        law = contact_law(
+            parts,
+            0.5 * (head + free_head) - (middle + irregular),
+            free_head - head - (free_wire - before) - rise,
+            middle_yield,
+            wire_yield,
+        )
+        force = meet_second_wire(line, wire, parts, run, contact, lane, free_head, law, middle, middle_yield)
+        total = force + own[ROW.SECOND_FORCE]
+    own[ROW.CONTACT_FORCE] = total
+    own[ROW.HEAD_HEIGHT] = 0.5 * (head + free_head + contact_input * total)
     apply_force(line, wire, lane, contact, x, force)
+
+
+@inlined
+def contact_law(parts, gap, change, middle_yield, wire_yield):
+    """Numerator and denominator of ``contact_force`` with one of two wires (m, m/N)."""
+    damped, contact_input = (
+        parts[PART.STRIP_COMPLIANCE] * parts[PART.STRIP_DAMPING],
+        parts[PART.CONTACT_INPUT],
+    )
+    resisting = parts[PART.STRIP_COMPLIANCE] + middle_yield - 0.5 * contact_input
+    return gap + damped * change, resisting + damped * (wire_yield - contact_input)
+
+
+@inlined
+def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, middle, middle_yield):
+    """Share the contact force between two wires, apply that on the second, and return that on the first (N).
+
+    first: law of the first wire. middle: its height at mid-step without this force (m); middle_yield: how
+    much it rises there per newton (m/N).
+    """
+    own, point = run.table[contact, lane], len(run.distance) + contact
+    x, share = position(run, contact, lane, own[ROW.STEP] + 0.5), parts[PART.IMPLICIT_SHARE]
+    rise = 0.0
+    if parts[PART.STRIP_DAMPING] > 0.0:
+        rise = rise_along(line, wire, run, contact, point, own, lane)
+    free_wire, wire_yield, early_yield, _ = look_at_contact(line, wire, lane, point, x)
+    before, irregular, head = own[ROW.SECOND_BEFORE], own[ROW.IRREGULARITY], own[ROW.STATE]
+    its_middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.SECOND_MIDDLE]
+    its_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
+    second = contact_law(
+        parts,
+        0.5 * (head + free_head) - (its_middle + irregular),
+        free_head - head - (free_wire - before) - rise,
+        its_yield,
+        wire_yield,
+    )
+    damped = parts[PART.STRIP_COMPLIANCE] * parts[PART.STRIP_DAMPING]
+    force, other = shared_forces(first, second, -(0.5 + damped) * parts[PART.CONTACT_INPUT])
+    height, its_height = middle + middle_yield * force, its_middle + its_yield * other
+    # Of two wires that are touched, the one that carries more counts; of two that are not, the lower one.
+    lower = its_height < height if force + other == 0.0 else other > force
+    own[ROW.WIRE_HEIGHT] = irregular + (its_height if lower else height)
+    own[ROW.SECOND_FORCE] = other
+    apply_force(line, wire, lane, point, x, other)
+    return force
 
 
 @inlined

@@ -12,6 +12,7 @@ from .drift import drifted_way, drifting_stride
 from .pantograph.schema import PantographData
 from .sensors import SensorSettings, sensor_settings
 from .state import ROW
+from .wind import wind_at
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,18 @@ def stride(run, collector, lane, steps):
 
 @inlined
 def lift(run, collector, lane, steps):
-    """Static force and aerodynamic uplift on a lane's collector (N), at its speed after a number of steps."""
+    """Static force and still air's uplift on a lane's collector (N), at its speed after a number of steps."""
     own = run.table[collector, lane]
     mean, now = own[ROW.STRIDE], stride(run, collector, lane, steps)
     return own[ROW.NOMINAL_FORCE] + run.aerodynamic[collector] * (now * now - mean * mean)
+
+
+@inlined
+def lift_by_wind(run, collector, lane, steps):
+    """Uplift (N) of a lane's collector that wind adds to that of still air; a tail wind takes some away."""
+    x, now = position(run, collector, lane, steps), stride(run, collector, lane, steps)
+    wind = wind_at(run.wind[lane], x, steps)
+    return run.aerodynamic[collector] * (wind * (now + now + wind))
 
 
 @inlined

@@ -149,8 +149,12 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
         _draw_mast(canvas, layout, x, contact, upper if line.messenger.size else None)
     if line.messenger.size:
         canvas.wire(upper, METAL, 2)
-    for x, slack in zip(layout.across(line.droppers, at).tolist(), line.slack.tolist(), strict=True):
-        top, bottom = (float(np.interp(x, wire[:, 0], wire[:, 1])) for wire in (upper, contact))
+    for places, heights in line.further:
+        canvas.wire(layout.points(places, heights, at), METAL, 1)
+    ends = (layout.up(heights).tolist() for heights in (line.tops, line.bottoms))
+    for x, top, bottom, slack in zip(
+        layout.across(line.droppers, at).tolist(), *ends, line.slack.tolist(), strict=True
+    ):
         if slack:
             bow = np.linspace(0, 1, 9)
             points = np.column_stack([x + 28 * bow * (1 - bow), top + (bottom - top) * bow])

@@ -16,6 +16,7 @@ from ..metrics.criterion import Criterion
 from ..metrics.droppers import MovingDropper, moving_droppers
 from ..metrics.figures import Figures, losses_of_contact
 from ..metrics.low_pass import low_pass
+from ..metrics.stretches import StretchFigures, by_stretch
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
@@ -133,6 +134,11 @@ class Findings:
         if not self.run.spans_differ:
             return []
         return by_span(self.run, "all" if self.covered is None else None)
+
+    @cached_property
+    def by_stretch(self) -> list[StretchFigures]:
+        """Figures of overlaps, of what lies behind them and of all else; none where there are no overlaps."""
+        return by_stretch(self.run, "all" if self.covered is None else None)
 
     @cached_property
     def at_rest(self) -> list[RestingDropper]:

@@ -4,7 +4,7 @@ LEFT_OUT = (
     "several pantographs on one line, and the waves that run from one to another",
     "overlaps of two sections, section insulators, crossings and neutral sections",
     "curves, stagger and the lateral plane",
-    "wind on the wires and on the pantograph, gusts and tunnels, ice, temperature",
+    "wind on the wires, side wind, tunnels; ice and temperature that differ along the line",
     "rigid rails and third rails; stitch wires, so that a stitched line is stiffer at its supports here",
     "roll and pitch of the collector head and its two strips: it is one point",
     "motion of the vehicle and of the track",

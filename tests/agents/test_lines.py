@@ -1,4 +1,4 @@
-"""Training on lines drawn from a family, several side by side."""
+"""Training on lines drawn from a family or a section, several side by side."""
 
 import gymnasium
 import numpy as np
@@ -41,16 +41,18 @@ def training(**changes):
     return parse_training(table | changes, "test")
 
 
-def test_a_training_on_a_family_gives_a_policy_for_lines_that_it_has_not_met(tmp_path):
-    folder = train.train(training(), tmp_path / "run", progress=False)
+@pytest.mark.parametrize("source", ["family:high-speed", "section:fast-line"])
+def test_a_training_gives_a_policy_for_lines_that_it_has_not_met(source, tmp_path):
+    own = training(environment=ENVIRONMENT | {"catenary": source})
+    folder = train.train(own, tmp_path / "run", progress=False)
     facts, actor = read_model(folder.model)
-    assert facts.environment["catenary"] == "family:high-speed"
+    assert facts.environment["catenary"] == source
     assert facts.needs.line_values
     # Readings 5, place 2, speed, nominal force, line 7, action, with the deviation in the place of the force.
     assert actor.weights[0].shape == (8, 17)
     assert facts.ratio == pytest.approx(1.0, abs=0.5)
-    for line in ("family:high-speed", "re330"):
-        run = simulate(line, speed_kmh=300, policy=str(folder.model), seed=3, accuracy="fast", distance=700.0)
+    for line in (source, "re330"):
+        run = simulate(line, speed_kmh=300, policy=str(folder.model), seed=3, accuracy="fast", distance=900.0)
         assert run.summary().std > 0
     with pytest.raises(InputError, match="Only a flexible catenary has the values"):
         simulate("periodic-stiffness", policy=str(folder.model))
@@ -88,6 +90,10 @@ def test_base_policies_get_the_context_of_their_lane_s_line(tmp_path):
     assert lines[1] != lines[2]
 
 
-def test_a_speed_of_an_evaluation_must_be_one_for_the_family():
+@pytest.mark.parametrize("source", ["family:high-speed", "section:fast-line"])
+def test_a_speed_of_an_evaluation_must_be_one_for_the_lines(source):
     with pytest.raises(InputError, match="has no line for 500 km/h"):
-        training(evaluation={"interval_steps": 512, "speeds_kmh": [500]})
+        training(
+            environment=ENVIRONMENT | {"catenary": source},
+            evaluation={"interval_steps": 512, "speeds_kmh": [500]},
+        )

@@ -8,7 +8,7 @@ import pytest
 from panto_env.analysis.line_check import check, span_tables
 from panto_env.analysis.line_plot import plot_line
 from panto_env.catalog import load_catenary
-from panto_env.metrics.en50119 import gradient_limits, highest_speed
+from panto_env.catalog.en50119 import gradient_limits, highest_speed
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import solve

@@ -80,6 +80,21 @@ def drifting_run():
     return [run.contact_force.tolist(), run.position.tolist()]
 
 
+def run_in_weather():
+    """Ice on both wires, one of them fixed and cold, and a speed that drifts in a gusty wind."""
+    line, blown = (
+        short_line(),
+        load_pantograph("en50318-2002").model_copy(update={"aerodynamic_coefficient": 1e-3}),
+    )
+    fixed = line.messenger_wire.model_copy(update={"axial_stiffness": 10e6})
+    line = line.model_copy(update={"messenger_wire": fixed})
+    weather = {"wind": 12.0, "ice": 0.4, "temperature": -20.0}
+    numerics = {"window": 3, "precision": "double", "spacing": 0.5, "time_step": 2e-3}
+    drawn = {"speed_drift": 5.0, "line_condition": weather, "seed": 1}
+    run = panto_env.simulate(line, blown, distance=30.0, **numerics, **drawn)
+    return [run.contact_force.tolist(), run.dropper_force.tolist()]
+
+
 def uneven_run():
     """Short spans that differ: a window that travels, and the whole line with a hard spot."""
     table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
@@ -89,6 +104,26 @@ def uneven_run():
     line = FlexibleCatenaryData.model_validate(table | {"sequence": spans})
     settings = {"precision": "double", "distance": 62.0, "spacing": 0.5, "time_step": 2e-3}
     conditions = {3: {"raised_supports": [(2, 0.02)]}, 0: {"hard_spots": [(3, 4.2, 2.0, 100.0)]}}
+    found = []
+    for window, condition in conditions.items():
+        run = panto_env.simulate(
+            line, "en50318-2002", window=window or None, line_condition=condition, **settings
+        )
+        found += [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+    return found
+
+
+def overlapping_run():
+    """Short spans with stitch wires and an overlap: a window that travels, and defects on the whole line."""
+    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table["stitch_wire"] = {"length": 9.0, "tension": 2000.0, "mass": 0.3, "clamp_mass": 0.2}
+    table |= {"span_length": 20.0}
+    table["droppers"] |= {"positions": (2.5, 10.0, 17.5), "sag": (0.0, 0.0, 0.0)}
+    spans = [{}, {}, {"stitch_wire": {"length": 0.0}}, {}]
+    overlaps = [{"first_span": 4, "rises": (0.02, 0.1), "level": 1.0}]
+    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans * 2, "overlaps": overlaps})
+    settings = {"precision": "double", "distance": 150.0, "spacing": 0.5, "time_step": 2e-3}
+    conditions = {4: {"broken_droppers": [(5, 5)]}, 0: {"hard_spots": [(6, 4.2, 2.0, 100.0)]}}
     found = []
     for window, condition in conditions.items():
         run = panto_env.simulate(
@@ -123,6 +158,8 @@ RUNS = {
     "a window that moves along a line": passive_run,
     "a speed that drifts": drifting_run,
     "spans that differ": uneven_run,
+    "stitch wires and an overlap": overlapping_run,
+    "weather": run_in_weather,
     "a rig": rig_run,
     "several lanes": several_lanes,
 }

@@ -26,7 +26,7 @@ from panto_env.base.checksums import checksum, read_checked
 from panto_env.base.files import DEEPEST, MOST_KEYS, read_toml
 from panto_env.base.inline import parse_inline
 from panto_env.base.settings import Settings, parse
-from panto_env.catalog import load_catenary, load_family, load_pantograph
+from panto_env.catalog import load_catenary, load_family, load_pantograph, load_section
 from panto_env.catalog.loader import text_of
 from panto_env.cli.descriptions import described
 from panto_env.control.settings import run_settings
@@ -37,6 +37,7 @@ TOML = {
     "catenary": load_catenary,
     "pantograph": load_pantograph,
     "family": load_family,
+    "section": load_section,
     "list": lambda path: described(str(path)),
     "benchmark": load_benchmark,
     "training": load_training,
@@ -90,7 +91,9 @@ def refused(read, path, limit=20.0):
 @pytest.mark.parametrize("loader", TOML)
 def test_a_toml_file_made_to_do_harm(loader, harm, tmp_path):
     path = tmp_path / "card.toml"
-    kind = {"catenary": "flexible", "pantograph": "pantograph", "family": "family"}.get(loader)
+    kind = {"catenary": "flexible", "pantograph": "pantograph", "family": "family", "section": "section"}.get(
+        loader
+    )
     path.write_text((f"kind = '{kind}'\n" if kind else "") + HARM[harm])
     refused(TOML[loader], path, 8.0)
 

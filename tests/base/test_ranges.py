@@ -23,7 +23,7 @@ from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.sensors import SENSORS, sensor_settings
 
 ABSURD = (-1e9, 1e9, math.nan, math.inf, -math.inf, "12", True)
-LINES = {load_catenary(name).kind: load_catenary(name) for name in available("catenary")}
+LINES = {load_catenary(name).kind: load_catenary(name) for name in reversed(available("catenary"))}
 """A line of each kind, to change one value of."""
 ALONE = {  # of settings that are not files: how they are read
     "line condition": ((LineCondition,), lambda value: parse(LineCondition, value, "line_condition")),

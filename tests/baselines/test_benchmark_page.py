@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.oracle.stored import stored_ratio
 from panto_baselines.report.result import read_result
 from panto_baselines.report.summary import summary
@@ -30,7 +30,9 @@ def test_its_tables_are_those_of_the_results(track):
 @pytest.mark.parametrize("track", TRACKS)
 def test_stored_results_are_of_the_tracks_as_they_are(track):
     stored = json.loads((DOCS / f"{track}.json").read_text(encoding="utf-8"))
-    assert stored["settings"] == load_benchmark(track).model_dump(mode="json")
+    # Values that came later have in older results the default with which these were made.
+    settings = BenchmarkSettings.model_validate(stored["settings"])
+    assert settings.model_dump(mode="json") == load_benchmark(track).model_dump(mode="json")
 
 
 def test_the_page_of_all_has_every_track():

@@ -13,7 +13,8 @@ import pytest
 from pydantic import BaseModel
 
 from panto_env.base.errors import InputError
-from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.catalog import available, load_catenary, load_family, load_pantograph, load_section
+from panto_env.catalog.section import LineSection
 from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
@@ -25,9 +26,10 @@ LOADERS: dict[str, Callable[[Any], Any]] = {
     "catenary": load_catenary,
     "pantograph": load_pantograph,
 }
-ENTRIES = [(family, name) for family in LOADERS for name in available(family)]
+ALL = LOADERS | {"family": load_family, "section": load_section}
+ENTRIES = [(family, name) for family in ALL for name in available(family)]
 TAG = re.compile(r"(paper [123]|seen|recalled|own choice)\b")
-REFERENCE = re.compile(r"(?:seen|recalled|own choice): as ([\w.-]*\w)")
+REFERENCE = re.compile(r"(?:seen|recalled|own choice): as ([\w.:-]*\w)")
 NOT_VALUES = {"kind", "name", "description", "sources"}
 
 
@@ -36,10 +38,15 @@ def values(entry: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
     given = entry.model_fields_set - (NOT_VALUES if not prefix else set())
     if isinstance(entry, RigData):  # its line has sources of its own, and gives what every line has
         given -= {"line", *CatenaryData.model_fields}
+    if getattr(entry, "sequence", ()):  # the spans are those of the sequence
+        given -= {"spans"}
     for key in sorted(given):
         item = getattr(entry, key)
-        if isinstance(item, BaseModel):
+        if isinstance(item, BaseModel) and not (isinstance(entry, LineSection) and key == "base"):
             yield from values(item, f"{prefix}{key}.")
+        elif key == "span_types":
+            for name, table in item.items():
+                yield from ((f"{key}.{name}.{own}", value) for own, value in table.items())
         else:
             yield f"{prefix}{key}", item
 
@@ -61,21 +68,24 @@ def test_every_entry_that_is_promised_is_there() -> None:
 
 @pytest.mark.parametrize(("family", "name"), ENTRIES)
 def test_entry_loads_under_its_own_name(family: str, name: str) -> None:
-    entry = LOADERS[family](name)
+    entry = ALL[family](name)
     assert entry.name == name
     assert entry.description
 
 
 @pytest.mark.parametrize(("family", "name"), ENTRIES)
 def test_every_value_has_a_source(family: str, name: str) -> None:
-    entry = LOADERS[family](name)
+    entry = ALL[family](name)
     keys = {key for key, _ in values(entry)}
     assert set(entry.sources) == keys
     untagged = {key: text for key, text in entry.sources.items() if not TAG.match(text)}
     assert not untagged
     for text in entry.sources.values():
         if reference := REFERENCE.match(text):
-            assert reference[1] in {*entry.sources, *available(family)}, text
+            known = {*available(family), *available("catenary")} | {
+                f"family:{own}" for own in available("family")
+            }
+            assert reference[1] in {*entry.sources, *known}, text
 
 
 @pytest.mark.parametrize("name", available("catenary"))

@@ -1,4 +1,7 @@
-"""A family of lines: what is drawn from it lies in its ranges, hangs, and belongs together."""
+"""A family of lines: what is drawn from it lies in its ranges, hangs, and belongs together.
+
+What holds for every description to draw from is tested of sections, too.
+"""
 
 import json
 import math
@@ -9,7 +12,7 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.analysis.family import drawn_line
-from panto_env.catalog import available, load_family, load_lines
+from panto_env.catalog import available, load_catenary, load_drawn, load_family, load_lines
 from panto_env.catalog.loader import text_of
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
@@ -19,6 +22,9 @@ from panto_env.plant.catenary.flexible.static import hang
 from ..command import panto
 
 FAMILY = load_family("high-speed")
+DRAWN = {"family:high-speed": (200, 350), "section:main-line": (120, 160), "section:fast-line": (250, 300)}
+"""Descriptions to draw from, with speeds (km/h) for their lines."""
+drawn = pytest.mark.parametrize("source", DRAWN)
 
 
 def line_of(seed, family="family:high-speed", speed_kmh=(200, 350)):
@@ -33,14 +39,15 @@ def values_of(line):
     return line.model_dump_json(exclude={"sources"})
 
 
-def file_of(tmp_path, *changes):
-    text = text_of("high-speed")
+def file_of(tmp_path, *changes, source="family:high-speed"):
+    kind, name = source.split(":")
+    text = text_of(name)
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
     path = tmp_path / "mine.toml"
     path.write_text(text)
-    return f"family:{path}"
+    return f"{kind}:{path}"
 
 
 def inside(value, ends):
@@ -90,14 +97,15 @@ def test_the_wire_hangs_as_low_as_the_pre_sag_says():
 
 
 @pytest.mark.plain
-def test_a_seed_is_a_line_and_no_two_seeds_or_episodes_share_one():
+@drawn
+def test_a_seed_is_a_line_and_no_two_seeds_or_episodes_share_one(source):
     """Over the borders of the ranges for test, selection and training."""
     seeds = [*range(40), *range(990, 1010), *range(1990, 2010), 999_999]
-    lines = [values_of(line_of(seed)[0]) for seed in seeds]
+    lines = [values_of(line_of(seed, source, DRAWN[source])[0]) for seed in seeds]
     assert len(set(lines)) == len(seeds)
-    assert lines[7] == values_of(line_of(7)[0])
+    assert lines[7] == values_of(line_of(7, source, DRAWN[source])[0])
     random = np.random.default_rng(7)
-    settings = run_settings({"catenary": "family:high-speed", "speed_kmh": (200, 350)})
+    settings = run_settings({"catenary": source, "speed_kmh": DRAWN[source]})
     episodes = [values_of(on_drawn_line(settings, lambda: random).line) for _ in range(5)]
     assert episodes[0] == lines[7]
     assert len({*episodes, *lines}) == len(seeds) + 4
@@ -168,48 +176,63 @@ def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message):
 
 @pytest.mark.plain
 def test_where_one_line_is_needed_a_family_or_a_list_is_refused(tmp_path):
-    with pytest.raises(InputError, match="One line is needed here"):
-        _ = run_settings({"catenary": "family:high-speed"}).line
+    for source in DRAWN:
+        with pytest.raises(InputError, match="One line is needed here, not a list, a family or a section"):
+            _ = run_settings({"catenary": source}).line
+        with pytest.raises(InputError, match=f"One line is needed here, not the .* '{source}' to draw from"):
+            load_catenary(source)
     with pytest.raises(InputError, match="A list of lines must have one line"):
         run_settings({"catenary": []})
-    with pytest.raises(InputError, match="so give it with 'family:' before its path"):
-        run_settings({"catenary": file_of(tmp_path).removeprefix("family:")})
+    for source in DRAWN:
+        kind, path = file_of(tmp_path, source=source).split(":")
+        for other in ("", "family:" if kind == "section" else "section:"):
+            with pytest.raises(InputError, match=f"so give it with '{kind}:' before its path"):
+                run_settings({"catenary": f"{other}{path}"})
     with pytest.raises(InputError, match="Unknown family 'hihg-speed', did you mean 'high-speed'"):
         run_settings({"catenary": "family:hihg-speed"})
+    with pytest.raises(InputError, match="Unknown section 'manline', did you mean 'main-line'"):
+        run_settings({"catenary": "section:manline"})
 
 
-def test_a_saved_run_holds_its_line_and_can_be_repeated(tmp_path):
-    run = simulate("family:high-speed", seed=5, distance=120.0, line_condition="fair")
-    line, _ = line_of(5, speed_kmh=300)
-    assert run.catenary == line.name == "family:high-speed"
+@drawn
+def test_a_saved_run_holds_its_line_and_can_be_repeated(source, tmp_path):
+    given = {"seed": 5, "speed_kmh": DRAWN[source][1], "distance": 120.0, "line_condition": "fair"}
+    run = simulate(source, **given)
+    line, _ = line_of(5, source, DRAWN[source][1])
+    assert run.catenary == line.name == source
     assert run.design["catenary"] == line.model_dump(mode="json")
-    again = simulate(line, seed=5, distance=120.0, line_condition="fair")
+    again = simulate(line, **given)
     np.testing.assert_array_equal(again.contact_force, run.contact_force)
     run.save(tmp_path / "run.parquet")
     assert type(run).load(tmp_path / "run.parquet").design["catenary"] == run.design["catenary"]
 
 
-def test_a_required_mean_is_met_on_the_drawn_line():
+@drawn
+def test_a_required_mean_is_met_on_the_drawn_line(source):
     """The passes that trim the static force draw the same line and irregularity."""
-    run = simulate("family:high-speed", seed=5, mean_force=130.0, line_condition="fair", accuracy="fast")
+    given = {"speed_kmh": DRAWN[source][1], "line_condition": "fair", "accuracy": "fast"}
+    run = simulate(source, seed=5, mean_force=130.0, **given)
     assert run.summary().mean == pytest.approx(130.0, abs=0.06)
 
 
-def check_seeds_are_plausible(seeds):
+def check_seeds_are_plausible(lines, seeds):
     """Each line hangs, runs, and lies in the stated bands."""
-    found = [drawn_line(FAMILY, seed) for seed in seeds]
-    assert [(one.seed, one.outside(FAMILY), one.ending) for one in found if one.outside(FAMILY)] == []
+    found = [drawn_line(lines, seed) for seed in seeds]
+    assert [(one.seed, one.outside(lines), one.ending) for one in found if one.outside(lines)] == []
     return found
 
 
-def test_drawn_lines_are_plausible():
+@drawn
+def test_drawn_lines_are_plausible(source):
     """A sample; `make studies` tries a thousand."""
-    for one in check_seeds_are_plausible(range(8)):
-        line, (_, fastest) = line_of(one.seed)
+    for one in check_seeds_are_plausible(
+        load_drawn(source), range(8 if source == "family:high-speed" else 3)
+    ):
+        line, (_, fastest) = line_of(one.seed, source, DRAWN[source])
         assert one.speed_kmh == fastest
         # The middle of a span of two strings that act together yields L / 4 (T1 + T2); droppers add to it.
         both = line.contact_wire.tension + line.messenger_wire.tension
-        assert 1.0 < one.elasticity / (line.span_length / (4 * both)) < 1.4
+        assert 1.0 < one.elasticity / (one.longest_span / (4 * both)) < 1.4
         assert one.elasticity == pytest.approx(elasticity(line, 120.0)[1].max(), rel=0.1)
 
 
@@ -221,25 +244,33 @@ def test_the_time_that_a_draw_takes_is_in_milliseconds(monkeypatch):
 
 @pytest.mark.study
 def test_a_thousand_drawn_lines_are_plausible_and_drawn_in_milliseconds():
-    found = check_seeds_are_plausible(range(1000))
+    found = check_seeds_are_plausible(FAMILY, range(1000))
     assert np.median([one.milliseconds for one in found]) < 20
     assert np.mean([one.draws for one in found]) < 3
 
 
-def test_the_command_says_which_lines_are_not_plausible(tmp_path):
+@pytest.mark.parametrize(
+    ("source", "band", "most"),
+    [("family:high-speed", "[0.1, 0.45]", 0.2), ("section:main-line", "[0.05, 0.3]", 0.155)],
+)
+def test_the_command_says_which_lines_are_not_plausible(source, band, most, tmp_path):
     own = file_of(
-        tmp_path, ("force_deviation = { value = [0.1, 0.45]", "force_deviation = { value = [0.1, 0.2]")
+        tmp_path,
+        (f"force_deviation = {{ value = {band}", f"force_deviation = {{ value = [0.01, {most}]"),
+        source=source,
     )
     result = panto("family", own, "--seeds", "4", "--first", "2000", "--json")
     assert result.returncode == 1
     found = json.loads(result.stdout)
     assert [one["seed"] for one in found] == [2000, 2001, 2002, 2003]
     for one in found:
-        assert (one["outside"] == ["force_deviation"]) == (one["force_deviation"] > 0.2)
+        assert (one["outside"] == ["force_deviation"]) == (one["force_deviation"] > most)
     text = panto("family", own, "--seeds", "4", "--first", "2000").stdout
     count = sum(bool(one["outside"]) for one in found)
+    assert count > 0
     assert f"{count} of 4 lines are not plausible." in " ".join(text.split())
 
 
-def test_the_catalogue_names_its_families():
+def test_the_catalogue_names_its_families_and_sections():
     assert available("family") == ("high-speed",)
+    assert available("section") == ("fast-line", "main-line")

@@ -29,6 +29,10 @@ def test_validate_prints_the_table_and_passes():
     assert told["passed"]
     assert len(told["checks"]) == 2 * len(reference.ACCEPTED)
     assert all(check["lowest"] <= check["value"] <= check["highest"] for check in told["checks"])
+    kinds = json.loads(result.stdout)["kinds"]
+    assert {each["line_kind"] for each in kinds} == {"AC simple", "AC stitched"}
+    stitched = {each["catenary"]: each for each in kinds if each["speed_kmh"] == 300.0}
+    assert stitched["re330-stitched"]["max_uplift"] > 1.2 * stitched["re330"]["max_uplift"]  # at supports
     table = panto("validate")
     assert "All figures inside." in table.stdout
 

@@ -1,4 +1,4 @@
-"""Environments whose line is drawn: from a list or a family, in one lane or in groups of lanes."""
+"""Environments whose line is drawn: from a list, a family or a section, in one lane or in groups of lanes."""
 
 import copy
 import pickle
@@ -21,7 +21,10 @@ from .test_vector_rules import actions_of, assert_same, native, of_singles
 
 SHORT = {"distance": 25.0, "settle": 0.0, "reward": "agent", "accuracy": "fast"}
 FAMILY = {"catenary": "family:high-speed"} | SHORT
+SECTION = {"catenary": "section:main-line", "speed_kmh": (120, 160)} | SHORT | {"distance": 12.5}
 LIST = {"catenary": ["re250", "beijing-tianjin", "ln2"], "speed_kmh": (200, 300)} | SHORT
+
+drawn = pytest.mark.parametrize("settings", [FAMILY, SECTION], ids=["family", "section"])
 
 
 def make(**settings):
@@ -52,20 +55,28 @@ def run_to_end(env, action=0.0):
             return np.array(seen)
 
 
-def test_each_episode_has_a_line_of_its_own():
-    env = make(**FAMILY)
+@pytest.mark.parametrize(
+    ("settings", "limits"),
+    [
+        (FAMILY, lambda wave_speed: (0.45 * wave_speed, min(350, 0.7 * wave_speed))),
+        (SECTION, lambda wave_speed: (120, 160)),
+    ],
+    ids=["family", "section"],
+)
+def test_each_episode_has_a_line_of_its_own(settings, limits):
+    env = make(**settings)
     lines, space = [], env.observation_space
     for seed in (4, None, None, 4):
         observation, info = env.reset(seed=seed)
         assert observation in space
         context = env.unwrapped.context
         lines.append(values_of(context))
-        wave_speed_kmh = 3.6 * context.catenary.contact_wire.wave_speed
-        assert 0.45 * wave_speed_kmh <= info["speed_kmh"] <= min(350, 0.7 * wave_speed_kmh)
+        slowest, fastest = limits(3.6 * context.catenary.contact_wire.wave_speed)
+        assert slowest <= info["speed_kmh"] <= fastest
         run_to_end(env)
     assert lines[0] == lines[3]
     assert len(set(lines)) == 3
-    assert lines[0] == line_of(4, **FAMILY).model_dump_json(exclude={"sources"})
+    assert lines[0] == line_of(4, **settings).model_dump_json(exclude={"sources"})
 
 
 def test_a_list_gives_its_lines():
@@ -96,12 +107,14 @@ def test_the_episode_on_a_drawn_line_is_that_on_the_same_line_given():
     np.testing.assert_array_equal(run_to_end(drawn, 0.3), run_to_end(given, 0.3))
 
 
-def test_gymnasium_s_checker_accepts_it():
-    check_env(make(**FAMILY).unwrapped, skip_render_check=True)
+@drawn
+def test_gymnasium_s_checker_accepts_it(settings):
+    check_env(make(**settings).unwrapped, skip_render_check=True)
 
 
-def test_copies_go_on_alike():
-    env = make(**FAMILY)
+@drawn
+def test_copies_go_on_alike(settings):
+    env = make(**settings)
     env.reset(seed=1)
     twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
     seen = run_to_end(env)
@@ -132,7 +145,7 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
 # --- lanes -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [FAMILY, LIST])
+@pytest.mark.parametrize("settings", [FAMILY, SECTION, LIST])
 def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     ran = check_lanes_are_singles("Pantograph-v0", settings, steps=70)
     assert ran.ends > 3
@@ -161,11 +174,12 @@ def test_lanes_on_lines_of_their_own_answer_as_gymnasium_s_vector_environment(mo
     assert ends > 3
 
 
-def test_lanes_of_a_group_share_the_line_of_its_first_lane():
-    envs = make_vec(7, lines=3, **FAMILY)
+@drawn
+def test_lanes_of_a_group_share_the_line_of_its_first_lane(settings):
+    envs = make_vec(7, lines=3, **settings)
     envs.reset(seed=10)
     lines = [values_of(envs.unwrapped.context(lane)) for lane in range(7)]
-    firsts = [line_of(seed, **FAMILY).model_dump_json(exclude={"sources"}) for seed in (10, 13, 15)]
+    firsts = [line_of(seed, **settings).model_dump_json(exclude={"sources"}) for seed in (10, 13, 15)]
     assert lines == [firsts[0]] * 3 + [firsts[1]] * 2 + [firsts[2]] * 2
     envs.reset(seed=10)
     assert lines == [values_of(envs.unwrapped.context(lane)) for lane in range(7)]
@@ -173,13 +187,14 @@ def test_lanes_of_a_group_share_the_line_of_its_first_lane():
     assert not {values_of(envs.unwrapped.context(lane)) for lane in range(7)} & set(lines)
 
 
-def test_lanes_that_share_a_line_are_single_environments_on_it():
+@drawn
+def test_lanes_that_share_a_line_are_single_environments_on_it(settings):
     """The first of a group in all; the others on its line and at speeds for it."""
-    envs = make_vec(4, lines=2, autoreset_mode="Disabled", **FAMILY)
+    envs = make_vec(4, lines=2, autoreset_mode="Disabled", **settings)
     observations, infos = envs.reset(seed=20)
     singles = []
     for lane in range(4):
-        single = make(**FAMILY)
+        single = make(**settings)
         task, _ = envs.unwrapped._lanes.task_of(lane)
         own = {"catenary": task.settings.catenary, "speed_kmh": task.settings.speed_kmh}
         observation, info = single.reset(seed=20 + lane, options=own if lane % 2 else None)
@@ -237,22 +252,24 @@ def test_options_go_to_each_group():
     np.testing.assert_array_equal(observations[0], single.step(np.zeros(1, np.float32))[0])
 
 
-def test_an_action_that_is_not_finite_moves_no_group():
-    envs = make_vec(4, lines=2, **FAMILY)
+@drawn
+def test_an_action_that_is_not_finite_moves_no_group(settings):
+    envs = make_vec(4, lines=2, **settings)
     envs.reset(seed=0)
     actions = np.zeros((4, 1), np.float32)
     actions[3] = np.nan
     with pytest.raises(InputError, match="The action of lane 3 must be finite"):
         envs.step(actions)
-    fresh = make_vec(4, lines=2, **FAMILY)
+    fresh = make_vec(4, lines=2, **settings)
     fresh.reset(seed=0)
     for _ in range(3):
         ours, theirs = (each.step(np.zeros((4, 1), np.float32)) for each in (envs, fresh))
     np.testing.assert_array_equal(ours[0], theirs[0])
 
 
-def test_groups_are_copied_with_their_state():
-    envs = make_vec(4, lines=2, **FAMILY)
+@drawn
+def test_groups_are_copied_with_their_state(settings):
+    envs = make_vec(4, lines=2, **settings)
     envs.reset(seed=0)
     envs.step(np.zeros((4, 1), np.float32))
     twin = pickle.loads(pickle.dumps(envs))
@@ -266,7 +283,7 @@ def test_groups_are_copied_with_their_state():
     ("lanes", "settings", "message"),
     [
         (2, {"lines": 3} | FAMILY, "2 lanes are too few for 3 lines"),
-        (2, {"lines": 2} | SHORT, "lines are drawn from a list or a family"),
+        (2, {"lines": 2} | SHORT, "lines are drawn from a list, a family or a section"),
         (2, {"episodes_per_line": 0} | FAMILY, "episodes_per_line must be a whole number from 1"),
     ],
 )
@@ -282,10 +299,11 @@ def test_a_line_given_by_value_is_an_option_too():
     assert env.unwrapped.context.catenary == line
 
 
-def test_groups_step_on_several_threads_as_on_one(monkeypatch):
+@drawn
+def test_groups_step_on_several_threads_as_on_one(settings, monkeypatch):
     """Over the ends of episodes, with new lines drawn within a step."""
     monkeypatch.setattr("panto_env.backend.threads.WORTH", 0.0)  # on threads, however short a step is
-    many, alone = (make_vec(8, lines=4, **FAMILY) for _ in range(2))
+    many, alone = (make_vec(8, lines=4, **settings) for _ in range(2))
     groups = alone.unwrapped._lanes
     groups._threads = LaneThreads(groups._step_groups, 4, threads=1)
     many.reset(seed=0)

@@ -14,6 +14,7 @@ from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318.convergence import in_use
 
 from . import simulation
+from .differences import at_rest
 from .figures import figures as figures_of
 from .pictures import draw
 from .sections import sections
@@ -51,6 +52,16 @@ def main() -> None:
     Console().print(table)
 
 
+def compare_at_rest() -> None:
+    """Print the largest differences of both codes at rest, section by section."""
+    table = Table("section", "contact wire (mm)", "messenger (mm)", "droppers' forces (N)", "lengths (mm)")
+    for name, section in sections().items():
+        found = at_rest(section.line)
+        values = (1e3 * found.contact, 1e3 * found.messenger, found.force, 1e3 * found.length)
+        table.add_row(name, *(f"{value:.4f}" for value in values))
+    Console().print(table)
+
+
 def compare_sections(folder: Path) -> None:
     """Print the figures of each section of unlike spans by both codes, and draw their forces in a folder."""
     table = Table("section", "model", "F_m (N)", "σ (N)", "max (N)", "min (N)", "uplift per support (mm)")
@@ -74,4 +85,8 @@ if __name__ == "__main__":
     parser.add_argument("--sections", action="store_true", help="sections of unlike spans, with pictures")
     parser.add_argument("--output", type=Path, default=Path("runs/finite-element"), help="for the pictures")
     given = parser.parse_args()
-    compare_sections(given.output) if given.sections else main()
+    if given.sections:
+        compare_at_rest()
+        compare_sections(given.output)
+    else:
+        main()

@@ -27,12 +27,18 @@ def span_nodes(span_length: float, droppers: Sequence[float], element: float) ->
     return np.append(np.concatenate(pieces), span_length)
 
 
-def matrices(nodes: Array, wire: Wire) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Stiffness (bending and tension) and consistent mass, each (2 n_nodes, 2 n_nodes)."""
+def matrices(
+    nodes: Array, wire: Wire, own_tension: Array | None = None
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Stiffness (bending and tension) and consistent mass, each (2 n_nodes, 2 n_nodes).
+
+    own_tension: of each element, (n_nodes - 1,) (N), by default the wire's.
+    """
     h = np.diff(nodes)
     hh, o = h * h, np.ones_like(h)
     bending = wire.bending_stiffness / h**3 * _symmetric(12 * o, 6 * h, 4 * hh, 2 * hh)
-    tension = wire.tension / (30 * h) * _symmetric(36 * o, 3 * h, 4 * hh, -hh)
+    pull = wire.tension if own_tension is None else own_tension
+    tension = pull / (30 * h) * _symmetric(36 * o, 3 * h, 4 * hh, -hh)
     mass = (
         wire.mass
         * h

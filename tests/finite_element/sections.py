@@ -38,6 +38,26 @@ BOTH = {
         for length, height, encumbrance in zip(LENGTHS, HEIGHTS, LOW, strict=True)
     ]
 }
+BESIDE_SUPPORTS = [2.5, 6.0]
+"""Where droppers hang from a stitch wire, from the support (m)."""
+STITCHED_330 = {"stitch_wire": {"length": 18.0, "tension": 3.5e3, "mass": 0.31}}
+STITCHED_250 = {"stitch_wire": {"length": 18.0, "tension": 2.8e3, "mass": 0.31}}
+BARE = {"stitch_wire": {"length": 0.0}}
+SHORTER = {"stitch_wire": {"length": 12.0, "tension": 2.0e3}}
+SOME_STITCHED = STITCHED_330 | {
+    "sequence": [
+        {"span_length": length, "droppers": {"spacing": 5.0, "first": 2.5}} | changes
+        for length, changes in zip(
+            LENGTHS, ({}, {}, BARE, {}, BARE, BARE, {}, {}, SHORTER, BARE, {}, {}, {}, {}), strict=True
+        )
+    ]
+}
+"""Spans of all lengths; some supports have a stitch wire, one of them a shorter one, and some have none."""
+
+
+def overlap(first_span: int, *rises: float) -> dict[str, Any]:
+    """Fourteen spans all alike but for an overlap."""
+    return {"sequence": [{}] * 14, "overlaps": [{"first_span": first_span, "rises": rises}]}
 
 
 @dataclass(frozen=True)
@@ -91,8 +111,23 @@ def line_of(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
     if "spacing" in values["droppers"]:
         del values["droppers"]["positions"], values["droppers"]["sag"]
     own = {key: value for key, value in changes.items() if key != "droppers"}
-    del values["spans"]
+    if "sequence" in changes:
+        del values["spans"]
     return FlexibleCatenaryData.model_validate(values | own)
+
+
+def stitched(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
+    """A line of the catalogue with a stitch wire, droppers on it, and values of its own.
+
+    Droppers beside supports stand where they hang from it; the others are the line's own from 11 m on.
+    """
+    usual = load_catenary(name)
+    table = zip(usual.droppers.positions, usual.droppers.sag, strict=True)
+    middle = [(x, sag) for x, sag in table if 11.0 < x < usual.span_length - 11.0]
+    begin = [(x, 0.0) for x in BESIDE_SUPPORTS]
+    end = [(usual.span_length - x, 0.0) for x in reversed(BESIDE_SUPPORTS)]
+    x, sag = (list(each) for each in zip(*begin, *middle, *end, strict=True))
+    return line_of(name, {"droppers": {"positions": x, "sag": sag}} | changes)
 
 
 def sections() -> dict[str, Section]:
@@ -105,4 +140,18 @@ def sections() -> dict[str, Section]:
         "mixed": Section(line_of("en50318-2002", MIXED), pantograph("en50318-2002"), 250.0),
         "bridge": Section(line_of("benchmark-2015", BRIDGE), pantograph("dsa380"), 250.0),
         "both": Section(line_of("re330", BOTH), pantograph("cx"), 250.0),
+        "stitched-330": Section(stitched("re330", STITCHED_330), pantograph("cx"), 300.0, spans=(4, 9)),
+        "stitched-250": Section(stitched("re250", STITCHED_250), pantograph("dsa250"), 200.0, spans=(4, 9)),
+        "some-stitched": Section(line_of("re330", SOME_STITCHED), pantograph("cx"), 250.0),
+        "overlap-2002": Section(
+            line_of("en50318-2002", overlap(6, 0.1, 0.5)), pantograph("en50318-2002"), 250.0
+        ),
+        "overlap-2002-long": Section(
+            line_of("en50318-2002", overlap(5, 0.06, 0.3, 0.8)), pantograph("en50318-2002"), 300.0
+        ),
+        "overlap-330": Section(line_of("re330", overlap(6, 0.1, 0.5)), pantograph("cx"), 300.0),
+        "overlap-330-long": Section(line_of("re330", overlap(5, 0.06, 0.3, 0.8)), pantograph("cx"), 250.0),
+        "overlap-stitched": Section(
+            stitched("re330", STITCHED_330 | overlap(6, 0.1, 0.5)), pantograph("cx"), 250.0
+        ),
     }

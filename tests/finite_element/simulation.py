@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -19,13 +18,11 @@ from panto_env.plant.pantograph.schema import PantographData
 
 from .figures import Figures, figures, stretch
 from .hermite import Array
+from .solvers import complementarity, narrow
 from .static import StaticShape, static_shape
 from .system import LineSystem, build
 
 __all__ = ["Figures", "Result", "StaticShape", "figures", "simulate", "static_shape", "stretch"]
-
-BANDWIDTH = 5  # two neighbouring nodes: messenger height of one to messenger slope of the next
-TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -37,17 +34,19 @@ class Result:
     position: Array
     """Position of the contact point, shape (n_times,) (m)."""
     contact_force: Array
-    """Unfiltered, shape (n_times,) (N)."""
+    """Unfiltered, of all wires that are touched, shape (n_times,) (N)."""
     head: Array
     """Height of the collector head, shape (n_times,) (m)."""
     wire: Array
-    """Height of the contact wire at the contact point, shape (n_times,) (m)."""
+    """Height of the lowest contact wire at the contact point, shape (n_times,) (m)."""
     uplift: Array
-    """Contact wire over its static shape at the interior supports, shape (n_times, spans - 1) (m)."""
+    """Contact wire in use over its static shape at the interior supports, shape (n_times, spans - 1) (m)."""
     support_position: Array
     """Where these stand, shape (spans - 1,) (m)."""
     dropper_tension: Array
-    """Shape (n_times, n_droppers), droppers in order along the line (N)."""
+    """Shape (n_times, n_droppers), droppers in order along the line, pair of wires by pair (N)."""
+    wire_forces: Array
+    """Contact force on each pair's contact wire, shape (n_times, n_pairs) (N)."""
 
 
 class Newmark:
@@ -87,23 +86,44 @@ def simulate(
     (m) bounds the elements, ``time_step`` is in s. The spring to the ground is unloaded with the lowest
     mass at nominal contact wire height 0, whatever the height of the first support.
     """
-    spans = line.spans if spans is None else spans
-    speed = speed_kmh / 3.6
-    system = build(line, spans, element)
-    whole = float(system.nodes[-1])
+    system = build(line, line.spans if spans is None else spans, element)
+    return ride(system, pantograph, speed_kmh, time_step, distance)
+
+
+def ride(
+    system: LineSystem,
+    pantograph: PantographData,
+    speed_kmh: float,
+    time_step: float,
+    distance: float | None = None,
+) -> Result:
+    """A run as ``simulate`` makes it, on matrices that are given."""
+    speed, whole = speed_kmh / 3.6, float(system.nodes[-1])
     steps = int(min(distance or whole, whole) / (speed * time_step) + 1e-9)
     wires = Newmark(system.mass, system.damping, system.stiffness, time_step)
     solver = _Contact(system, wires, pantograph, speed)
 
     time = time_step * np.arange(steps + 1)
-    motion, tension = np.zeros((steps + 1, 3)), np.zeros((steps + 1, system.dropper_tension.size))
-    uplift = np.zeros((steps + 1, spans - 1))
-    motion[0], tension[0] = solver.start(), system.dropper_tension
+    forces, tension = (
+        np.zeros((steps + 1, len(system.pairs))),
+        np.zeros((steps + 1, system.dropper_tension.size)),
+    )
+    motion, uplift = np.zeros((steps + 1, 2)), np.zeros((steps + 1, system.supports.size))
+    forces[0], *motion[0] = solver.start()
+    tension[0] = system.dropper_tension
     for n in range(1, steps + 1):
-        motion[n], tension[n] = solver.advance(speed * time[n])
+        (forces[n], *motion[n]), tension[n] = solver.advance(speed * time[n])
         uplift[n] = wires.u[system.supports]
-    force, head, wire = motion.T
-    return Result(time, speed * time, force, head, wire, uplift, system.support_position, tension)
+    return Result(
+        time,
+        speed * time,
+        forces.sum(axis=1),
+        *motion.T,
+        uplift,
+        system.support_position,
+        tension,
+        forces,
+    )
 
 
 class _Contact:
@@ -114,9 +134,8 @@ class _Contact:
             raise NotImplementedError("the finite-element model needs an elastic contact")
         self.system, self.wires, self.speed = system, wires, speed
         self.k, self.c = float(pantograph.contact_stiffness), pantograph.contact_damping
-        bands = [np.append(np.zeros(d), wires.matrix.diagonal(d)) for d in range(BANDWIDTH, -1, -1)]
-        assert sparse.triu(wires.matrix, BANDWIDTH + 1).nnz == 0
-        self.factor = (cholesky_banded(np.array(bands)), False)
+        self.order, bands = narrow(sparse.csr_array(wires.matrix))
+        self.factor = (cholesky_banded(bands), False)
 
         mass, damping, stiffness = _chain(pantograph)
         self.chain = Newmark(mass, damping, stiffness, wires.step)
@@ -125,83 +144,88 @@ class _Contact:
         self.lift[-1] = pantograph.nominal_force(speed)
 
         # What a newton of extra tension in each dropper does to all unknowns and all extensions.
-        droppers = system.extension.shape[0]
+        droppers, pairs = system.extension.shape[0], len(system.pairs)
+        self.droppers = droppers
         self.per_tension = self._solve(system.extension.T.toarray())
         gain = wires.shift * system.dropper_stiffness + wires.rate * system.dropper_damping
         self.gain = gain
-        self.matrix = np.eye(droppers + 1)
-        self.matrix[:-1, :-1] -= gain[:, None] * (system.extension @ self.per_tension)
-        self.active = np.append(np.zeros(droppers, bool), True)
+        self.matrix = np.eye(droppers + pairs)
+        self.matrix[:droppers, :droppers] -= gain[:, None] * (system.extension @ self.per_tension)
+        self.active = np.zeros(droppers + pairs, bool)
+        self.active[droppers] = True
 
-    def start(self) -> tuple[float, float, float]:
-        """Static equilibrium against the wire's fixed end: force (N), head and wire height (m)."""
-        height = self.system.contact_point(0.0)[3]
-        held = self.chain.stiffness.copy()
-        held[0, 0] += self.k
-        load = self.lift.copy()
-        load[0] += self.k * height
-        self.chain.u = np.linalg.solve(held, load)
-        return self.k * (self.chain.u[0] - height), self.chain.u[0], height
+    def start(self) -> tuple[Array, float, float]:
+        """Static equilibrium against the wires' fixed ends: what ``advance`` returns first."""
+        over = self.system.hangs_over(0.0)
+        heights = {pair: self.system.contact_point(0.0, pair)[3] for pair in over}
+        touched: list[int] = []
+        for pair in sorted(
+            over, key=heights.__getitem__
+        ):  # the lowest wire, and any that it does not keep away
+            if touched and self.chain.u[0] <= heights[pair]:
+                break
+            touched.append(pair)
+            held, load = self.chain.stiffness.copy(), self.lift.copy()
+            held[0, 0] += self.k * len(touched)
+            load[0] += self.k * sum(heights[each] for each in touched)
+            self.chain.u = np.linalg.solve(held, load)
+        forces = np.zeros(len(self.system.pairs))
+        forces[touched] = [self.k * (self.chain.u[0] - heights[pair]) for pair in touched]
+        return forces, self.chain.u[0], min(heights.values())
 
-    def advance(self, x: float) -> tuple[tuple[float, float, float], Array]:
-        """One step to ``x`` (m): force (N), head and wire height (m); dropper tensions (N)."""
-        system, wires, chain = self.system, self.wires, self.chain
-        unknowns, values, slopes, height, incline = system.contact_point(x)
-        columns = np.zeros((wires.u.size, 2))
+    def advance(self, x: float) -> tuple[tuple[Array, float, float], Array]:
+        """One step to ``x`` (m): force on each pair's contact wire (N), height of the head and of the lowest
+        contact wire (m); dropper tensions (N)."""
+        system, wires, chain, n = self.system, self.wires, self.chain, self.droppers
+        over = system.hangs_over(x)
+        points = [system.contact_point(x, pair) for pair in over]
+        columns = np.zeros((wires.u.size, 1 + len(over)))
         columns[:, 0] = wires.predict()
-        columns[unknowns, 1] = values
-        acceleration, per_force = self._solve(columns).T
+        for k, (unknowns, values, *_) in enumerate(points):
+            columns[unknowns, 1 + k] = values
+        acceleration, *per_forces = self._solve(columns).T
         wires.correct(acceleration)
         chain.correct(self.chain_inverse @ (chain.predict() + self.lift))
 
-        # Force of contact spring and damper were the wires and pantograph not to yield to it ...
-        gap = chain.u[0] - height - values @ wires.u[unknowns]
-        closing = chain.v[0] - values @ wires.v[unknowns]
-        closing -= self.speed * (incline + slopes @ wires.u[unknowns])
-        # ... and how it falls with the acceleration of wire and head.
-        rates = self.k * wires.shift + self.c * wires.rate
-        along = rates * values + self.c * self.speed * wires.shift * slopes
         stretch = system.extension @ wires.u
         pull = system.dropper_stiffness * stretch
         pull += system.dropper_damping * (system.extension @ wires.v)
-
-        offset = np.append(system.dropper_tension + pull, -(self.k * gap + self.c * closing))
-        self.matrix[:-1, -1] = self.gain * (system.extension @ per_force)
-        self.matrix[-1, :-1] = -(along @ self.per_tension[unknowns])
-        self.matrix[-1, -1] = 1 + along @ per_force[unknowns] + rates * self.chain_inverse[0, 0]
+        # A wire that does not hang over the strip has no force on it.
+        offset = np.append(system.dropper_tension + pull, np.ones(len(system.pairs)))
+        self.matrix[n:, :] = np.eye(len(system.pairs), n + len(system.pairs), n)
+        self.matrix[:n, n:] = 0.0
+        rates = self.k * wires.shift + self.c * wires.rate
+        touching = n + np.array(over)
+        for pair, (unknowns, values, slopes, height, incline), per_force in zip(
+            over, points, per_forces, strict=True
+        ):
+            # Force of contact spring and damper were the wires and pantograph not to yield to it ...
+            gap = chain.u[0] - height - values @ wires.u[unknowns]
+            closing = chain.v[0] - values @ wires.v[unknowns]
+            closing -= self.speed * (incline + slopes @ wires.u[unknowns])
+            offset[n + pair] = -(self.k * gap + self.c * closing)
+            # ... and how it falls with the acceleration of wire and head.
+            along = rates * values + self.c * self.speed * wires.shift * slopes
+            self.matrix[:n, n + pair] = self.gain * (system.extension @ per_force)
+            self.matrix[n + pair, :n] = -(along @ self.per_tension[unknowns])
+            self.matrix[n + pair, n + pair] += along @ per_force[unknowns]
+            self.matrix[n + pair, touching] += rates * self.chain_inverse[0, 0]
         forces, rest = complementarity(self.matrix, offset, self.active)
 
-        slack = np.flatnonzero(self.active[:-1])
-        change = per_force * forces[-1] - self.per_tension[:, slack] @ forces[slack]
-        for part, extra in ((wires, change), (chain, -self.chain_inverse[:, 0] * forces[-1])):
+        slack, on_wires = np.flatnonzero(self.active[:n]), forces[n:]
+        change = np.array(per_forces).T @ on_wires[over] - self.per_tension[:, slack] @ forces[slack]
+        head = -self.chain_inverse[:, 0] * on_wires.sum()
+        for part, extra in ((wires, change), (chain, head)):
             part.u += part.shift * extra
             part.v += part.rate * extra
             part.a += extra
-        wire = height + values @ wires.u[unknowns]
-        return (forces[-1], chain.u[0], wire), rest[:-1]
+        lowest = min(height + values @ wires.u[unknowns] for unknowns, values, _, height, _ in points)
+        return (on_wires, chain.u[0], lowest), rest[:n]
 
     def _solve(self, right: Array) -> Array:
-        return cho_solve_banded(self.factor, right, check_finite=False)
-
-
-def complementarity(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Solve rest = matrix q + offset with q >= 0, rest >= 0 and q rest = 0; return q and rest (N).
-
-    ``active`` (where q may exceed 0) is the first guess and is updated in place.
-    """
-    for iteration in range(1000):
-        chosen = np.flatnonzero(active)
-        q = np.zeros(offset.size)
-        q[chosen] = np.linalg.solve(matrix[np.ix_(chosen, chosen)], -offset[chosen])
-        rest = matrix[:, chosen] @ q[chosen] + offset
-        rest[chosen] = 0.0
-        wrong = np.flatnonzero((q < -TOLERANCE) | (rest < -TOLERANCE))
-        if wrong.size == 0:
-            return np.maximum(q, 0.0), np.maximum(rest, 0.0)
-        # Changing all at once is quick but may cycle; one at a time (Murty) cannot.
-        change = wrong if iteration < 20 else wrong[-1:]
-        active[change] = ~active[change]
-    raise ArithmeticError("slack droppers and contact found no consistent state")
+        found = np.empty_like(right)
+        found[self.order] = cho_solve_banded(self.factor, right[self.order], check_finite=False)
+        return found
 
 
 def _chain(pantograph: PantographData) -> tuple[Array, Array, Array]:

@@ -9,11 +9,11 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.schema import Wire
 
-from .hermite import Array, Indices, matrices, span_nodes, uniform_load
+from .hermite import Array, Indices, matrices, uniform_load
+from .stitch import GRAVITY, Upper, nodes_between, stitches_at
 
-GRAVITY = 9.81
+__all__ = ["GRAVITY", "StaticShape", "static_shape"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class StaticShape:
     """Messenger wire height (m), shape (n_nodes,)."""
     messenger_slope: Array
     """Messenger wire slope (-), shape (n_nodes,)."""
+    hanger: Array
+    """Height of what a dropper would hang from: a stitch wire, or the messenger (m), shape (n_nodes,)."""
     dropper_tension: Array
     """Tension above the contact-wire clamp (N), shape (n_droppers,)."""
     dropper_length: Array
@@ -43,46 +45,60 @@ def static_shape(line: FlexibleCatenaryData, element: float = 0.25) -> StaticSha
     and yields under the load. The steady arm carries none of the wire, unless the catalogue says that it
     holds it: then the contact wire is at height 0 at the support.
     """
-    droppers = line.droppers
-    x = span_nodes(line.span_length, droppers.positions, element)
+    droppers, ends = line.droppers, (0.0, line.span_length)
+    stitches = stitches_at(ends, (line.stitch_wire,) * 2)
+    x = nodes_between(*ends, droppers.positions, stitches, element)
     at = np.searchsorted(x, np.array(droppers.positions) - 1e-9)
+    upper = Upper(x, line.messenger_wire, stitches)
+    hung = upper.under[at]
+    around = _repeating(upper.size, upper.under)
+    springs = np.zeros(upper.size)
+    springs[0] = line.support.stiffness  # at the last node stands the same support again
+
     held, heights = at, -np.array(droppers.sag)
     if line.steady_arm.holds_wire:
         held, heights = np.append(at, 0), np.append(heights, 0.0)
-    length, top = np.full(at.size, line.encumbrance), np.array([line.encumbrance])
+    stiffness, _ = matrices(x, line.contact_wire)
+    fold = _repeating(2 * x.size, 2 * np.arange(x.size))
+    weight = uniform_load(x, -line.contact_wire.mass * GRAVITY)
+    length = np.full(at.size, line.encumbrance)
     for _ in range(50):
         half = droppers.mass * length / 2
-        clamped = half + droppers.contact_clamp_mass
-        contact, reaction = _hang(x, line.contact_wire, held, heights, at, clamped)
+        force = weight.copy()
+        force[2 * at] -= GRAVITY * (half + droppers.contact_clamp_mass)
+        contact, reaction = _hang(stiffness, force, fold, 2 * held, heights)
         tension = reaction[: at.size]
-        load = tension / GRAVITY + half + droppers.messenger_clamp_mass
-        messenger, carried = _hang(x, line.messenger_wire, np.array([0]), top, at, load)
-        top = line.encumbrance - carried / line.support.stiffness
-        old, length = length, messenger[at, 0] - contact[at, 0]
+        force = upper.weight + springs * line.encumbrance
+        force[hung] -= tension + GRAVITY * (half + droppers.messenger_clamp_mass)
+        above, _ = _hang(upper.stiffness + sparse.diags_array(springs), force, around)
+        old, length = length, above[hung] - contact[2 * at]
         if np.max(np.abs(length - old)) < 1e-12:
             break
-    return StaticShape(x, *contact.T, *messenger.T, tension, length)
+    messenger = above[: 2 * x.size].reshape(-1, 2)
+    return StaticShape(x, *contact.reshape(-1, 2).T, *messenger.T, above[upper.under], tension, length)
 
 
 def _hang(
-    x: Array, wire: Wire, held: Indices, heights: Array, loaded: Indices, masses: Array
+    stiffness: sparse.csr_array,
+    force: Array,
+    fold: sparse.csr_array,
+    held: Indices | None = None,
+    heights: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Periodic wire held at nodes ``held`` at ``heights``, with ``masses`` (kg) at ``loaded``.
+    """Unknowns under forces, folded, with those ``held`` at ``heights``; and the forces that hold these."""
+    fixed = np.zeros(0, int) if held is None else fold.indices[held]
+    folded, load = sparse.csr_array(fold.T @ stiffness @ fold), fold.T @ force
+    shape = np.zeros(load.size)
+    shape[fixed] = 0.0 if heights is None else heights
+    free = np.setdiff1d(np.arange(load.size), fixed)
+    shape[free] = spsolve(folded[free][:, free].tocsc(), (load - folded @ shape)[free])
+    return fold @ shape, (folded @ shape - load)[fixed]
 
-    Returns height and slope at every node, shape (n_nodes, 2), and the upward forces that hold it.
-    """
-    stiffness, _ = matrices(x, wire)
-    force = uniform_load(x, -wire.mass * GRAVITY)
-    force[2 * loaded] -= GRAVITY * masses
-    # The last node is the first one again: fold its two unknowns onto those of the first.
-    size = 2 * x.size - 2
-    fold = sparse.csr_array(
-        (np.ones(size + 2), (np.arange(size + 2), np.arange(size + 2) % size)), (size + 2, size)
-    )
-    stiffness, force = sparse.csr_array(fold.T @ stiffness @ fold), fold.T @ force
-    shape = np.zeros(size)
-    shape[2 * held] = heights
-    free = np.setdiff1d(np.arange(size), 2 * held)
-    shape[free] = spsolve(stiffness[free][:, free].tocsc(), (force - stiffness @ shape)[free])
-    reaction = (stiffness @ shape - force)[2 * held]
-    return (fold @ shape).reshape(-1, 2), reaction
+
+def _repeating(size: int, under: Indices) -> sparse.csr_array:
+    """Folds the last node's unknowns onto the first one's: height, slope, and what droppers hang from."""
+    same = np.arange(size)
+    last = 2 * under.size - 2
+    same[[last, last + 1, under[-1]]] = 0, 1, under[0]
+    _, columns = np.unique(same, return_inverse=True)
+    return sparse.csr_array((np.ones(size), (np.arange(size), columns)), (size, int(columns.max()) + 1))

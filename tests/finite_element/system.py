@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
-from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData, Rayleigh
+from panto_env.plant.catenary.schema import Wire
 
 from .hermite import Array, Indices, matrices, shape_functions
-from .rest import at_rest
+from .rest import PairAtRest, at_rest
+from .stitch import Upper, stitches_at
 
 
 @dataclass(frozen=True)
 class LineSystem:
-    """Unknowns per node: messenger height and slope, contact wire height and slope (m, -)."""
+    """Unknowns of a pair of wires per node: messenger height and slope, contact wire height and slope (m, -).
+
+    After those of its nodes come the heights of its stitch wires; then the next pair's.
+    """
 
     nodes: Array
-    """Node positions (m), shape (n_nodes,)."""
+    """Node positions (m), shape (n_nodes,), pair after pair."""
     free: Array
-    """1 for an unknown, 0 for a fixed wire end, shape (4 n_nodes,)."""
+    """1 for an unknown, 0 for a fixed wire end, shape (n_unknowns,)."""
     static: Array
     """Static height and slope of the contact wire (m, -), shape (n_nodes, 2)."""
     mass: sparse.csr_array
     damping: sparse.csr_array
     stiffness: sparse.csr_array
-    """Matrices (kg, N s/m, N/m), shape (4 n_nodes, 4 n_nodes); unit mass at fixed unknowns."""
+    """Matrices (kg, N s/m, N/m), shape (n_unknowns, n_unknowns); unit mass at fixed unknowns."""
     extension: sparse.csr_array
-    """Messenger less contact height at each dropper, shape (n_droppers, 4 n_nodes)."""
+    """Height of each dropper's upper end less that of its lower one, shape (n_droppers, n_unknowns)."""
     dropper_stiffness: Array
     """Shape (n_droppers,) (N/m)."""
     dropper_damping: Array
@@ -36,36 +42,74 @@ class LineSystem:
     dropper_tension: Array
     """Static tension, shape (n_droppers,) (N)."""
     supports: Indices
-    """Unknowns that are the contact wire's height at the interior supports, integers."""
+    """Unknowns that are the height of the contact wire in use at the interior supports, integers."""
     support_position: Array
     """Where the interior supports stand, shape (spans - 1,) (m)."""
+    pairs: tuple[tuple[int, int, int], ...]
+    """First node, node after the last, and first unknown of each pair of wires."""
 
-    def contact_point(self, x: float) -> tuple[Indices, Array, Array, float, float]:
-        """Unknowns, values and slopes of the contact wire's height at ``x`` (m), shapes (4,);
-        then its static height (m) and slope (-) there."""
-        i = min(max(int(np.searchsorted(self.nodes, x, side="right")) - 1, 0), self.nodes.size - 2)
-        h = self.nodes[i + 1] - self.nodes[i]
-        values, slopes = shape_functions((x - self.nodes[i]) / h, h)
-        ends = self.static[i : i + 2].ravel()
-        unknowns = 4 * i + np.array([2, 3, 6, 7])
+    def contact_point(self, x: float, pair: int = 0) -> tuple[Indices, Array, Array, float, float]:
+        """Unknowns, values and slopes of a contact wire's height at ``x`` (m), shapes (4,);
+        then its static height (m) and slope (-) there. Beyond its anchors the wire is as if cut off."""
+        first, last, unknown = self.pairs[pair]
+        i = min(max(int(np.searchsorted(self.nodes[first:last], x, side="right")) - 1, 0), last - first - 2)
+        here = first + i
+        h = self.nodes[here + 1] - self.nodes[here]
+        values, slopes = shape_functions((x - self.nodes[here]) / h, h)
+        ends = self.static[here : here + 2].ravel()
+        unknowns = unknown + 4 * i + np.array([2, 3, 6, 7])
         free = self.free[unknowns]
         return unknowns, free * values, free * slopes, float(values @ ends), float(slopes @ ends)
 
+    def hangs_over(self, x: float) -> list[int]:
+        """Numbers of the pairs of wires whose anchors lie on either side of ``x`` (m)."""
+        ends = [(self.nodes[first], self.nodes[last - 1]) for first, last, _ in self.pairs]
+        return [k for k, (begin, end) in enumerate(ends) if begin - 1e-9 <= x <= end + 1e-9]
+
 
 def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
-    """Line of ``spans`` spans in elements up to ``element`` (m), both wires fixed at its ends."""
-    rest = at_rest(line, spans, element)
+    """Line of ``spans`` spans in elements up to ``element`` (m), all wires fixed at their ends."""
+    return joined([of_pair(rest, line.wires, line.damping) for rest in at_rest(line, spans, element)])
+
+
+def joined(systems: Sequence[LineSystem]) -> LineSystem:
+    """Pairs of wires in the order of travel as one line; nothing but a train joins them."""
+    if len(systems) == 1:
+        return systems[0]
+    nodes = np.cumsum([0, *(each.nodes.size for each in systems)]).tolist()
+    unknowns = np.cumsum([0, *(each.free.size for each in systems)]).tolist()
+
+    def chained(key: str) -> Array:
+        return np.concatenate([getattr(each, key) for each in systems])
+
+    def blocks(key: str) -> sparse.csr_array:
+        return sparse.csr_array(sparse.block_diag([getattr(each, key) for each in systems]))
+
+    chains = ("nodes", "free", "static", "dropper_stiffness", "dropper_damping", "dropper_tension")
+    return LineSystem(
+        **{key: chained(key) for key in (*chains, "support_position")},
+        **{key: blocks(key) for key in ("mass", "damping", "stiffness", "extension")},
+        supports=np.concatenate([each.supports + at for each, at in zip(systems, unknowns, strict=False)]),
+        pairs=tuple(zip(nodes[:-1], nodes[1:], unknowns[:-1], strict=True)),
+    )
+
+
+def of_pair(rest: PairAtRest, wires: tuple[Wire, Wire], rayleigh: Rayleigh) -> LineSystem:
+    """A pair of wires (contact, messenger) between its anchors, where no stitch wire is."""
     count, at, masts = rest.nodes.size, rest.droppers, rest.masts
     tables = [span.droppers for span in rest.spans for _ in span.droppers.positions]
     stands = rest.spans[1:]  # each interior support is its following span's
+    contact_wire, messenger_wire = wires
 
-    size = 4 * count
-    on_messenger = _placement(size, 4 * np.arange(count)[:, None] + [0, 1])
+    stitches = stitches_at(rest.nodes[masts].tolist(), [each.stitch_wire for each in stands])
+    upper = Upper(rest.nodes, messenger_wire, stitches)
+    size = 2 * count + upper.size
+    own = np.append(4 * np.arange(count)[:, None] + [0, 1], np.arange(4 * count, size))
+    on_messenger = _placement(size, own)
     on_contact = _placement(size, 4 * np.arange(count)[:, None] + [2, 3])
-    k_messenger, m_messenger = matrices(rest.nodes, line.messenger_wire)
-    k_contact, m_contact = matrices(rest.nodes, line.contact_wire)
-    stiffness = on_messenger @ k_messenger @ on_messenger.T + on_contact @ k_contact @ on_contact.T
-    mass = on_messenger @ m_messenger @ on_messenger.T + on_contact @ m_contact @ on_contact.T
+    k_contact, m_contact = matrices(rest.nodes, contact_wire)
+    stiffness = on_messenger @ upper.stiffness @ on_messenger.T + on_contact @ k_contact @ on_contact.T
+    mass = on_messenger @ upper.mass @ on_messenger.T + on_contact @ m_contact @ on_contact.T
 
     k = np.array(
         [
@@ -73,14 +117,16 @@ def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
             for each, length in zip(tables, rest.dropper_length, strict=True)
         ]
     )
-    extension = (_placement(size, 4 * at) - _placement(size, 4 * at + 2)).T.tocsr()
+    hung = own[upper.under[at]]
+    extension = (_placement(size, hung) - _placement(size, 4 * at + 2)).T.tocsr()
     stiffness = stiffness + extension.T @ sparse.diags_array(k) @ extension
     # Rayleigh damping is the wires' (and taut droppers'), so it is taken before what follows.
-    damping = line.damping.alpha * mass + line.damping.beta * stiffness
+    damping = rayleigh.alpha * mass + rayleigh.beta * stiffness
 
     half = np.array([each.mass for each in tables]) * rest.dropper_length / 2
     point_mass, point_spring, point_damper = np.zeros((3, size))
-    point_mass[4 * at] += half + [each.messenger_clamp_mass for each in tables]
+    point_mass[4 * np.arange(count)] += upper.clamps
+    point_mass[hung] += half + [each.messenger_clamp_mass for each in tables]
     point_mass[4 * at + 2] += half + [each.contact_clamp_mass for each in tables]
     point_mass[4 * masts + 2] += [each.steady_arm.mass for each in stands]
     point_spring[4 * masts] += [each.support.stiffness for each in stands]
@@ -88,7 +134,7 @@ def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
     point_damper[4 * masts] += [each.support.damping for each in stands]
 
     free = np.ones(size)
-    free[[0, 2, size - 4, size - 2]] = 0.0
+    free[[0, 2, 4 * count - 4, 4 * count - 2]] = 0.0
     keep = sparse.diags_array(free)
     return LineSystem(
         nodes=rest.nodes,
@@ -100,10 +146,11 @@ def build(line: FlexibleCatenaryData, spans: int, element: float) -> LineSystem:
         stiffness=(keep @ (stiffness + sparse.diags_array(point_spring)) @ keep).tocsr(),
         extension=extension,
         dropper_stiffness=k,
-        dropper_damping=line.damping.beta * k,
+        dropper_damping=rayleigh.beta * k,
         dropper_tension=rest.dropper_tension,
-        supports=4 * masts + 2,
-        support_position=rest.nodes[masts],
+        supports=4 * rest.in_use + 2,
+        support_position=rest.nodes[rest.in_use],
+        pairs=((0, count, 0),),
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Static shape of a line of unlike spans in Hermite elements: as it is designed, and as its droppers hold it.
 
-The line is closed by its own mirror image, so that nothing ends: this is what its ends stand for.
+The line is closed by its own mirror images about the straight lines of its outermost spans: its ends go on at
+these gradients, with half of a support's stiffness and load, and half of a stitch wire.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ from scipy.sparse.linalg import spsolve
 from panto_env.plant.catenary.flexible.schema import Span
 from panto_env.plant.catenary.schema import Wire
 
-from .hermite import Array, Indices, matrices, span_nodes, uniform_load
-
-GRAVITY = 9.81
+from .hermite import Array, Indices, matrices, uniform_load
+from .stitch import GRAVITY, Upper, nodes_between, stitches_at
 
 
 @dataclass(frozen=True)
 class LineShape:
-    """The line itself, without its mirror image; heights over the nominal one."""
+    """The line itself, without its mirror images; heights over the nominal one."""
 
     x: Array
     """Node positions (m), shape (n_nodes,)."""
@@ -32,6 +32,8 @@ class LineShape:
     """Contact wire slope (-), shape (n_nodes,)."""
     messenger: Array
     """Messenger wire height (m), shape (n_nodes,)."""
+    hanger: Array
+    """Height of what a dropper would hang from: a stitch wire, or the messenger (m), shape (n_nodes,)."""
     dropper_tension: Array
     """Above the contact-wire clamp, shape (n_droppers,) (N)."""
     dropper_length: Array
@@ -41,92 +43,104 @@ class LineShape:
 
 
 class ClosedLine:
-    """Nodes, droppers and supports of a line and its mirror image."""
+    """Nodes, droppers, supports and stitch wires of a line, and slopes at which it goes on at its ends."""
 
     def __init__(
-        self, spans: Sequence[Span], end: tuple[float, float], wires: tuple[Wire, Wire], element: float
+        self,
+        spans: Sequence[Span],
+        end: tuple[float, float],
+        wires: tuple[Wire, Wire],
+        element: float,
+        above: Array | float = 0.0,
     ) -> None:
-        """end: contact height and encumbrance at the last support (m). wires: contact, messenger."""
-        self.wires, self.count = wires, len(spans)
-        pieces, x, supports, begin = [], [], [0.0], 0.0
-        for span in spans:
-            pieces.append(begin + span_nodes(span.span_length, span.droppers.positions, element)[:-1])
-            x += [begin + place for place in span.droppers.positions]
-            begin += span.span_length
-            supports.append(begin)
-        line = np.concatenate([*pieces, [begin]])
-        self.x = np.append(line, 2 * begin - line[-2::-1])
-        self.own = len(line)
-        self.droppers = len(x)
-        self.hung = self._numbers(np.append(x, 2 * begin - np.array(x)))
-        self.masts = self._numbers(np.append(supports, 2 * begin - np.array(supports[-2:0:-1])))
-        low = np.array([*(span.contact_height for span in spans), end[0]])
-        high = low + np.array([*(span.encumbrance for span in spans), end[1]])
-        chord = np.interp(x, supports, low)
-        below = np.concatenate([span.droppers.sag for span in spans])
-        self.heights = np.tile(chord - below, 2)
+        """end: contact height and encumbrance at the last support (m). wires: contact, messenger.
+
+        above: wanted heights at droppers over straight lines between supports, less sags, (n_droppers,) (m).
+        """
+        supports = np.append(0.0, np.cumsum([span.span_length for span in spans]))
         stands = [*spans, spans[-1]]
-        self.low, self.high = _mirrored(low), _mirrored(high)
-        self.support = _mirrored(np.array([each.support.stiffness for each in stands]))
-        self.holds = _mirrored(np.array([each.steady_arm.holds_wire for each in stands]))
+        stitches = stitches_at(supports.tolist(), [each.stitch_wire for each in stands])
+        pieces = [
+            nodes_between(begin, begin + span.span_length, span.droppers.positions, stitches, element)[:-1]
+            for begin, span in zip(supports.tolist(), spans, strict=False)
+        ]
+        x = np.concatenate(
+            [begin + span.droppers.positions for begin, span in zip(supports, spans, strict=False)]
+        )
+        self.x = np.concatenate([*pieces, supports[-1:]])
+        self.hung, self.masts = self._numbers(x), self._numbers(supports)
+        self.upper = Upper(self.x, wires[1], stitches)
+        self.low = np.array([*(span.contact_height for span in spans), end[0]])
+        self.high = self.low + np.array([*(span.encumbrance for span in spans), end[1]])
+        below = np.concatenate([span.droppers.sag for span in spans])
+        self.heights = np.interp(x, supports, self.low) + above - below
+        self.support = np.array([each.support.stiffness for each in stands])
+        self.support[[0, -1]] /= 2
+        self.holding = np.flatnonzero([each.steady_arm.holds_wire for each in stands])
 
         def each(key: str) -> Array:
-            return np.tile([getattr(span.droppers, key) for span in spans for _ in span.droppers.sag], 2)
+            return np.array([getattr(span.droppers, key) for span in spans for _ in span.droppers.sag])
 
-        self.mass, self.lower, self.upper = map(each, ("mass", "contact_clamp_mass", "messenger_clamp_mass"))
+        self.mass, self.lower_clamp, self.upper_clamp = map(
+            each, ("mass", "contact_clamp_mass", "messenger_clamp_mass")
+        )
+        first, last = ((heights[1:] - heights[:-1]) / np.diff(supports) for heights in (self.low, self.high))
+        self._slopes = (first[0], first[-1]), (last[0], last[-1])
+        self._wire = wires[0]
 
     def _numbers(self, positions: Array) -> Indices:
         return np.abs(self.x[:, None] - positions).argmin(axis=0)
 
-    def fold(self) -> sparse.csr_array:
-        """The last node is the first one again."""
-        size = 2 * self.x.size - 2
-        rows = np.arange(size + 2)
-        return sparse.csr_array((np.ones(size + 2), (rows, rows % size)), (size + 2, size))
+    @property
+    def ends(self) -> tuple[Indices, Array, Array]:
+        """Unknowns that are the ends' slopes, in either wire; the contact wire's slopes, the messenger's."""
+        return np.array([1, 2 * self.x.size - 1]), np.array(self._slopes[0]), np.array(self._slopes[1])
 
-    def wire(self, wire: Wire) -> tuple[sparse.csr_array, Array]:
-        """Stiffness, and forces of the wire's own weight."""
-        fold = self.fold()
-        stiffness, _ = matrices(self.x, wire)
-        force = fold.T @ uniform_load(self.x, -wire.mass * GRAVITY)
-        return sparse.csr_array(fold.T @ stiffness @ fold), force
+    def contact_wire(self) -> tuple[sparse.csr_array, Array]:
+        """Stiffness, and forces of the wire's own weight and of its ends."""
+        force = uniform_load(self.x, -self._wire.mass * GRAVITY)
+        force[[0, -2]] += self._wire.tension * np.array([-1.0, 1.0]) * self._slopes[0]
+        return matrices(self.x, self._wire)[0], force
+
+    def messenger(self) -> tuple[sparse.csr_array, Array]:
+        """Stiffness, also of stitch wires and supports; forces of these, of own weights and of the ends."""
+        springs, lifted = np.zeros((2, self.upper.size))
+        springs[2 * self.masts], lifted[2 * self.masts] = self.support, self.support * self.high
+        force = self.upper.weight + self.upper.end_forces(self._slopes[1]) + lifted
+        return sparse.csr_array(self.upper.stiffness + sparse.diags_array(springs)), force
 
     def shape(self, contact: Array, messenger: Array, tension: Array) -> LineShape:
-        """The line's own half of the unknowns."""
-        apart = messenger[2 * self.hung] - contact[2 * self.hung]
-        carried = self.support * (self.high - messenger[2 * self.masts])
+        """Of the unknowns of both wires and the droppers' tensions (N)."""
         return LineShape(
-            self.x[: self.own],
-            contact[: 2 * self.own : 2],
-            contact[1 : 2 * self.own : 2],
-            messenger[: 2 * self.own : 2],
-            tension[: self.droppers],
-            apart[: self.droppers],
-            carried[: self.count + 1] / np.array([2.0, *[1.0] * (self.count - 1), 2.0]),
+            self.x,
+            contact[::2],
+            contact[1::2],
+            messenger[: 2 * self.x.size : 2],
+            messenger[self.upper.under],
+            tension,
+            messenger[self.upper.under[self.hung]] - contact[2 * self.hung],
+            self.support * (self.high - messenger[2 * self.masts]),
         )
 
 
 def designed(line: ClosedLine) -> LineShape:
     """The shape with the contact wire at the wanted heights at its droppers, and at arms that hold it."""
-    holding = np.flatnonzero(line.holds)
-    held = np.append(line.hung, line.masts[holding])
-    fixed = np.append(line.heights, line.low[holding])
-    lower, weight = line.wire(line.wires[0])
-    upper, above_weight = line.wire(line.wires[1])
-    length = np.ones(line.hung.size)
+    lower, weight = line.contact_wire()
+    upper, above_weight = line.messenger()
+    ends, lower_slopes, upper_slopes = line.ends
+    held = np.concatenate([2 * line.hung, 2 * line.masts[line.holding], ends])
+    fixed = np.concatenate([line.heights, line.low[line.holding], lower_slopes])
+    hung, length = line.upper.under[line.hung], np.ones(line.hung.size)
     for _ in range(60):
         half = line.mass * length / 2
         force = weight.copy()
-        force[2 * line.hung] -= GRAVITY * (half + line.lower)
-        contact = np.zeros(force.size)
-        contact[2 * held] = fixed
-        free = np.setdiff1d(np.arange(force.size), 2 * held)
-        contact[free] = spsolve(lower[free][:, free].tocsc(), (force - lower @ contact)[free])
+        force[2 * line.hung] -= GRAVITY * (half + line.lower_clamp)
+        contact = _held(lower, force, held, fixed)
         tension = (lower @ contact - force)[2 * line.hung]
         force = above_weight.copy()
-        force[2 * line.hung] -= tension + GRAVITY * (half + line.upper)
-        messenger = spsolve(*_on_springs(upper, force, line))
-        old, length = length, messenger[2 * line.hung] - contact[2 * line.hung]
+        force[hung] -= tension + GRAVITY * (half + line.upper_clamp)
+        messenger = _held(upper, force, ends, upper_slopes)
+        old, length = length, messenger[hung] - contact[2 * line.hung]
         if np.abs(length - old).max() < 1e-12:
             break
     return line.shape(contact, messenger, tension)
@@ -140,40 +154,38 @@ def built(
     Arms that hold the wire keep it at the support's height. pushed: number of a node of the contact wire, and
     an upward force there (N).
     """
-    lower, weight = line.wire(line.wires[0])
-    upper, above_weight = line.wire(line.wires[1])
-    upper, above_weight = _on_springs(upper, above_weight, line)
-    size, lengths, k = weight.size, np.tile(unloaded, 2), np.tile(stiffness, 2)
-    both = sparse.block_diag([lower, upper]).tocsr()
-    count = line.hung.size
+    lower, weight = line.contact_wire()
+    upper, above_weight = line.messenger()
+    size, count = weight.size, line.hung.size
+    hung = size + line.upper.under[line.hung]
     rows = np.repeat(np.arange(count), 2)
-    columns = np.stack([2 * line.hung, size + 2 * line.hung], axis=1).ravel()
-    apart = sparse.csr_array((np.tile([-1.0, 1.0], count), (rows, columns)), (count, 2 * size))
-    half = line.mass * lengths / 2
+    columns = np.stack([2 * line.hung, hung], axis=1).ravel()
+    apart = sparse.csr_array(
+        (np.tile([-1.0, 1.0], count), (rows, columns)), (count, size + above_weight.size)
+    )
+    half = line.mass * unloaded / 2
     force = np.append(weight, above_weight)
-    force[2 * line.hung] -= GRAVITY * (half + line.lower)
-    force[size + 2 * line.hung] -= GRAVITY * (half + line.upper)
-    force += apart.T @ (k * lengths)
+    force[2 * line.hung] -= GRAVITY * (half + line.lower_clamp)
+    force[hung] -= GRAVITY * (half + line.upper_clamp)
+    force += apart.T @ (stiffness * unloaded)
     force[2 * pushed[0]] += pushed[1]
-    both = both + apart.T @ sparse.diags_array(k) @ apart
-    holding = 2 * line.masts[np.flatnonzero(line.holds)]
-    state = np.zeros(2 * size)
-    state[holding] = line.low[np.flatnonzero(line.holds)]
-    free = np.setdiff1d(np.arange(2 * size), holding)
-    state[free] = spsolve(both.tocsr()[free][:, free].tocsc(), (force - both @ state)[free])
-    tension = k * (apart @ state - lengths) + 0.0
+    both = sparse.block_diag([lower, upper]) + apart.T @ sparse.diags_array(stiffness) @ apart
+    ends, lower_slopes, upper_slopes = line.ends
+    held = np.concatenate([2 * line.masts[line.holding], ends, size + ends])
+    state = _held(
+        sparse.csr_array(both),
+        force,
+        held,
+        np.concatenate([line.low[line.holding], lower_slopes, upper_slopes]),
+    )
+    tension = stiffness * (apart @ state - unloaded) + 0.0
     return line.shape(state[:size], state[size:], tension)
 
 
-def _on_springs(
-    stiffness: sparse.csr_array, force: Array, line: ClosedLine
-) -> tuple[sparse.csc_array, Array]:
-    springs, force = np.zeros(force.size), force.copy()
-    springs[2 * line.masts] = line.support
-    force[2 * line.masts] += line.support * line.high
-    return (stiffness + sparse.diags_array(springs)).tocsc(), force
-
-
-def _mirrored(at_supports: Array) -> Array:
-    """Values at the supports of the line and of its image, of which the last is the first one again."""
-    return np.append(at_supports, at_supports[-2:0:-1])
+def _held(stiffness: sparse.csr_array, force: Array, held: Indices, values: Array) -> Array:
+    """Unknowns under forces, with some of them held at values."""
+    state = np.zeros(force.size)
+    state[held] = values
+    free = np.setdiff1d(np.arange(force.size), held)
+    state[free] = spsolve(stiffness[free][:, free].tocsc(), (force - stiffness @ state)[free])
+    return state

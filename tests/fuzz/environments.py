@@ -105,7 +105,7 @@ def case_of(seed: int) -> dict[str, Any]:
     }
 
 
-CONDITIONS = {"flexible": ("as-built", "as-built")}
+CONDITIONS = {"flexible": ("as-built", "as-built", {"ice": 0.5}, {"ice": 0.2, "wind": 12.0})}
 """Further conditions that lines of a kind have."""
 KEEP = ("speed_kmh", "distance")
 HANDS = ("uniform", "reversed", "full", "huge", "wrong")

@@ -1,9 +1,13 @@
 """Figures span by span, and droppers one by one, where spans differ."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.metrics.by_span import by_span
 from panto_env.metrics.droppers import moving_droppers
@@ -62,3 +66,62 @@ def test_the_table_by_spans_names_its_units(run):
     sheet = of_spans(run, (3, 4))
     assert list(sheet.columns["span"]) == [3, 4]
     assert sheet.headings["uplift"] == "maximum uplift at its first support (m)"
+
+
+def test_figures_of_all_spans_follow_from_those_of_each_by_its_length(run):
+    """CF and CL over the distance, as in paper 1 (Eqs 13 and 14); mean and σ over samples of equal time.
+
+    At constant speed samples are equally spaced along the track, so that a span counts by its length. The
+    mean over spans, each counted alike, is another one.
+    """
+    away = (run.alignment.length_at(run.position) > 58) & (run.position % 7.0 < 1.5)  # in the long spans
+    lost = replace(run, contact_force=np.where(away, 0.0, run.contact_force))
+    for each_run in (run, lost):
+        spans = by_span(each_run, (3, 12))
+        length = np.array([each.length for each in spans])
+        share, whole = length / length.sum(), each_run.summary((3, 12))
+        means, deviations = (np.array([getattr(each, name) for each in spans]) for name in ("mean", "std"))
+        assert whole.distance == pytest.approx(length.sum(), abs=2 * each_run.stride)
+        assert share @ means == pytest.approx(whole.mean, abs=0.01)
+        variance = share @ (deviations**2 + (means - whole.mean) ** 2)
+        assert np.sqrt(variance) == pytest.approx(whole.std, rel=1e-3)
+        losses = np.array([each.contact_loss for each in spans])
+        assert share @ losses == pytest.approx(whole.contact_loss, abs=0.02)
+        costs = sum(each_run.summary((k, k)).cost_function for k in range(3, 13))
+        # Eq. 14 has no step from the last sample of a span to the first one of the next.
+        assert costs == pytest.approx(whole.cost_function, rel=10 * each_run.stride / length.sum())
+    assert whole.contact_loss > 3
+    assert abs(losses.mean() - whole.contact_loss) > 0.1  # each span counted alike
+    assert abs(np.sqrt(np.mean(deviations**2 + (means - means.mean()) ** 2)) / whole.std - 1) > 1e-3
+
+
+def test_the_evaluated_spans_end_before_the_line_s_end_is_felt(long_run, run):
+    """Its anchor reflects waves; a line that goes on behind it shows by how much the last spans are off."""
+    shorter, longer = long_run
+    assert shorter.spans() == (10, 22)  # of 30
+    assert longer.spans() == (10, 46)
+    ours, true = (by_span(each, (10, 29)) for each in long_run)
+    off = np.array([abs(a.max - b.max) / longer.summary().mean for a, b in zip(ours, true, strict=True)])
+    assert off[:13].max() < 0.025  # the two lines have grids of their own
+    assert off[13:].max() > 0.05
+    assert shorter.summary() == shorter.summary((10, 22))
+    with pytest.warns(AccuracyWarning, match="The line has only 13 spans: in the last 8 its end reflects"):
+        assert run.spans() == (10, 12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run.spans((10, 12)) == (10, 12)
+
+
+@pytest.fixture(scope="module")
+def long_run():
+    """Runs on a line of 30 spans, and on one that goes on with another 24."""
+    base = load_catenary("re250")
+    table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    lengths = np.random.default_rng(0).uniform(0.8, 1.0, 54) * base.span_length
+    lines = [
+        FlexibleCatenaryData.model_validate(
+            table | {"sequence": [{"span_length": length} for length in lengths[:count].tolist()]}
+        )
+        for count in (30, 54)
+    ]
+    return [simulate(line, "dsa380", 250, record_droppers=False) for line in lines]

@@ -6,17 +6,16 @@ import numpy as np
 import pandas
 import pytest
 
-from panto_env.catalog import available, load_catenary
+from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
 from ..command import panto
 from ..finite_element.static import GRAVITY, static_shape
+from ..uniform_lines import UNIFORM
 
-FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
 
-
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_forces_carry_the_contact_wire(name):
     """Less clamps and half of the droppers, they add up to its weight, with what a steady arm holds."""
     line = load_catenary(name)
@@ -30,7 +29,7 @@ def test_forces_carry_the_contact_wire(name):
     assert [each.static_force for each in table] == pytest.approx(other.dropper_tension, rel=1e-3, abs=0.2)
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_lengths_and_stretches_fill_the_room_between_the_wires(name):
     """As finite elements give it, with the messenger's supports yielding under all that they carry."""
     line = load_catenary(name)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import available, load_catenary, load_pantograph, load_section
 from panto_env.plant.catenary.flexible.resolution import HARD_CONTACT_ERROR, HARD_CONTACT_MEAN_ERROR
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 
@@ -18,6 +18,8 @@ LINES = ("en50318-2002", "benchmark-2015", "re250", "shinkansen-simple", "ln2")
 PANTOGRAPHS = ("en50318-2002", "dsa380", "identified-2dof", "three-mass", "benchmark-2015")
 SLOW, SLOW_SPANS, USUAL_SPANS = 100.0, (2, 3), (4, 6)
 """Speed (km/h) below which fewer spans are evaluated, and spans."""
+DRAWN = 1 / 6
+"""Share of cases whose line is drawn from a section of the catalogue, with curves, bridges and ramps."""
 SPANS = 20
 """Spans of a line whose spans differ: enough for a window that travels."""
 
@@ -80,13 +82,31 @@ def case_of(seed):
     }
     pantograph = load_pantograph(PANTOGRAPHS[random.integers(len(PANTOGRAPHS))])
     conditions = ("new", "worn", {"wear_depth": 2e-3, "wear_wavelength": 0.4})
-    return {
+    case = {
         "line": (line.model_copy(update={"droppers": droppers}), factors(random, LINE_FACTORS)),
         "pantograph": (pantograph.model_copy(update=changed), factors(random, PANTOGRAPH_FACTORS)),
         "speed_kmh": random.uniform(20.0, 420.0),
         "line_condition": conditions[random.integers(3)],
         "sequence": sequence_of(np.random.default_rng([seed, 1])),
     }
+    case |= {"stitch": stitch_of(np.random.default_rng([seed, 3])), "at_overlap": seed % 2 == 0}
+    return case | drawn_section(np.random.default_rng([seed, 2]), case["line"][1])
+
+
+def stitch_of(random):
+    """Of a third of the lines, stitch wires: droppers on each side, share of the tension, mass (kg/m)."""
+    if random.random() > 1 / 3:
+        return None
+    return int(random.integers(1, 3)), random.uniform(0.05, 0.4), random.uniform(0.1, 0.8)
+
+
+def drawn_section(random, changed):
+    """Of some cases, a line drawn from a section in the place of the other one; and with its factors."""
+    if random.random() > DRAWN:
+        return {}
+    names = available("section")
+    line, _ = load_section(names[random.integers(len(names))]).draw(random)
+    return {"line": (line, changed), "sequence": ()}
 
 
 def sequence_of(random):
@@ -103,6 +123,14 @@ def sequence_of(random):
 def made(case):
     """Line and pantograph of a case. Raises ValueError where no line or pantograph has such values."""
     line, pantograph = (scaled(*case[name]) for name in ("line", "pantograph"))
+    if case["stitch"]:
+        hung, share, mass = case["stitch"]
+        x, tension = line.droppers.positions, float(np.clip(share * line.messenger_wire.tension, 500, 20e3))
+        stitch = {"length": x[hung - 1] + x[hung], "tension": tension, "mass": mass, "clamp_mass": 0.2}
+        table = line.model_dump(exclude={"sources"}, exclude_none=True)
+        if line.sequence:
+            del table["spans"]
+        line = type(line).model_validate(table | {"stitch_wire": stitch})
     if case["sequence"]:
         spans = [
             {"span_length": length * line.span_length, "contact_height": height}
@@ -111,6 +139,21 @@ def made(case):
         table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
         line = type(line).model_validate(table | {"sequence": spans})
     return line, pantograph
+
+
+def place_in(line, spans, at_overlap):
+    """Spans of the same number that begin with an overlap, or else with a bridge's ramp."""
+    if at_overlap and line.overlaps:
+        first = max(line.overlaps[0].first_span, spans[0])
+        return first, first + spans[1] - spans[0]
+    return bridge_in(line, spans)
+
+
+def bridge_in(line, spans):
+    """Spans of the same number that begin with the first ramp of a bridge, or those given."""
+    heights = np.flatnonzero(line.contact_heights)
+    first = max(spans[0], int(heights[0])) if heights.size else spans[0]
+    return (first, first + spans[1] - spans[0]) if first < line.spans - 4 else spans
 
 
 def momentum(run, pantograph):
@@ -152,7 +195,10 @@ def check(case):
         line, pantograph = made(case)
     except (InputError, ValueError):
         return "schema"
+    section = line.name.startswith("section:")
     spans = USUAL_SPANS if case["speed_kmh"] > SLOW else SLOW_SPANS
+    if section:  # where its bridge or its overlap begins, if it has one
+        spans = place_in(line, spans, case["at_overlap"])
     numbers = {
         "line_condition": case["line_condition"],
         "record_droppers": False,
@@ -177,7 +223,8 @@ def check(case):
     if run.terminated:
         return "ended"
     fine = finer(line, pantograph, case, run, **numbers)
-    where = ", spans that differ" * bool(case["sequence"])
+    where = ", spans that differ" * bool(case["sequence"]) + ", drawn section" * section
+    where += ", stitched" * bool(case["stitch"])
     assert not fine.terminated
     ours, true = run.summary(spans), fine.summary(spans)
     if pantograph.hard_contact:
@@ -213,4 +260,5 @@ def test_random_runs_are_refused_or_right():
     agreed = {way: count for way, count in ways.items() if way.startswith("agreed")}
     assert ways["agreed"] > 0.05 * ways.total()
     assert sum(agreed.values()) > 0.4 * ways.total()
-    assert sum(count for way, count in agreed.items() if "differ" in way) > 0.05 * ways.total()
+    for way, share in (("differ", 0.05), ("section", 0.03)):
+        assert sum(count for each, count in agreed.items() if way in each) > share * ways.total()

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +10,19 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
-from panto_env.catalog import available, load_catenary
+from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
+from panto_env.plant.catenary.flexible.overlaps import tension_lengths
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
-from panto_env.plant.catenary.flexible.static import solve
+from panto_env.plant.catenary.flexible.static import hang, solve
+from panto_env.plant.catenary.flexible.stitches import stitches_of
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 
-FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
+from ..uniform_lines import UNIFORM
+
 FILE = """
 kind = "flexible"
 description = "of a test"
@@ -57,7 +61,7 @@ def spelt_out(name, count=6):
     return table | {"span_types": {"usual": own}, "sequence": ["usual", own, *["usual"] * (count - 2)]}
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_equal_spans_written_out_are_the_uniform_line(name):
     line = load_catenary(name).model_copy(update={"spans": 6})
     for table in (spelt_out(name), json.loads(json.dumps(spelt_out(name)))):
@@ -216,17 +220,28 @@ def test_droppers_without_table_or_rule_are_refused_in_one_sentence(droppers, me
 
 def test_types_without_a_sequence_are_refused(tmp_path):
     text = FILE + "spans = 8\n" + DROPPERS + "[span_types.long]\n"
-    with pytest.raises(InputError, match="span_types or an end_support needs a sequence"):
+    with pytest.raises(InputError, match="span_types, overlaps or an end_support needs a sequence"):
         read(text, tmp_path)
 
 
 def test_the_example_of_the_document_hangs(tmp_path):
     """With the droppers that it sets without a table, too."""
     page = (Path(__file__).parents[2] / "docs" / "own-section.md").read_text()
-    spans, droppers = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    spans, droppers, *_ = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     own = FILE.replace("span_length = 65.0\n", "") + droppers + spans
     line = read(own, tmp_path)
     assert [span.span_length for span in spans_of(line).each] == [65.0, 65.0, 45.0, 40.0, 45.0, 65.0]
     assert spans_of(line).contact_heights == (0.0, 0.0, 0.0, -0.05, -0.05, 0.0, 0.0)
     assert len(line.droppers.positions) == 9
     assert max(line.droppers.sag) == pytest.approx(0.05)
+
+
+def test_the_examples_of_stitch_wires_and_overlaps_hang():
+    page = (Path(__file__).parents[2] / "docs" / "own-section.md").read_text()
+    *_, stitch, overlap = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    table = load_catenary("re330-stitched").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table |= {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
+    line = FlexibleCatenaryData.model_validate(table)
+    hang(line)
+    assert [round(part.end) for part in tension_lengths(line)] == [17 * 65, 20 * 65]
+    assert stitches_of(line).support.tolist() == list(range(1, 21))

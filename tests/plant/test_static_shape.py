@@ -9,7 +9,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
 from panto_env.base.explanation import explain
 from panto_env.base.ranges import ranges_of
-from panto_env.catalog import available, load_catenary
+from panto_env.catalog import load_catenary
 from panto_env.plant.catenary import check_line
 from panto_env.plant.catenary.flexible import static as static_shape
 from panto_env.plant.catenary.flexible.schema import Droppers, FlexibleCatenaryData, Support
@@ -17,9 +17,8 @@ from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import Wire
 
 from ..finite_element import simulation as finite_element
+from ..uniform_lines import UNIFORM
 from . import periodic_span
-
-FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
 
 
 def test_dropper_lengths_of_the_2015_benchmark_within_3_mm():
@@ -28,7 +27,7 @@ def test_dropper_lengths_of_the_2015_benchmark_within_3_mm():
     assert shape.dropper_length == pytest.approx(half + half[-2::-1], abs=3e-3)
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_agrees_with_finite_elements(name):
     line = load_catenary(name)
     shape, other = static_shape.solve(line), finite_element.static_shape(line, element=0.1)
@@ -49,13 +48,13 @@ def check_against_the_closed_form(line, shape, tolerance):
     assert shape.arm_force == pytest.approx(arm_force, abs=1e3 * tolerance)
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", [name for name in UNIFORM if load_catenary(name).stitch_wire is None])
 def test_agrees_with_the_closed_form(name):
     line = load_catenary(name)
     check_against_the_closed_form(line, static_shape.solve(line), 1e-12)
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_in_equilibrium(name):
     """Droppers and steady arm carry the contact wire's weight; tensions are positive."""
     line = load_catenary(name)

@@ -183,13 +183,13 @@ def energy(line, wire, data, step):
         total -= (now[w, 2:-2] * pull).sum() * bare / (2 * step**2)
 
     def at(things, w):
-        four = middle[w, PAD + things.first[:, None] + np.arange(4)]
+        four = middle[w, PAD + things.first + np.arange(4)]
         return (things.constants[:, :4] * four).sum(axis=1)
 
     total += (data.support.stiffness * at(line.scattered.masts, MESSENGER) ** 2).sum() / 2
     links = line.scattered.links
     extension, stiffness = at(links, MESSENGER) - at(links, CONTACT), links.constants[:, LINK.STIFFNESS]
-    static = line.link_static[0]
+    static = line.link_static[0, links.number]
     taut = stiffness * extension**2 / 2
     slack = -static * extension - static**2 / stiffness / 2
     return total + np.where(stiffness * extension > -static, taut, slack).sum()
@@ -294,3 +294,12 @@ def test_lanes_of_a_vector_environment_equal_single_ones():
             alone, own, *_ = env.step(action)
             np.testing.assert_array_equal(alone, observation)
             assert own == reward
+
+
+def test_longest_distance_counts_the_spans_before_a_run():
+    """Seven of the line's sixteen."""
+    with pytest.raises(
+        InputError, match=r"at most 512 m on line .*, behind 7 spans before the run, not 513 m"
+    ):
+        gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=513.0)
+    gymnasium.make("Pantograph-v0", catenary=line_of(MIXED), distance=512.0).close()

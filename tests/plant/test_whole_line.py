@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from panto_env import InputError
 from panto_env.base.explanation import explain
-from panto_env.catalog import available, load_catenary
+from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -17,8 +17,8 @@ from panto_env.plant.catenary.flexible.static import GRAVITY, hang, solve
 from panto_env.plant.catenary.flexible.whole_line import settle_line
 
 from ..finite_element import whole_line as judge
+from ..uniform_lines import UNIFORM
 
-FLEXIBLE = [name for name in available("catenary") if load_catenary(name).kind == "flexible"]
 SHORT = {
     "span_length": 45.0,
     "encumbrance": 1.2,
@@ -97,7 +97,7 @@ def test_supports_carry_the_weight_of_everything(name, changes):
     assert carried == pytest.approx(GRAVITY * (wires + clamps + shape.dropper_mass.sum()), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", FLEXIBLE)
+@pytest.mark.parametrize("name", UNIFORM)
 def test_equal_spans_of_a_whole_line_are_the_span_that_repeats(name):
     line = load_catenary(name).model_copy(update={"spans": 6})
     whole, one = settle_line(line), solve(line)

@@ -122,7 +122,8 @@ def folder(tmp_path, monkeypatch):
         shutil.copytree(ROOT / "docs" / name, tmp_path / "docs" / name)
     shutil.copytree(ROOT / "examples" / "submission", tmp_path / "my-policy")
     (tmp_path / "docs" / "figures").mkdir()
-    shutil.copy(ROOT / "examples" / "masts.csv", tmp_path)
+    for name in ("masts.csv", "overlap.toml"):
+        shutil.copy(ROOT / "examples" / name, tmp_path)
     truth = parameters_of(load_pantograph("identified-2dof"))
     write_record(
         add_noise(clean_record(FREQUENCY_SWEEP, truth), np.random.default_rng(0)), tmp_path / "rig.csv"

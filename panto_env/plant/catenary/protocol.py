@@ -48,6 +48,7 @@ class CatenaryModel(Protocol):
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: the wire's state in all lanes
     massless: bool  # whether the contact wire has no mass of its own
+    wires_per_collector: int  # maximum number of contact wires that a collector touches at a time
     contact_gain: float  # inverse of the stiffness at which an explicit contact law is unstable (m/N)
     grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
@@ -115,14 +116,23 @@ def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> N
     """Raise InputError where a condition has defects: for lines without droppers and supports."""
     if any(condition.defective for condition in conditions):
         raise InputError(
-            "Only a flexible catenary has droppers and supports that can be defective or scatter, and line "
-            f"'{data.name}' is not one; use another line_condition, such as 'fair'."
+            "Only a flexible catenary has droppers and supports that can be defective or scatter, and wires "
+            f"that bear ice, and line '{data.name}' is not one; use another line_condition, such as 'fair'."
         )
 
 
 @operation
 def advance_wire(line: Any, wire: Any, lane: int) -> None:
     """Advance one lane's wire by a step, without the contact forces of this step."""
+
+
+@operation
+def has_second_wire(line: Any) -> Any:
+    """Whether a collector may touch a second contact wire, for which it has a contact point of its own.
+
+    These follow the contact points of all collectors with their first wire, in the same order.
+    """
+    return False
 
 
 @operation

@@ -97,12 +97,15 @@ class CatenaryData(Settings):
         return math.nan, math.nan
 
 
+LOWEST_TENSION = 500.0  # N
+
+
 class Wire(Settings):
     """A tensioned wire with bending stiffness."""
 
     # Twin wires, and one equivalent wire for all, have up to five times the values of one wire.
     mass: Annotated[float, Between(0.05, 20, "kg/m")] = Field(description="mass per length (kg/m)")
-    tension: Annotated[float, Between(500, 200e3, "N")] = Field(description="tension (N)")
+    tension: Annotated[float, Between(LOWEST_TENSION, 200e3, "N")] = Field(description="tension (N)")
     bending_stiffness: Annotated[float, Between(0, 1e5, "N m^2")] = Field(
         description="bending stiffness EI (N m^2)"
     )

@@ -18,9 +18,12 @@ class LineView(NamedTuple):
     messenger: Array  # (n,): height of the messenger wire there (m), or (0,)
     supports: Array  # (supports,): positions (m)
     droppers: Array  # (droppers,): positions (m)
+    tops: Array  # (droppers,): height of their upper ends (m)
+    bottoms: Array  # (droppers,): height of their lower ends (m)
+    further: tuple[tuple[Array, Array], ...]  # positions and heights (m) of stitch wires and a second pair
     slack: NDArray[np.bool_]  # (droppers,): whether each dropper is slack
 
 
 NONE = np.zeros(0)
-NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, slack=np.zeros(0, dtype=np.bool_))
+NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, NONE, NONE, (), slack=np.zeros(0, dtype=np.bool_))
 """View of a line that has neither wires nor supports."""

@@ -57,7 +57,7 @@ def move_apart(pantographs, collector, own, place, first, lane):
     1 N of the actuator, held over the step.
     """
     size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
-    on_frame, on_head = own[ROW.LIFT], 0.0
+    on_frame, on_head = own[ROW.LIFT] + own[ROW.WIND], 0.0
     upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
         upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
@@ -80,7 +80,8 @@ def move_freely(pantographs, collector, own, lane):
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
-    on_frame, on_head = own[ROW.LIFT] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+    on_frame = (own[ROW.LIFT] + own[ROW.WIND]) + own[ROW.FRAME_FORCE]
+    on_head = own[ROW.HEAD_FORCE]
     free_state = own[ROW.STATE + size :]
     for r in range(0, size, 2):  # in pairs, which a processor computes side by side
         total = frame_input[r] * on_frame + head_input[r] * on_head

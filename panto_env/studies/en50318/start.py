@@ -63,8 +63,8 @@ def _errors(line: FlexibleCatenaryData, speed_kmh: float, first_spans: Sequence[
 
 
 def _lines(speed_kmh: float) -> list[FlexibleCatenaryData]:
-    """Flexible lines that bear this speed."""
+    """Flexible lines that bear this speed and go on for as long as is required."""
     entries = [load_catenary(name) for name in available("catenary")]
-    flexible = [entry for entry in entries if isinstance(entry, FlexibleCatenaryData)]
+    flexible = [entry for entry in entries if isinstance(entry, FlexibleCatenaryData) and not entry.ends]
     limit = from_kmh(speed_kmh) / FASTEST
     return [line for line in flexible if line.contact_wire.tension / line.contact_wire.mass > limit**2]

@@ -9,8 +9,9 @@ from typing import Any
 from ...base.table import Table
 from ...metrics.criterion import Criterion
 from ...metrics.trajectory import Trajectory
-from . import conditions, convergence, lines, reference, start, tables, wear, window
+from . import conditions, convergence, kinds, lines, reference, start, tables, wear, window
 from .conditions import ConditionCheck
+from .kinds import KindCheck
 from .lines import LineCheck
 from .reference import Check
 from .start import StartCheck
@@ -28,6 +29,7 @@ class Validation:
     runs: list[Trajectory]  # of the reference model
     checks: list[Check]
     compliance: list[list[Criterion]]  # of each run, over the standard's spans
+    kinds: list[KindCheck]
     convergence: list[dict[str, Any]]
     windows: list[WindowCheck]
     wear: list[WearCheck]
@@ -45,6 +47,7 @@ class Validation:
         """For people: of the standard's table and of what was requested."""
         return [
             tables.checks_table(self.checks),
+            tables.kinds_table(self.kinds),
             *([tables.convergence_table(self.convergence)] if self.convergence else []),
             *([tables.windows_table(self.windows)] if self.windows else []),
             *([tables.wear_table(self.wear)] if self.wear else []),
@@ -62,6 +65,7 @@ class Validation:
                 {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
                 for run, criteria in zip(self.runs, self.compliance, strict=True)
             ],
+            "kinds": [vars(check) for check in self.kinds],
             "convergence": self.convergence,
             "windows": [vars(check) for check in self.windows],
             "wear": [vars(check) for check in self.wear],
@@ -84,6 +88,10 @@ def run(
     """Run the standard's table, and whatever else is requested."""
     report("the reference model")
     runs = reference.reference_runs()
+    every_kind: list[KindCheck] = []
+    for kind, line, own, two_speeds in kinds.CASES:
+        report(line)
+        every_kind += [kinds.check_kind(kind, line, own, speed) for speed in two_speeds]
     rows: list[dict[str, Any]] = []
     for numerics in convergence.DISCRETISATIONS if with_convergence else ():
         report(str(numerics))
@@ -111,4 +119,5 @@ def run(
         report(f"the start of runs at {speed:g} km/h")
         starts += start.check_start(speed)
     compliance = [run.compliance(reference.SPANS) for run in runs]
-    return Validation(runs, reference.check(runs), compliance, rows, windows, worn, levels, every, starts)
+    checks = reference.check(runs)
+    return Validation(runs, checks, compliance, every_kind, rows, windows, worn, levels, every, starts)

@@ -8,7 +8,7 @@ from typing import Any
 from ...base.table import Alarm, Table
 from ...metrics.labels import LABELS
 from ...terminal import number
-from . import conditions, convergence, lines, reference, start, wear, window
+from . import conditions, convergence, kinds, lines, reference, start, wear, window
 
 Row = tuple[str, ...]
 ERRORS = ("std", "max", "min", "contact_loss")
@@ -38,6 +38,31 @@ def checks_table(checks: Sequence[reference.Check]) -> Table:
         rows.append(tuple(cells))
     title = "EN 50318:2002 reference model, spans 5 and 6, low-passed at 20 Hz"
     return Table(title, tuple(headings), rows)
+
+
+def kinds_table(checks: Sequence[kinds.KindCheck]) -> Table:
+    """Figures of lines of several kinds."""
+    rows = [
+        (
+            *(check.line_kind, check.catenary, check.pantograph, f"{check.speed_kmh:g}"),
+            *(number(value, 1) for value in (check.mean, check.std, check.max, check.min)),
+            number(1e3 * check.max_uplift, 1),
+            number(check.contact_loss, 2),
+        )
+        for check in checks
+    ]
+    return Table(
+        "Lines of the kinds that EN 50318:2018 asks for; its own lines, and DC ones, were in no source",
+        (
+            *("kind", "line", "pantograph", "km/h"),
+            *(LABELS[name].column for name in ("mean", "std", "max", "min")),
+            "uplift (mm)",
+            LABELS["contact_loss"].column,
+        ),
+        rows,
+        text_columns=3,
+        section_ends=tuple(k for k, row in enumerate(rows[1:]) if row[0] != rows[k][0]),
+    )
 
 
 def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:

@@ -27,6 +27,8 @@ WINDOWS = (3, 5, 8, 10, 0)
 MODES = (10, 20, 40, 80)
 SECTION = 5 * (50.0, 65.0, 55.0, 70.0, 60.0, 60.0)
 """Lengths of spans (m) of a line whose spans differ; their mean is that of the line with equal ones."""
+OVERLAP: dict[str, Any] = {"first_span": 13, "rises": [0.1, 0.5]}
+STITCH_WIRE = {"length": 16.0, "tension": 2800.0, "mass": 0.31}
 DISCRETISATIONS: tuple[dict[str, Any], ...] = (
     {},
     {"precision": "double"},
@@ -119,14 +121,20 @@ def cost_of_settings(repeats: int, report: Report) -> dict[str, list[dict[str, A
 
 
 def _lines() -> dict[str, FlexibleCatenaryData]:
-    """The same wires and droppers in equal spans and in spans that differ, as many of them."""
+    """The same wires and droppers in equal spans and in spans that differ, with what a real line has, too."""
     line = load_catenary(IDS[COUNTED].get("catenary", "en50318-2002"))
     assert isinstance(line, FlexibleCatenaryData)
     table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
     spans = [{"span_length": length, "droppers": {"positions": _spread(line, length)}} for length in SECTION]
-    return {
-        "equal spans": line.model_copy(update={"spans": len(SECTION)}),
-        "spans that differ": FlexibleCatenaryData.model_validate(table | {"sequence": spans}),
+    sections: dict[str, dict[str, Any]] = {
+        "spans that differ": {},
+        "spans that differ, an overlap": {"overlaps": [OVERLAP]},
+        "spans that differ, stitch wires": {"stitch_wire": STITCH_WIRE},
+        "all of these": {"overlaps": [OVERLAP], "stitch_wire": STITCH_WIRE},
+    }
+    return {"equal spans": line.model_copy(update={"spans": len(SECTION)})} | {
+        name: FlexibleCatenaryData.model_validate(table | {"sequence": spans} | more)
+        for name, more in sections.items()
     }
 
 

@@ -25,6 +25,17 @@ LOWER, UPPER = 0, 1
 """The two ends of a link."""
 
 
+class Beside(NamedTuple):
+    """Height of the second pair's contact wire, as the line has it for the first; empty without overlaps.
+
+    It is far above where there is no such wire.
+    """
+
+    shape: Array  # (rows, n)
+    rise: Array  # (rows, pieces, 5)
+    rise_breaks: Array  # (pieces + 1,)
+
+
 class FlexibleLine(NamedTuple):
     """Constants of a line on its grid: wires, springs that hold them, and links between them.
 
@@ -73,6 +84,8 @@ class FlexibleLine(NamedTuple):
     link_static: Array  # (rows, links of the window or the line): static tension (N)
     link_gap: Array  # (rows, links of the window or the line): extension before a slack one pulls (m)
     scattered: Scattered  # what has rows of its own, of the whole line
+    pairs: int  # of wires: 2 where wires overlap
+    beside: Beside
 
 
 class FlexibleWire(NamedTuple):
@@ -86,10 +99,11 @@ class FlexibleWire(NamedTuple):
         Array  # (1 or lanes, wires, rows, WIDTH): bare wire's mass over the node's; no rows where all are 1
     )
     mobility: Array  # (1 or lanes, wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N (m/N)
-    contact_row: Index  # (lanes, collectors): row of the first of the four nodes about a contact point
-    contact_segment: Index  # (lanes, collectors): its segment
-    contact_weight: Array  # (lanes, collectors, 4): of the four
-    unmoved_height: Array  # (lanes, collectors): of the contact wire at rest at the contact points (m)
+    # Contact points are those of all collectors with the first pair of wires, then with the second one.
+    contact_row: Index  # (lanes, contacts): row of the first of the four nodes about a contact point
+    contact_segment: Index  # (lanes, contacts): its segment
+    contact_weight: Array  # (lanes, contacts, 4): of the four
+    unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
     # Links in equal rows come first, then scattered ones. Extensions are relative to the static ones, minus
     # the gap of a link that is slack there.

@@ -11,26 +11,33 @@ from ....base.arrays import Array, Index
 from ...interpolation import stencil
 from .arrays import CONTACT, MESSENGER, PAD
 from .grid import spring_levels
-from .parts import Span
+from .overlaps import TensionLength, tension_lengths
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import StaticShape
+from .stitches import Stitches
 
 
 class Springs(NamedTuple):
     """Springs and dampers between wires and the ground: two at each mast, then hard spots."""
 
     masts: int
+    number: Index  # (masts,): of the support along the line, counted from 0; -1 where uplift is not recorded
     wire: Index  # (springs,)
     place: Array  # (springs,): along the line, in nodes
     levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
     mass: Array  # (springs,): that moves with the wire (kg)
+
+    def rows(self, which: slice) -> tuple[Index, Array, Array, Array]:
+        """Wire, place, levels and mass of some springs."""
+        return self.wire[which], self.place[which], self.levels[which], self.mass[which]
 
 
 class Links(NamedTuple):
     """Droppers: links between two wires at one place along the line, which can only pull."""
 
     wires: Index  # (links, 2): the lower and the upper one
+    stitch: Index  # (links,): number of the stitch wire, of those in the window, at the upper end; -1: a wire
     position: Array  # (links,): m
     stiffness: Array  # (links,): in tension (N/m)
     mass: Array  # (links, 2): mass that moves with the lower and the upper end (kg)
@@ -62,6 +69,12 @@ class Nodes(NamedTuple):
 
 def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     """Positions (m), (droppers,), of the droppers of a line with this number of spans."""
+    if data.overlaps:
+        parts = tension_lengths(data)
+        found = np.zeros(sum(len(part.droppers) for part in parts))
+        for part in parts:
+            found[part.droppers] = part.begin + dropper_positions(part.line, part.spans)
+        return found
     if not data.sequence:
         offsets = np.array(data.droppers.positions)
         return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
@@ -70,12 +83,13 @@ def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung][:spans])
 
 
-def springs_of(each: Sequence[Span], places: Array, step: float, spots: Array) -> Springs:
+def springs_of(part: TensionLength, places: Array, step: float, spots: Array) -> Springs:
     """At each mast the contact wire's steady arm, then the messenger's support; after all masts, hard spots.
 
-    each: the span that begins at each mast. places: of the masts, in nodes. step: s. spots: stiffness of hard
-    spots at each node of the contact wire from node -PAD on (N/m), (nodes,).
+    places: of the masts of a tension length, in nodes. step: s. spots: stiffness of hard spots at each node
+    of its contact wire from node -PAD on (N/m), (nodes,).
     """
+    each = spans_of(part.line, part.spans).each[1:]
     levels = [
         level
         for span in each
@@ -89,22 +103,49 @@ def springs_of(each: Sequence[Span], places: Array, step: float, spots: Array) -
     arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
     return Springs(
         masts=len(each),
-        wire=np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
+        number=part.first_span + np.arange(len(each)),
+        wire=part.wire + np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
         place=np.append(np.repeat(places, 2), hard - PAD),
         levels=np.array([*levels, *held]).reshape(-1, 3),
         mass=np.append(arms, np.zeros(len(hard))),
     )
 
 
-def links_of(data: FlexibleCatenaryData, each: Sequence[Span], shape: StaticShape) -> Links:
-    """The droppers of these spans, whose static shape is ``shape``, or repeats it."""
-    droppers = [span.droppers for span in each]
-    counts = [len(own.positions) for own in droppers]
-    half = np.tile(shape.dropper_mass / 2, len(each) // shape.spans)
-    clamps = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
+def links_of(data: FlexibleCatenaryData, spans: int, shape: StaticShape, stitches: Stitches) -> Links:
+    """The droppers of so many spans, whose static shape is ``shape``, or repeats it.
+
+    stitches: those that move.
+    """
+    half = np.tile(shape.dropper_mass / 2, spans // shape.spans)
+    wires, clamps = np.zeros((len(half), 2), dtype=np.int64), np.zeros((len(half), 2))
+    for part in tension_lengths(data, spans):
+        droppers = [span.droppers for span in spans_of(part.line, part.spans).each]
+        counts = [len(own.positions) for own in droppers]
+        both = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
+        wires[part.droppers] = part.wire + np.array([CONTACT, MESSENGER])
+        clamps[part.droppers] = np.repeat(np.array(both), counts, axis=0)
     return Links(
-        wires=np.tile(np.array([CONTACT, MESSENGER], dtype=np.int64), (len(half), 1)),
-        position=dropper_positions(data, len(each)),
-        stiffness=np.tile(shape.dropper_stiffness, len(each) // shape.spans),
-        mass=half[:, None] + np.repeat(np.array(clamps), counts, axis=0),
+        wires=wires,
+        stitch=stitches.carrying,
+        position=dropper_positions(data, spans),
+        stiffness=np.tile(shape.dropper_stiffness, spans // shape.spans),
+        mass=half[:, None] + clamps,
     )
+
+
+def joined_springs(each: Sequence[tuple[TensionLength, Springs]]) -> Springs:
+    """Those of several tension lengths: masts in their order along the line, then all hard spots.
+
+    Uplift is recorded at masts where the tension length is in use.
+    """
+    if len(each) == 1:
+        return each[0][1]
+    masts: list[tuple[float, int, int, int]] = []  # place, number, which tension length, which of its masts
+    for k, (_, own) in enumerate(each):
+        for n in range(own.masts):
+            masts.append((float(own.place[2 * n]), int(own.number[n]), k, n))
+    masts.sort()
+    rows = [each[k][1].rows(slice(2 * n, 2 * n + 2)) for _, _, k, n in masts]
+    rows += [own.rows(slice(2 * own.masts, None)) for _, own in each]
+    wire, place, levels, mass = (np.concatenate(found) for found in zip(*rows, strict=True))
+    return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)

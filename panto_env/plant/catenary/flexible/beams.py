@@ -25,7 +25,7 @@ class Profile(NamedTuple):
 
     breaks: Array  # (pieces of a span + 1,): where pieces begin and end in a span (m)
     pieces: Array  # (pieces, 5): a, b, c, d, e of each piece, span after span
-    decay: float  # kappa (1/m)
+    decay: float | Array  # kappa (1/m), of each piece where they differ
     repeats: bool = True  # whether the line goes on likewise beyond its end
 
     def height(self, x: Array) -> Array:
@@ -35,7 +35,8 @@ class Profile(NamedTuple):
         k = np.clip(np.searchsorted(self.breaks, local, side="right") - 1, 0, per_span - 1)
         a, b, c, d, e = self.pieces[(span.astype(int) * per_span + k) % len(self.pieces)].T
         left, right = local - self.breaks[k], self.breaks[k + 1] - local
-        bend = c * np.exp(-self.decay * left) + d * np.exp(-self.decay * right)
+        decay = self.decay[k] if isinstance(self.decay, np.ndarray) else self.decay
+        bend = c * np.exp(-decay * left) + d * np.exp(-decay * right)
         return np.asarray(a + b * left + bend + e * left * right)
 
 

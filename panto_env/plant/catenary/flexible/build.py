@@ -12,16 +12,17 @@ from ....base.errors import InputError
 from ....base.remember import remembered
 from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
-from .arrays import PAD, FlexibleLine, FlexibleWire
-from .attached import links_of, springs_of
+from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
+from .attached import joined_springs, links_of, springs_of
 from .grid import nodes_per_span, stencil_weights
 from .on_grid import in_equal_rows, on_grid
+from .overlaps import heights_of_pair, pairs_of, tension_lengths
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
 from .segments import lay_out, places
-from .spans import spans_of
 from .static import StaticShape
+from .stitches import moving_stitches
 from .wire_defects import NO_DEFECTS, WireDefects
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
@@ -46,8 +47,8 @@ def constants(
     own: defects of the contact wire itself, at positions along the whole line; a travelling window cannot
     have any. Raises InputError for more nodes than ``MOST_NODES``.
     """
-    differ = bool(data.sequence)
-    strides = data.spans if differ else spans
+    differ = data.one_by_one
+    strides = data.spans if data.sequence else spans
     window = min(resolution.window or strides, strides)
     per_stride = nodes_per_span(data, resolution.spacing)
     dx = data.stride / per_stride
@@ -60,14 +61,22 @@ def constants(
             f"the maximum is {MOST_NODES:,}, so take a coarser spacing or a smaller window."
         )
     x = dx * (np.arange(count) - PAD)
-    each = spans_of(data, covered).each
-    masts = (
-        np.array(data.alignment(covered).supports[1:-1]) / dx
-        if differ
-        else 1.0 * per_stride * np.arange(1, covered)
-    )
-    springs = springs_of(each[1:], masts, resolution.time_step, own.springs_of_nodes(x, dx))
-    grid = on_grid(data, shape, springs, links_of(data, each, shape), x, resolution.time_step, own)
+    parts = tension_lengths(data, covered)
+    defects = [own.within(*part.in_use) for part in parts] if len(parts) > 1 else [own]
+    held = []
+    for part, wrong in zip(parts, defects, strict=True):
+        masts = (
+            part.begin / dx + np.array(part.line.alignment(part.spans).supports[1:-1]) / dx
+            if differ
+            else 1.0 * per_stride * np.arange(1, covered)
+        )
+        springs = springs_of(part, masts, resolution.time_step, wrong.springs_of_nodes(x, dx))
+        begin, end = part.in_use
+        used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
+        held.append((part, springs._replace(number=np.where(used, springs.number, -1))))
+    ropes = moving_stitches(data, covered)
+    links = links_of(data, covered, shape, ropes)
+    grid = on_grid(data, shape, joined_springs(held), links, ropes, covered, x, resolution.time_step, defects)
     real = np.float32 if numerics.precision == "single" else np.float64
     rows = per_stride * window // WIDTH
     masts_of_window = per_stride * np.arange(1, window) if not differ else np.zeros(0, dtype=np.int64)
@@ -98,9 +107,11 @@ def constants(
         mast_segment=mast_segment,
         free_uplift=data.free_uplift,
         largest_move=LARGEST_SPEED * resolution.time_step,
-        link_static=np.tile(shape.dropper_tension, (1, len(each) // shape.spans)).astype(real),
+        link_static=np.tile(shape.dropper_tension, (1, covered // shape.spans)).astype(real),
         link_gap=np.zeros((1, len(grid.links.position)), dtype=real),
         scattered=scattered(grid if differ else None, real),
+        pairs=pairs_of(data),
+        beside=Beside(tensioned.beside[None], np.zeros((1, 0, 5)), np.zeros(0)),
         **in_equal_rows(grid, differ, rows, real),
     )
 
@@ -109,22 +120,24 @@ class Tensioned(NamedTuple):
     """Constants of a line that depend on the wires' tension: one row of each in ``FlexibleLine``."""
 
     shape: Array  # (n,)
+    beside: Array  # (n,), or none: of the second pair
     stencil: Array  # (wires, 5)
     absorbing: Array  # (wires,)
 
 
 def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: float) -> Tensioned:
     """Constants that depend on tension, for a grid of spacing ``dx`` (m) and a time step (s)."""
-    damping, wires = data.damping, (data.contact_wire, data.messenger_wire)
+    damping, wires = data.damping, data.wires * pairs_of(data)
     settle = 1.0 + damping.alpha * step / 2
     keep = (1.0 - damping.alpha * step / 2) / settle
     stencil = [
         [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
     ]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
-    table = int(np.ceil(data.period / SHAPE_SPACING)) + 1
+    table = np.linspace(0, data.period, int(np.ceil(data.period / SHAPE_SPACING)) + 1)
     return Tensioned(
-        shape=shape.contact.height(np.linspace(0, data.period, table)),
+        shape=heights_of_pair(data, shape, 0, table),
+        beside=heights_of_pair(data, shape, 1, table) if data.overlaps else np.zeros(0),
         stencil=np.array(stencil),
         absorbing=(courant - 1) / (courant + 1),
     )
@@ -134,9 +147,9 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
     """Wires of all lanes in their static shape, at the line's start."""
     wires, real = line.mobility.shape, line.stencil.dtype
     own = room_for(line, lanes)
-    apart = own.links.node.shape[1], 2 * own.masts.node.shape[1]  # sets
+    apart = own.links.node.shape[1] + own.hung.node.shape[1], 2 * own.masts.node.shape[1]  # sets
     sets, springs = len(line.link_row) + apart[0], len(line.spring_row) + apart[1]
-    each = lanes if line.scattered.mobility.size else 1
+    each, contacts = lanes if line.scattered.mobility.size else 1, collectors * line.pairs
 
     def of_links(value: float) -> Array:
         return np.full((lanes, sets, WIDTH), value, dtype=real)
@@ -149,10 +162,10 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
         travelled=np.zeros(lanes, dtype=np.int64),
         inertia=np.repeat(line.inertia[None], each, axis=0),
         mobility=np.repeat(line.mobility[None], each, axis=0),
-        contact_row=np.zeros((lanes, collectors), dtype=np.int64),
-        contact_segment=np.zeros((lanes, collectors), dtype=np.int64),
-        contact_weight=np.zeros((lanes, collectors, 4)),
-        unmoved_height=np.zeros((lanes, collectors)),
+        contact_row=np.zeros((lanes, contacts), dtype=np.int64),
+        contact_segment=np.zeros((lanes, contacts), dtype=np.int64),
+        contact_weight=np.zeros((lanes, contacts, 4)),
+        unmoved_height=np.zeros((lanes, contacts)),
         spring_past=np.zeros((lanes, springs, WIDTH), dtype=real),
         past_extension=of_links(0.0),
         extension=of_links(0.0),

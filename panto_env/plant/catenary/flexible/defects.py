@@ -18,19 +18,23 @@ from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ...alignment import Alignment
 from ...line_condition import LineCondition
+from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
 from .beams import GRAVITY, HELD, Beams, Profile, add_to_band
 from .schema import FlexibleCatenaryData, Span
 from .spans import spans_of
 from .static import solve
+from .stitches import Stitches, as_wire, moving, stitches_of
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
-UNKNOWNS = 4  # per node: height and slope of the contact wire, then of the messenger (m, -)
-BAND = 6  # diagonals of the matrix: a wire's unknowns at the next node are at most 5 away
+UNKNOWNS, STITCHED = 4, 6
+"""Per node: height and slope of the contact wire, then of the messenger, then of a stitch wire (m, -)."""
+BAND, STITCHED_BAND = 6, 10
+"""Diagonals of the matrix: a wire's unknowns at the next node are at most 5 away, or 9 with stitch wires."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class StaticState:
     tension: Array  # (droppers,): N
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
     rise: Array  # (pieces, 5): change of the running surface's height: a, b, c, d, e between nodes
+    change: Array  # (unknowns,): of heights and slopes (m, -)
 
 
 class DefectiveLine:
@@ -69,39 +74,72 @@ class DefectiveLine:
             data, [len(span.droppers.sag) for span in each], condition
         )
         own = locate(data, spans, condition)
+        stitches = moving(stitches_of(data, spans), spans)
+        stitched = len(stitches.support) > 0
+        self._per_node = per_node = STITCHED if stitched else UNKNOWNS
 
         if data.sequence:
             begins = zip(each, alignment.supports, strict=False)
+            nodes = [*nodes, *stitches.clamps]
             divided = [_divided(span, own, nodes, begin) for span, begin in begins]
         else:
-            divided = [_divided(each[0], own, nodes)] * spans
+            within = np.unique(np.round(stitches.clamps % data.span_length, 9))
+            divided = [_divided(each[0], own, [*nodes, *within])] * spans
         firsts = np.cumsum(
             [0, *(len(lengths) for _, lengths, _ in divided)]
         )  # numbers of the supports' nodes
         number = np.arange(firsts[-1] + 1)
         hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
-        self._ends = UNKNOWNS * hung[:, None] + [0, 2]  # of the droppers
-        self._masts = masts = UNKNOWNS * firsts[1:-1]
-        self._band = np.zeros((BAND, UNKNOWNS * len(number)))
-        self._load = np.zeros(UNKNOWNS * len(number))
+        self._ends = per_node * hung[:, None] + [0, 2]  # of the droppers
+        self._masts = masts = per_node * firsts[1:-1]
+        self._band = np.zeros((STITCHED_BAND if stitched else BAND, per_node * len(number)))
+        self._load = np.zeros(per_node * len(number))
         lengths = np.concatenate([lengths for _, lengths, _ in divided])
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
         self._repeats = not data.sequence
-        self._unknowns: Any = UNKNOWNS * number[:-1, None] + 2 * CONTACT + [0, 1, 4, 5]
+        self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
         self._beams = Beams(left.contact_wire, lengths)
         add_to_band(self._band, self._unknowns, self._beams.stiffness)
-        above = Beams(left.messenger_wire, lengths)
-        add_to_band(self._band, self._unknowns + 2 * (MESSENGER - CONTACT), above.stiffness)
+        above = self._unknowns + 2 * (MESSENGER - CONTACT)
+        self._above = Beams(left.messenger_wire, lengths)
+        if stitched:
+            self._stitch(left.messenger_wire, stitches, lengths, above)
+        else:
+            add_to_band(self._band, above, self._above.stiffness)
         self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
         self._band[0, masts] += [span.steady_arm.stiffness for span in each[1:]]
         self._band[0, masts + 2] += self._support_stiffness
         self._load[masts + 2] = self._support_stiffness * height
         self._lifted = masts + 2
-        self._band[0, [0, 2, -4, -2]] = HELD
+        self._band[0, [0, 2, -per_node, 2 - per_node]] = HELD
         self.decay = self._beams.decay
         self._carry(data, left, own, alignment)
+
+    def _stitch(self, messenger: Wire, stitches: Stitches, lengths: Array, above: Any) -> None:
+        """Add the messenger and the stitch wires, and hang droppers from these.
+
+        above: unknowns of the messenger's elements.
+        """
+        places = self._places
+        tensions = messenger.tension - stitches.deficit(places, places + lengths)
+        for tension in np.unique(np.round(tensions, 6)):
+            which = np.flatnonzero(np.round(tensions, 6) == tension)
+            thinner = messenger.model_copy(update={"tension": float(tension)})
+            add_to_band(self._band, above[which], Beams(thinner, lengths[which]).stiffness)
+        unused = np.ones(len(self._load), dtype=bool)
+        unused[:: self._per_node] = unused[1 :: self._per_node] = False
+        unused[2 :: self._per_node] = unused[3 :: self._per_node] = False
+        for k in range(len(stitches.support)):
+            first, last = (int(np.argmin(np.abs(places - end[k]))) for end in (stitches.begin, stitches.end))
+            rope = above[first:last] + 2  # its nodes are the messenger's, but for its ends
+            unused[np.unique(rope)] = False
+            unused[[rope[0, 0], rope[-1, 2]]] = True
+            rope[0, 0], rope[-1, 2] = above[first, 0], above[last - 1, 2]
+            add_to_band(self._band, rope, Beams(as_wire(stitches, k), lengths[first:last]).stiffness)
+        self._band[0, unused] = 1.0
+        self._ends[stitches.carrying >= 0, 1] += 2
 
     def _carry(
         self, data: FlexibleCatenaryData, left: FlexibleCatenaryData, own: WireDefects, alignment: Alignment
@@ -144,7 +182,7 @@ class DefectiveLine:
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
-        return UNKNOWNS * int(np.argmin(np.abs(self._places - position))) + 2 * CONTACT
+        return self._per_node * int(np.argmin(np.abs(self._places - position))) + 2 * CONTACT
 
     def solve(
         self,
@@ -179,11 +217,17 @@ class DefectiveLine:
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
         rise = self._beams.pieces(change[self._unknowns], self._bulge)
         rise[:, :2] += self._surface
-        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise)
+        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise, change)
 
     def rise(self, state: StaticState) -> Profile:
         """Change of the running surface's height in a state."""
         return Profile(self.breaks, state.rise, self.decay, self._repeats)
+
+    def rises(self, state: StaticState) -> tuple[Profile, Profile]:
+        """Change of the running surface's and of the messenger's height in a state."""
+        unknowns = state.change[self._unknowns + 2 * (MESSENGER - CONTACT)]
+        pieces = self._above.pieces(unknowns, np.zeros(len(unknowns)))
+        return self.rise(state), Profile(self.breaks, pieces, self._above.decay, self._repeats)
 
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
         """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""
@@ -194,7 +238,7 @@ class DefectiveLine:
         contact, messenger = self._ends.T
         band[0, contact] += spring
         band[0, messenger] += spring
-        band[2, contact] -= spring
+        band[messenger - contact, contact] -= spring
         gain = np.where(taut, -spring * error, -self._static)  # of tension, were the wires held
         load[contact] += gain
         load[messenger] -= gain
@@ -215,6 +259,11 @@ def _divided(
 def _own(counts: Sequence[int], span: int) -> str:
     last = min(span, len(counts))
     return f"and span {last} has {counts[last - 1]} droppers"
+
+
+def check_places(data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition) -> None:
+    """Raise InputError for a dropper or support that a line has not; counts: of the droppers of each span."""
+    _locate(data, counts, condition)
 
 
 def _locate(

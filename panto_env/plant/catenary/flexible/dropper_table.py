@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ....base.table import Table
+from .overlaps import tension_lengths
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import hang
@@ -23,7 +24,7 @@ HEADINGS = {
 class RestingDropper(NamedTuple):
     """One dropper of a line at rest, as designed."""
 
-    number: int  # from the support, from 1
+    number: int  # from the support, from 1; in an overlap the ending wires' first
     position: float  # from the support (m)
     sag: float  # of the contact wire below the line from its height at one support to that at the next (m)
     length: float  # unloaded: to which it is cut (m)
@@ -73,11 +74,18 @@ def droppers_at_rest(line: Any) -> list[RestingDropper]:
         return []
     shape = hang(line)
     stretch = shape.dropper_tension / shape.dropper_stiffness
-    rows = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
-    return [
-        RestingDropper(number, position, sag, *next(rows), number_of_span)
-        for number_of_span, span in enumerate(spans_of(line, 1).each, start=1)
-        for number, (position, sag) in enumerate(
-            zip(span.droppers.positions, span.droppers.sag, strict=True), start=1
-        )
-    ]
+    rows = list(
+        zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
+    )
+    hung: dict[int, tuple[int, float, float]] = {}  # by number along the line: span, position and sag
+    for part in tension_lengths(line, None if line.sequence else 1):
+        numbers = iter(part.droppers.tolist())
+        for span, own in enumerate(spans_of(part.line, part.spans).each, start=part.first_span + 1):
+            for position, sag in zip(own.droppers.positions, own.droppers.sag, strict=True):
+                hung[next(numbers)] = span, position, sag
+    found: list[RestingDropper] = []
+    for k in range(len(rows)):
+        span, position, sag = hung[k]
+        number = found[-1].number + 1 if found and found[-1].span == span else 1
+        found.append(RestingDropper(number, position, sag, *rows[k], span))
+    return found

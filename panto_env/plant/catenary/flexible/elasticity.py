@@ -13,6 +13,7 @@ import numpy as np
 from ....base.arrays import Array
 from ...line_condition import NEW
 from .defects import DefectiveLine
+from .overlaps import tension_lengths
 from .schema import FlexibleCatenaryData
 
 SPANS = 5
@@ -25,18 +26,24 @@ def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
     """Places in a span (m) and the uplift of the contact wire there per newton (m/N), (places,) each.
 
     force: at the place (N). The larger it is, the more droppers go slack. Where spans differ, places are
-    along the line, in all spans but the first and the last, at whose ends anchors hold the wires.
+    along the line, in all spans but the first and the last, at whose ends anchors hold the wires; in an
+    overlap the uplift is that of the wire in use alone.
     """
     if not line.sequence:
         places = line.span_length / PLACES * np.arange(PLACES + 1)
         whole = DefectiveLine(line, SPANS, NEW, nodes=places.tolist())
         return places, _lifts(whole, places + SPANS // 2 * line.span_length, force)
-    supports, spans = line.alignment().supports, len(line.sequence)
     found: list[tuple[Array, Array]] = []
-    for begin, end in pairwise(supports[1:-1]):
+    for begin, end in pairwise(line.alignment().supports[1:-1]):
         places = begin + (end - begin) / PLACES * np.arange(PLACES + 1)
-        whole = DefectiveLine(line, spans, NEW, nodes=places.tolist())
-        found.append((places, _lifts(whole, places, force)))
+        lifts = np.zeros(len(places))
+        for part in tension_lengths(line):
+            used = (places >= part.in_use[0]) & (places <= part.in_use[1])
+            if used.any():
+                own = places[used] - part.begin
+                whole = DefectiveLine(part.line, part.spans, NEW, nodes=own.tolist())
+                lifts[used] = _lifts(whole, own, force)
+        found.append((places, lifts))
     return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
 from ...state import own_row
-from .arrays import CONTACT, LOWER, MESSENGER, UPPER
+from .arrays import LOWER, MESSENGER, UPPER
 from .scattered import move_nodes, stretch_at
 from .scattered_arrays import LINK
 from .segments import move, read
+from .stitched import move_hung, stretch_of_hung
 
 
 @inlined
@@ -43,6 +44,12 @@ def measure_extensions(line, wire, lane):
     links, first = wire.scattered.links, line.link_row.size
     for s in range(links.node.shape[1]):
         apart = stretch_at(u, links.node[lane, s], links.constants[lane, s])
+        store_row(past, first + s, load_row(now, first + s))
+        store_row(now, first + s, apart - load_row(gap, first + s))
+    hung, first = wire.scattered.hung, first + links.node.shape[1]
+    for s in range(hung.node.shape[1]):
+        node, table = hung.node[lane, s], hung.constants[lane, s]
+        apart = stretch_of_hung(u, wire.scattered.displacement[lane], node, table)
         store_row(past, first + s, load_row(now, first + s))
         store_row(now, first + s, apart - load_row(gap, first + s))
 
@@ -108,8 +115,16 @@ def pull_links(line, wire, lane):
         stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
         pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
         store_row(change, number, pull)
-        move_nodes(u[CONTACT], d[CONTACT], node, table, LINK.MOVE, pull)
-        move_nodes(u[MESSENGER], d[MESSENGER], node, table, LINK.MOVE + 4, -pull)
+        move_nodes(u, d, node, table, LINK.MOVE, pull)
+        move_nodes(u[MESSENGER:], d[MESSENGER:], node, table, LINK.MOVE + 4, -pull)
+    held, first = wire.scattered, first + links.node.shape[1]
+    for s in range(held.hung.node.shape[1]):
+        node, table, number = held.hung.node[lane, s], held.hung.constants[lane, s], first + s
+        step = stretch_of_hung(d, held.increment[lane], node, table)
+        stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
+        pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
+        store_row(change, number, pull)
+        move_hung(u, d, held, lane, node, table, pull)
 
 
 @inlined

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import WIDTH
 from ....base.arrays import Array, Index
-from .arrays import CONTACT, LOWER, PAD, UPPER
+from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .attached import Links, Nodes, Springs
 from .grid import missing_yield
+from .overlaps import TensionLength, pairs_of, tension_lengths
 from .schema import FlexibleCatenaryData
 from .segments import places
 from .static import StaticShape
+from .stitch_grid import StitchGrid, stitch_grid
+from .stitches import Stitches
 from .wire_defects import WireDefects
 
 STIFFEST = 1e8
@@ -36,6 +40,8 @@ class OnGrid(NamedTuple):
     link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
     stiffness: Array  # (links,): in tension, with the grid's missing compliance (N/m)
     room: Array  # (links,): designed distance of the ends (m)
+    slope_mobility: Array  # (wires, 1): displacement of a bare node in a step by a tension, per slope (1/N)
+    ropes: StitchGrid
 
 
 def on_grid(
@@ -43,45 +49,64 @@ def on_grid(
     shape: StaticShape,
     springs: Springs,
     links: Links,
+    stitches: Stitches,
+    spans: int,
     x: Array,
     step: float,
-    own: WireDefects,
+    own: Sequence[WireDefects],
 ) -> OnGrid:
-    """x: positions of the nodes from node -PAD on (m). step: s. own: defects of the contact wire itself."""
-    damping, wires, dx = data.damping, data.wires, float(x[PAD + 1])
+    """stitches: those that move. x: positions of the nodes from node -PAD on (m). step: s. own: defects of
+    the contact wire of each tension length.
+    """
+    parts = tension_lengths(data, spans)
+    damping, wires, dx = data.damping, data.wires * pairs_of(data), float(x[PAD + 1])
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
+    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
+    usual = (links.stitch < 0) & (len(parts) == 1)
+    room = np.where(usual, room, np.tile(stretched, len(room) // len(stretched)))
     at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
     bare = np.array([[wire.mass * dx] for wire in wires])
-    added = np.zeros((len(wires), len(x)))
-    for end in (LOWER, UPPER):
-        np.add.at(
-            added, (links.wires[:, end, None], at_links.four), at_links.shares * links.mass[:, end, None]
-        )
+    added, ropes = np.zeros((len(wires), len(x))), stitch_grid(data, stitches, links, x, step)
+    on = links.stitch >= 0  # a stitch wire
+    for end, ours in ((LOWER, slice(None)), (UPPER, ~on)):
+        nodes = links.wires[ours, end, None], at_links.four[ours]
+        np.add.at(added, nodes, at_links.shares[ours] * links.mass[ours, end, None])
+    clamped = np.repeat(stitches.clamp_mass, 2)[:, None]
+    above = np.repeat(stitches.wire, 2)[:, None] + MESSENGER
+    np.add.at(added, (above, ropes.clamps.four), ropes.clamps.shares * clamped)
     np.add.at(added, (springs.wire[:, None], at_springs.four), at_springs.shares * springs.mass[:, None])
-    added[CONTACT] += own.mass_of_nodes(x, dx, data.contact_wire)
+    for part, defects in zip(parts, own, strict=True):
+        added[part.wire + CONTACT] += defects.mass_of_nodes(x, dx, data.contact_wire)
     mass = bare + added
-    mobility = step**2 / mass / (1.0 + damping.alpha * step / 2)
+    held = _held(parts, len(wires), x)
+    mobility = np.where(held, 0.0, step**2 / mass / (1.0 + damping.alpha * step / 2))
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
 
     # The compliance that the wires lack on the grid is added to the links.
     weights = at_links.weights
-    ends = [(links.wires == w).sum(axis=1) for w in range(len(wires))]
+    ends = [((links.wires == w) & ~(on[:, None] & [False, True])).sum(axis=1) for w in range(len(wires))]
     missing = sum(
         count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
     )
+    missing = missing + ropes.missing_yield
     stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
     move = np.stack(
         [mobility[links.wires[:, end, None], at_links.four] * weights for end in (LOWER, UPPER)], axis=1
     )
     relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
+    move[on, UPPER] = 0.0
+    two = ropes.mobility[links.stitch[on, None], ropes.node[on, None] + [0, 1]]
+    move[on, UPPER, :2] = two * ropes.shares[on]
+    relative[on] = 0.5 * (weights * move[:, LOWER])[on].sum(axis=1)
+    relative[on] += 0.5 * (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
     early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
-    held = mobility[springs.wire[:, None], at_springs.four]
+    moved = mobility[springs.wire[:, None], at_springs.four]
     return OnGrid(
-        inertia=bare / mass,
+        inertia=np.where(held, 0.0, bare / mass),
         mobility=mobility,
         springs=springs,
         at_springs=at_springs,
-        spring_yield=(at_springs.weights**2 * held).sum(axis=1)[:, None],
+        spring_yield=(at_springs.weights**2 * moved).sum(axis=1)[:, None],
         links=links,
         at_links=at_links,
         move=move,
@@ -89,7 +114,24 @@ def on_grid(
         link_yield=relative,
         stiffness=stiffness,
         room=room,
+        slope_mobility=step**2 / bare / (1.0 + damping.alpha * step / 2) / dx,
+        ropes=ropes,
     )
+
+
+def _held(parts: Sequence[TensionLength], wires: int, x: Array) -> Any:
+    """Whether nodes of wires are beyond their anchors, (wires, nodes); those of the line's ends move."""
+    if len(parts) == 1:
+        return np.zeros((wires, len(x)), dtype=bool)
+    held = np.ones((wires, len(x)), dtype=bool)
+    for number, part in enumerate(parts):
+        inside = np.ones(len(x), dtype=bool)
+        if number > 0:
+            inside &= x > part.begin + (x[1] - x[0]) / 2
+        if number < len(parts) - 1:
+            inside &= x < part.end - (x[1] - x[0]) / 2
+        held[part.wire : part.wire + 2, inside] = False
+    return held
 
 
 class Sets:

@@ -10,11 +10,24 @@ from pydantic import Field, model_validator
 from ....base.explanation import comma_hint
 from ....base.ranges import Between
 from ....base.settings import Settings
-from ..schema import LONGEST_SPAN, SpanLength
+from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength, Wire
 
 CLOSEST = 0.1
 """Least distance between two droppers, or between one and a support (m)."""
 Clamp = Annotated[float, Between(0, 10, "kg")]
+
+
+class Conductor(Wire):
+    """A wire of a flexible line: weights or springs keep its tension, or it is fixed at both ends."""
+
+    axial_stiffness: Annotated[float, Between(1e5, 5e8, "N")] | None = Field(
+        None,
+        description="EA of a wire that is fixed at both ends, so that its tension depends on temperature and "
+        "ice (N); by default its tension is kept, as by weights",
+    )
+    expansion: Annotated[float, Between(0, 1e-4, "1/K")] = Field(
+        17e-6, description="thermal expansion of a wire that is fixed (1/K); copper's by default (recalled)"
+    )
 
 
 class Droppers(Settings):
@@ -70,6 +83,20 @@ class SteadyArm(Settings):
     )
 
 
+class StitchWire(Settings):
+    """A rope under the messenger at a support, clamped to it on both sides; droppers between hang from it.
+
+    It takes its tension from the messenger, which carries so much less between the clamps.
+    """
+
+    length: Annotated[float, Between(0, 60, "m")] = Field(
+        description="from clamp to clamp, with the support in the middle (m); 0 for none at this support"
+    )
+    tension: Annotated[float, Between(500, 20e3, "N")] = Field(description="tension (N)")
+    mass: Annotated[float, Between(0.05, 5, "kg/m")] = Field(description="mass per length (kg/m)")
+    clamp_mass: Clamp = Field(0.0, description="each clamp, on the messenger (kg)")
+
+
 Encumbrance: TypeAlias = Annotated[float, Between(0.05, 10, "m")]
 ContactHeight: TypeAlias = Annotated[float, Between(-2, 2, "m")]
 
@@ -88,6 +115,7 @@ class Span(Settings):
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
+    stitch_wire: StitchWire | None = Field(None, description="at the span's first support, or none")
 
     @model_validator(mode="after")
     def _droppers_in_span(self) -> Self:
@@ -104,6 +132,33 @@ class EndSupport(Settings):
     contact_height: ContactHeight | None = Field(
         None, description="height of the contact wire (m), by default that of the last span"
     )
+
+
+class Overlap(Settings):
+    """Where one pair of wires ends and the next one begins, side by side over an odd number of spans.
+
+    In the middle span both contact wires are level over some metres. From there the ending one rises in a
+    parabola to the first of ``rises`` at the next support, and on from support to support to its anchor at
+    the last one of the overlap. The beginning wires come down likewise. Heights are over the line's own.
+    """
+
+    first_span: Annotated[int, Between(1, MOST_SPANS)] = Field(
+        description="number of the span at whose first support the next wires are anchored"
+    )
+    rises: tuple[Annotated[float, Between(0.02, 2, "m")], ...] = Field(
+        min_length=1,
+        max_length=4,
+        description="height of the wire out of use over the one in use, at the supports from the middle span "
+        "outwards, the last of them the anchor's (m): one value for an overlap of one span, two for three",
+    )
+    level: Annotated[float, Between(0, 50, "m")] = Field(
+        4.0, description="stretch in the middle over which both contact wires are at the same height (m)"
+    )
+
+    @property
+    def spans(self) -> int:
+        """Number of spans over which both pairs of wires hang."""
+        return 2 * len(self.rises) - 1
 
 
 def check_inside(positions: Sequence[float], span_length: float) -> None:

@@ -200,7 +200,7 @@ def _lightest(runs: Runs) -> float:
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
-    window, lightest = window_of(data.wires, numerics, runs), _lightest(runs)
+    window, lightest = window_of(data.wires, numerics, runs, bool(data.overlaps)), _lightest(runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(required.time_step)

@@ -14,9 +14,9 @@ from ....backend import (
     store_row,
 )
 from ...state import own_row
-from .arrays import CONTACT, MESSENGER, PAD
-from .scattered_arrays import MAST, SPRING
-from .segments import row_of, segment_of
+from .arrays import MESSENGER, PAD
+from .scattered_arrays import MAST, SPRING, STITCH
+from .segments import row_of, segment_of, share_ends
 
 
 @inlined
@@ -31,10 +31,10 @@ def displacement_at(x, node, constants):
 @inlined
 def stretch_at(x, node, constants):
     """Displacement or increment of the upper wire minus that of the lower one at links of a set (m)."""
-    lower, upper = x[CONTACT], x[MESSENGER]
-    total = load_row(constants, 0) * (gather(upper, node, 0) - gather(lower, node, 0))
+    upper = x[MESSENGER:]
+    total = load_row(constants, 0) * (gather(upper, node, 0) - gather(x, node, 0))
     for k in range(1, 4):
-        total += load_row(constants, k) * (gather(upper, node, k) - gather(lower, node, k))
+        total += load_row(constants, k) * (gather(upper, node, k) - gather(x, node, k))
     return total
 
 
@@ -52,8 +52,8 @@ def keep_past_of_masts(scattered, masts, lane, d, past, first):
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            store_row(past, first + s, displacement_at(d[CONTACT], node, table))
-        store_row(past, first + sets + s, displacement_at(d[MESSENGER], node, table))
+            store_row(past, first + s, displacement_at(d, node, table))
+        store_row(past, first + sets + s, displacement_at(d[MESSENGER:], node, table))
 
 
 @inlined
@@ -63,8 +63,9 @@ def apply_masts(scattered, masts, lane, u, d, past, first):
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            _apply_spring(u[CONTACT], d[CONTACT], node, table, MAST.ARM, load_row(past, first + s))
-        _apply_spring(u[MESSENGER], d[MESSENGER], node, table, MAST.SUPPORT, load_row(past, first + sets + s))
+            _apply_spring(u, d, node, table, MAST.ARM, load_row(past, first + s))
+        above, its_d = u[MESSENGER:], d[MESSENGER:]
+        _apply_spring(above, its_d, node, table, MAST.SUPPORT, load_row(past, first + sets + s))
 
 
 @inlined
@@ -85,18 +86,32 @@ def record_scattered(line, wire, lane, uplift, tension):
     sets = masts.node.shape[1]
     for s in range(sets if uplift.size > 0 else 0):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        moved = displacement_at(u[CONTACT], node, table) - 0.5 * displacement_at(d[CONTACT], node, table)
+        moved = displacement_at(u, node, table) - 0.5 * displacement_at(d, node, table)
         store_row(past, s, moved)
         for j in range(WIDTH):
             n = masts.number[lane, j * sets + s]
             if n >= 0:
-                uplift[n & NOT_NEGATIVE] = past[s, j]
-    sets, first = links.node.shape[1], line.link_row.size
-    for s in range(sets if tension.size > 0 else 0):
+                number = line.scattered.masts.number[n & NOT_NEGATIVE]
+                if number >= 0:
+                    uplift[number & NOT_NEGATIVE] = past[s, j]
+    if tension.size > 0:
+        first = line.link_row.size
+        _record_links(line.scattered.links, links, wire, lane, first, tension)
+        _record_links(
+            line.scattered.hung, wire.scattered.hung, wire, lane, first + links.node.shape[1], tension
+        )
+
+
+@inlined
+def _record_links(along, held, wire, lane, first, tension):
+    """Write the tension of links whose sets begin with ``first`` (N)."""
+    sets = held.node.shape[1]
+    for s in range(sets):
         for j in range(WIDTH):
-            n = links.number[lane, j * sets + s]
+            n = held.number[lane, j * sets + s]
             if n >= 0:
-                tension[n & NOT_NEGATIVE] = wire.static[lane, first + s, j] + wire.change[lane, first + s, j]
+                number = along.number[n & NOT_NEGATIVE] & NOT_NEGATIVE
+                tension[number] = wire.static[lane, first + s, j] + wire.change[lane, first + s, j]
 
 
 @inlined
@@ -115,18 +130,57 @@ def take_window(line, wire, lane):
         start = travelled * (nodes // line.window)
         at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
+        if line.pairs > 1:
+            _hold_anchors(wire.displacement[lane], wire.increment[lane], wire.inertia[lane], line.rows)
         end = start + nodes
         _leave(scattered.masts, held.masts, lane, start, at_start)
         n = held.masts.begin[lane] & NOT_NEGATIVE
-        while n < scattered.masts.first.size and (at_end or scattered.masts.first[n] + 3 < end):
+        while n < scattered.masts.number.size and (at_end or scattered.masts.enters[n] < end):
             _enter(scattered.masts, held.masts, lane, n, start, line.rows)
             n += 1
         _leave(scattered.links, held.links, lane, start, at_start)
-        n = held.links.begin[lane] & NOT_NEGATIVE
-        while n < scattered.links.first.size and (at_end or scattered.links.first[n] + 3 < end):
+        n, first = held.links.begin[lane] & NOT_NEGATIVE, line.link_row.size
+        while n < scattered.links.number.size and (at_end or scattered.links.enters[n] < end):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
-                _rest(line, wire, lane, n)
+                _rest(line, wire, lane, scattered.links, held.links, n, first)
             n += 1
+        if scattered.deficit.size > 0:
+            _take_stitches(line, wire, lane, start, end, at_start, at_end)
+
+
+@inlined
+def _take_stitches(line, wire, lane, start, end, at_start, at_end):
+    """Take in stitch wires, and the droppers that hang from them."""
+    scattered, held = line.scattered, wire.scattered
+    deficit, last = held.deficit[lane], line.rows * WIDTH
+    for pair in range(deficit.shape[0]):
+        for i in range(deficit.shape[1]):
+            for j in range(WIDTH):
+                local = j * line.rows + i - PAD
+                inside = local > 0 and local < last
+                deficit[pair, i, j] = scattered.deficit[pair, start + local + PAD] if inside else 0.0
+    _leave(scattered.stitches, held.stitches, lane, start, at_start)
+    n = held.stitches.begin[lane] & NOT_NEGATIVE
+    sets, nodes = held.stitches.node.shape[1], scattered.stitches.empty.size - STITCH.INERTIA
+    while n < scattered.stitches.number.size and (at_end or scattered.stitches.enters[n] < end):
+        if _enter(scattered.stitches, held.stitches, lane, n, start, line.rows):
+            slot = n % held.stitches.number.shape[1]
+            for k in range(nodes):
+                row = slot % sets * nodes + k
+                held.displacement[lane, row, slot // sets] = 0.0
+                held.increment[lane, row, slot // sets] = 0.0
+        n += 1
+    _leave(scattered.hung, held.hung, lane, start, at_start)
+    n, first = held.hung.begin[lane] & NOT_NEGATIVE, line.link_row.size + held.links.node.shape[1]
+    while n < scattered.hung.number.size and (at_end or scattered.hung.enters[n] < end):
+        if _enter(scattered.hung, held.hung, lane, n, start, line.rows):
+            _rest(line, wire, lane, scattered.hung, held.hung, n, first)
+            own, slot = held.hung.node.shape[1], n % held.hung.number.shape[1]
+            above = scattered.carrying[n] % held.stitches.number.shape[1]
+            upper = (above % sets * nodes + scattered.upper[n]) * WIDTH + above // sets
+            held.hung.node[lane, slot % own, 4, slot // own] = upper
+            held.hung.node[lane, slot % own, 5, slot // own] = upper + WIDTH
+        n += 1
 
 
 @kernel
@@ -152,10 +206,23 @@ def _take_nodes(scattered, inertia, mobility, start, rows):
 
 
 @inlined
+def _hold_anchors(u, d, inertia, rows):
+    """Put nodes at rest that are at anchors or beyond; the window's absorbing end may have moved them."""
+    for w in range(inertia.shape[0]):
+        for i in range(inertia.shape[1]):
+            for j in range(WIDTH):
+                if inertia[w, i, j] == 0.0:
+                    u[w, i + PAD, j] = 0.0
+                    d[w, i + PAD, j] = 0.0
+        share_ends(u[w], rows)
+        share_ends(d[w], rows)
+
+
+@inlined
 def _leave(along, held, lane, start, at_start):
     """Empty the slots of things that the window has left behind."""
     begin = held.begin[lane] & NOT_NEGATIVE
-    while begin < along.first.size and not at_start and along.first[begin] <= start:
+    while begin < along.number.size and not at_start and along.leaves[begin] <= start:
         begin += 1
     held.begin[lane] = begin
     sets = held.node.shape[1]
@@ -163,7 +230,7 @@ def _leave(along, held, lane, start, at_start):
         if held.number[lane, slot] < begin:
             s, j = slot % sets, slot // sets
             held.number[lane, slot] = -1
-            for k in range(4):
+            for k in range(held.node.shape[2]):
                 held.node[lane, s, k, j] = 0
             for r in range(along.empty.size):
                 held.constants[lane, s, r, j] = along.empty[r]
@@ -174,10 +241,12 @@ def _enter(along, held, lane, n, start, rows):
     """Put thing n into its slot, and renumber its nodes; whether it was not there before."""
     sets, slot = held.node.shape[1], n % held.number.shape[1]
     s, j = slot % sets, slot // sets
-    for k in range(4):
-        local = along.first[n] + k - start
-        segment = segment_of(local, rows)
-        held.node[lane, s, k, j] = row_of(local, segment, rows) * WIDTH + segment
+    for p in range(along.first.shape[1]):
+        for k in range(4):
+            local = along.first[n, p] + k - start
+            segment = segment_of(local, rows)
+            row = along.wire[n] * (rows + 2 * PAD) + row_of(local, segment, rows)
+            held.node[lane, s, 4 * p + k, j] = row * WIDTH + segment
     new = held.number[lane, slot] != n
     if new:
         held.number[lane, slot] = n
@@ -187,12 +256,12 @@ def _enter(along, held, lane, n, start, rows):
 
 
 @inlined
-def _rest(line, wire, lane, n):
-    """Put link n at rest in its slot."""
-    sets, first, row = wire.scattered.links.node.shape[1], line.link_row.size, own_row(line.link_static, lane)
-    slot = n % wire.scattered.links.number.shape[1]
+def _rest(line, wire, lane, along, held, n, first):
+    """Put link n of those whose sets begin with ``first`` at rest in its slot."""
+    sets, row, number = held.node.shape[1], own_row(line.link_static, lane), along.number[n] & NOT_NEGATIVE
+    slot = n % held.number.shape[1]
     s, j = first + slot % sets, slot // sets
-    wire.static[lane, s, j] = line.link_static[row, n]
-    wire.gap[lane, s, j] = line.link_gap[row, n]
-    wire.extension[lane, s, j] = 0.0 - line.link_gap[row, n]
+    wire.static[lane, s, j] = line.link_static[row, number]
+    wire.gap[lane, s, j] = line.link_gap[row, number]
+    wire.extension[lane, s, j] = 0.0 - line.link_gap[row, number]
     wire.change[lane, s, j] = 0.0

@@ -26,6 +26,25 @@ class LinkRow(IntEnum):
     ROOM = 16  # designed distance of its ends (m)
 
 
+class HungRow(IntEnum):
+    """Constants of a dropper on a stitch wire; from ``LinkRow.EARLY`` on as those of any dropper."""
+
+    WEIGHT = 0  # of the four nodes on the contact wire
+    UPPER = 4  # of the two nodes on the stitch wire
+    MOVE = 6  # displacement of the four nodes in a step by 1 N (m/N)
+    MOVE_UPPER = 10  # of the two
+
+
+class StitchRow(IntEnum):
+    """Constants of a stitch wire."""
+
+    WEIGHT = 0  # of the messenger's four nodes about the first clamp, then about the second one
+    MOVE = 8  # displacement of these nodes in a step by 1 N (m/N)
+    NEAR = 16  # weight of a neighbouring node in a node's step (-)
+    PULL = 17  # tension over spacing (N/m)
+    INERTIA = 18  # of each node: bare wire's mass over the node's
+
+
 class MastRow(IntEnum):
     """Constants of the steady arm and the messenger's support at a mast."""
 
@@ -42,13 +61,18 @@ class SpringRow(IntEnum):
 
 
 LINK, MAST, SPRING = constants(LinkRow), constants(MastRow), constants(SpringRow)
+HUNG, STITCH = constants(HungRow), constants(StitchRow)
 LINK_ROWS, MAST_ROWS = 17, 18
 
 
 class AlongLine(NamedTuple):
     """Things attached along the whole line, in their order."""
 
-    first: Index  # (things,): number of the first of four nodes, from the line's start
+    first: Index  # (things, places): number of the first of four nodes at each, from the line's start
+    leaves: Index  # (things,): first of the nodes that must be within a window
+    enters: Index  # (things,): last one
+    number: Index  # (things,): along the line, of its kind
+    wire: Index  # (things,): of the contact wire on which, or over which, it hangs
     constants: Array  # (things, rows)
     empty: Array  # (rows,): of a slot that holds none, which then has no effect
 
@@ -58,7 +82,9 @@ class InWindow(NamedTuple):
 
     begin: Index  # (lanes,): number of the first thing
     number: Index  # (lanes, sets times WIDTH): of the thing in each slot; -1 for none
-    node: Index  # (lanes, sets, 4, WIDTH): its nodes, each as row times WIDTH plus segment
+    # Its nodes on the contact wire, each as row times WIDTH plus segment, behind those of the wires before;
+    # the nodes on the messenger beside them are one wire further.
+    node: Index  # (lanes, sets, nodes, WIDTH)
     constants: Array  # (lanes, sets, rows, WIDTH)
 
 
@@ -68,7 +94,13 @@ class Scattered(NamedTuple):
     inertia: Array  # (wires, nodes): bare wire's mass over that of the node; no nodes where all are 1
     mobility: Array  # (wires, nodes): displacement in a step by 1 N (m/N); the first node is -PAD
     masts: AlongLine
-    links: AlongLine
+    links: AlongLine  # droppers on the messenger
+    hung: AlongLine  # droppers on stitch wires
+    stitches: AlongLine
+    upper: Index  # (hung,): node of the stitch wire before the upper end
+    carrying: Index  # (hung,): number of the stitch wire
+    deficit: Array  # (pairs, nodes): weight in a node's step of a messenger's slope from the node before, by
+    # the tension that stitch wires take from it (-); none without them
     stiff_arms: bool  # whether any steady arm is a spring
 
 
@@ -77,3 +109,12 @@ class ScatteredWindow(NamedTuple):
 
     masts: InWindow
     links: InWindow
+    hung: InWindow
+    stitches: InWindow
+    # Of messengers, as ``Scattered`` has it, and a node's step by it; no pairs without stitch wires.
+    deficit: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH)
+    missing: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH): scratch (m)
+    # Nodes of stitch wires, from clamp to clamp, those of set after set.
+    displacement: Array  # (lanes, sets times nodes, WIDTH): m
+    increment: Array  # (lanes, sets times nodes, WIDTH): m
+    clamp_force: Array  # (lanes, 2 sets, WIDTH): up on the messenger, scratch (N)

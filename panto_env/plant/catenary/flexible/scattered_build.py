@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ....backend import WIDTH, bind, pack
 from ....base.arrays import Array, Index
-from .arrays import FlexibleLine, FlexibleWire
+from .arrays import LOWER, MESSENGER, PAD, FlexibleLine, FlexibleWire
 from .on_grid import OnGrid
 from .scattered import take_start
 from .scattered_arrays import (
+    HUNG,
     LINK,
     LINK_ROWS,
     MAST_ROWS,
+    STITCH,
     AlongLine,
     InWindow,
     Scattered,
@@ -22,21 +25,30 @@ from .scattered_arrays import (
 )
 
 NODES = 4
+HUNG_NODES = NODES + 2
+"""Nodes of a dropper on a stitch wire."""
 
 
 def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     """What is attached along a whole line on its grid; None where spans are alike: nothing is scattered."""
-    masts, links = np.zeros(MAST_ROWS), np.zeros(LINK_ROWS)
+    masts, links = np.zeros(MAST_ROWS, real), np.zeros(LINK_ROWS, real)
     links[[LINK.YIELD, LINK.STIFFNESS, LINK.ROOM]] = 1.0  # a slot without a link has none that could be slack
     if grid is None:
-        none = np.zeros(0, dtype=np.int64)
-        bare = np.zeros((2, 0))
+        none, bare = np.zeros(0, dtype=np.int64), np.zeros((2, 0))
+        without = [
+            _along(none[:, None], np.zeros((0, len(empty))), empty, none, none) for empty in (masts, links)
+        ]
         return Scattered(
-            bare.astype(real),
-            bare,
-            AlongLine(none, np.zeros((0, MAST_ROWS), real), masts.astype(real)),
-            AlongLine(none, np.zeros((0, LINK_ROWS), real), links.astype(real)),
-            False,
+            inertia=bare.astype(real),
+            mobility=bare,
+            masts=without[0],
+            links=without[1],
+            hung=without[1],
+            stitches=without[0],
+            upper=none,
+            carrying=none,
+            deficit=np.zeros((0, 0), real),
+            stiff_arms=False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
     at_links = grid.at_links
@@ -58,58 +70,169 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     pull = levels / (1 + levels[:, :1] * yielding)
     of_springs = np.concatenate([mobility * weights, pull], axis=1)
     of_masts = np.concatenate([weights[::2], of_springs[::2], of_springs[1::2]], axis=1)
+    ropes, hung = grid.ropes, np.flatnonzero(grid.links.stitch >= 0)
+    on_messenger = np.flatnonzero(grid.links.stitch < 0)
+    hung, on_messenger = (
+        each[np.argsort(at_links.first[each], kind="stable")] for each in (hung, on_messenger)
+    )
+    carrying = grid.links.stitch[hung]
+    stitches = _stitches(grid, real)
+    of_links[hung, HUNG.UPPER : HUNG.MOVE] = ropes.shares[hung]
+    of_links[hung, HUNG.MOVE : LINK.EARLY] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
+    at_hung = at_links.first[hung]
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
         mobility=grid.mobility,
-        masts=AlongLine(first[::2].copy(), of_masts.astype(real), masts.astype(real)),
-        links=AlongLine(at_links.first, of_links.astype(real), links.astype(real)),
+        masts=_along(first[::2, None], of_masts, masts, grid.springs.wire[pairs][::2], grid.springs.number),
+        links=_along(
+            at_links.first[on_messenger, None],
+            of_links[on_messenger],
+            links,
+            grid.links.wires[on_messenger, LOWER],
+            on_messenger,
+        ),
+        # A dropper on a stitch wire needs it in the window.
+        hung=_along(
+            at_hung[:, None],
+            of_links[hung],
+            links,
+            grid.links.wires[hung, LOWER],
+            hung,
+            leaves=np.minimum(at_hung, stitches.leaves[carrying]),
+            enters=np.maximum(at_hung + NODES - 1, stitches.enters[carrying]),
+        ),
+        stitches=stitches,
+        upper=ropes.node[hung],
+        carrying=carrying,
+        deficit=_deficit(grid, real),
         stiff_arms=bool(levels[::2].any()),
     )
 
 
-def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
-    """Room for what is in a window at any of its places along the line."""
-    return ScatteredWindow(
-        masts=_room(line, line.scattered.masts, lanes), links=_room(line, line.scattered.links, lanes)
+def _along(
+    first: Index,
+    rows: Array,
+    empty: Array,
+    wire: Index,
+    number: Index,
+    leaves: Index | None = None,
+    enters: Index | None = None,
+) -> AlongLine:
+    """Things in their order along the line, in the precision of ``empty``; they need their nodes at least."""
+    begin = first[:, 0] if leaves is None else leaves
+    end = first[:, -1] + NODES - 1 if enters is None else enters
+    return AlongLine(
+        first=np.ascontiguousarray(first),
+        # A thing never leaves or enters before the one that comes before it.
+        leaves=np.minimum.accumulate(begin[::-1])[::-1].copy(),
+        enters=np.maximum.accumulate(end),
+        number=number.copy(),
+        wire=wire.copy(),
+        constants=np.ascontiguousarray(rows, dtype=empty.dtype),
+        empty=empty,
     )
 
 
-def _room(line: FlexibleLine, along: AlongLine, lanes: int) -> InWindow:
-    sets = _sets(line, along.first)
+def _stitches(grid: OnGrid, real: Any) -> AlongLine:
+    """Stitch wires along the line."""
+    ropes, count = grid.ropes, len(grid.ropes.spacing)
+    empty = np.zeros(STITCH.INERTIA + ropes.intervals + 1, real)
+    above = np.repeat(ropes.stitches.wire, 2)[:, None] + MESSENGER
+    move = grid.mobility[above, ropes.clamps.four] * ropes.clamps.weights
+    pull = ropes.stitches.tension / ropes.spacing
+    rows = np.concatenate(
+        [
+            ropes.clamps.weights.reshape(count, 2 * NODES),
+            move.reshape(count, 2 * NODES),
+            (pull * ropes.bare_mobility)[:, None],
+            pull[:, None],
+            ropes.inertia,
+        ],
+        axis=1,
+    )
+    return _along(ropes.clamps.first.reshape(count, 2), rows, empty, ropes.stitches.wire, np.arange(count))
+
+
+def _deficit(grid: OnGrid, real: Any) -> Array:
+    """Weights of slopes for the tension that stitch wires take from the messenger."""
+    missing = grid.ropes.deficit * grid.slope_mobility[MESSENGER::2]
+    return np.asarray(missing if grid.ropes.intervals else missing[:0], dtype=real)
+
+
+def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
+    """Room for what is in a window at any of its places along the line."""
+    along, real = line.scattered, line.stencil.dtype
+    stitches = _room(line, along.stitches, lanes, 2 * NODES)
+    sets = stitches.node.shape[1]
+    nodes = sets * (along.stitches.empty.size - STITCH.INERTIA)
+    pairs, rows = len(along.deficit), line.rows + 2 * PAD
+    return ScatteredWindow(
+        masts=_room(line, along.masts, lanes),
+        links=_room(line, along.links, lanes),
+        hung=_room(line, along.hung, lanes, HUNG_NODES),
+        stitches=stitches,
+        deficit=np.zeros((lanes, pairs, rows, WIDTH), real),
+        missing=np.zeros((lanes, pairs, rows, WIDTH), real),
+        displacement=np.zeros((lanes, nodes, WIDTH), real),
+        increment=np.zeros((lanes, nodes, WIDTH), real),
+        clamp_force=np.zeros((lanes, 2 * sets, WIDTH), real),
+    )
+
+
+def _room(line: FlexibleLine, along: AlongLine, lanes: int, nodes: int = NODES) -> InWindow:
+    sets = _sets(line, along)
     return InWindow(
         begin=np.zeros(lanes, dtype=np.int64),
         number=np.full((lanes, sets * WIDTH), -1, dtype=np.int64),
-        node=np.zeros((lanes, sets, NODES, WIDTH), dtype=np.int32),
+        node=np.zeros((lanes, sets, nodes, WIDTH), dtype=np.int32),
         constants=np.tile(along.empty[:, None], (lanes, sets, 1, WIDTH)),
     )
 
 
-def _sets(line: FlexibleLine, first: Index) -> int:
+def _sets(line: FlexibleLine, along: AlongLine) -> int:
     """Number of sets that hold all things of a window, and of which none has two things that share nodes."""
-    if not first.size:
+    if not along.first.size:
         return 0
     nodes = line.rows * WIDTH
     starts = nodes // line.window * np.arange(len(line.starts) - line.window)
-    most = (np.searchsorted(first, starts + nodes) - np.searchsorted(first, starts)).max() + 2  # at anchors
-    sets = int(-(-most // WIDTH))
-    while len(first) > sets and (first[sets:] - first[:-sets]).min() < NODES:
+    begin, end = along.leaves, along.enters - NODES + 1
+    most = (np.searchsorted(end, starts + nodes) - np.searchsorted(begin, starts)).max() + 2  # at anchors
+    sets, first, last = int(-(-most // WIDTH)), along.first[:, 0], along.first[:, -1]
+    while len(first) > sets and (first[sets:] - last[:-sets]).min() < NODES:
         sets += 1
     return sets
 
 
 def begin_window(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
     """Put what is in the first window into a lane, at rest."""
-    for held in wire.scattered:
+    own = wire.scattered
+    for held in (own.masts, own.links, own.hung, own.stitches):
         held.begin[lane] = 0
         held.number[lane] = -1
+    own.displacement[lane] = own.increment[lane] = 0.0
     bind(take_start, pack(line, wire), 0)(lane)
 
 
 def present(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, Array]:
     """Numbers of the links in a lane's window along the line, (links,), and their tension (N)."""
-    number = wire.scattered.links.number[lane]
-    slots = np.flatnonzero(number >= 0)
-    sets = wire.scattered.links.node.shape[1]
-    tension = (wire.static[lane] + wire.change[lane])[len(line.link_row) :][slots % sets, slots // sets]
-    order = np.argsort(number[slots])
-    return number[slots][order], tension[order]
+    numbers, tensions, first = [], [], len(line.link_row)
+    all_tensions, (along, held) = wire.static[lane] + wire.change[lane], (line.scattered, wire.scattered)
+    for things, here in ((along.links, held.links), (along.hung, held.hung)):
+        slots, sets = np.flatnonzero(here.number[lane] >= 0), here.node.shape[1]
+        numbers.append(things.number[here.number[lane][slots]])
+        tensions.append(all_tensions[first + slots % max(sets, 1), slots // max(sets, 1)])
+        first += sets
+    number, tension = np.concatenate(numbers), np.concatenate(tensions)
+    order = np.argsort(number)
+    return number[order], tension[order]
+
+
+def rope_nodes(line: FlexibleLine, wire: FlexibleWire, lane: int) -> Iterator[tuple[int, Array]]:
+    """Number of each stitch wire in a lane's window, and displacements of its nodes (m); 0 at its clamps."""
+    own = wire.scattered
+    sets = own.stitches.node.shape[1]
+    moved = own.displacement[lane] - 0.5 * own.increment[lane]
+    for slot in np.flatnonzero(own.stitches.number[lane] >= 0).tolist():
+        nodes = len(moved) // sets
+        number = int(own.stitches.number[lane, slot])
+        yield number, moved[slot % sets * nodes : (slot % sets + 1) * nodes, slot // sets]

@@ -13,8 +13,20 @@ from ....base.ranges import Between
 from ....base.settings import Settings
 from ...alignment import Alignment
 from ...numerics import Numerics, Runs
-from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Wire
-from .parts import CLOSEST, Droppers, Encumbrance, EndSupport, Span, SteadyArm, Support, check_inside
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
+from .parts import (
+    CLOSEST,
+    Conductor,
+    Droppers,
+    Encumbrance,
+    EndSupport,
+    Overlap,
+    Span,
+    SteadyArm,
+    StitchWire,
+    Support,
+    check_inside,
+)
 from .spans import laid_out, spans_of
 from .window import clear_spans, warn_if_short
 
@@ -23,13 +35,15 @@ __all__ = [
     "Droppers",
     "EndSupport",
     "FlexibleCatenaryData",
+    "Overlap",
     "Rayleigh",
     "Span",
     "SteadyArm",
+    "StitchWire",
     "Support",
 ]
 
-SEQUENCE = {"span_types", "sequence", "end_support"}
+SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}
 """Values of a line whose spans differ."""
 
 
@@ -49,16 +63,20 @@ class FlexibleCatenaryData(CatenaryData):
 
     kind: Literal["flexible"] = "flexible"
     encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
-    contact_wire: Wire
-    messenger_wire: Wire
+    contact_wire: Conductor
+    messenger_wire: Conductor
     droppers: Droppers
     support: Support
     steady_arm: SteadyArm
+    stitch_wire: StitchWire | None = Field(
+        None, description="at every support; without it all droppers hang from the messenger"
+    )
     damping: Rayleigh
     span_types: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
         description="types of spans by name: tables of what differs from the line's own span_length, "
-        "encumbrance, droppers, support and steady_arm, and contact_height at the span's first support",
+        "encumbrance, droppers, support, steady_arm and stitch_wire, and contact_height at the span's first "
+        "support",
     )
     sequence: tuple[str | dict[str, Any], ...] = Field(
         (),
@@ -67,6 +85,9 @@ class FlexibleCatenaryData(CatenaryData):
     )
     end_support: EndSupport | None = Field(
         None, description="heights at the last support of a sequence, by default those of its last span"
+    )
+    overlaps: tuple[Overlap, ...] = Field(
+        (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
 
     def __hash__(self) -> int:
@@ -94,12 +115,14 @@ class FlexibleCatenaryData(CatenaryData):
                 )
         line = handler(table)
         if not line.sequence:
-            if line.span_types or line.end_support is not None:
-                raise InputError("A line with span_types or an end_support needs a sequence of its spans.")
+            if line.span_types or line.end_support is not None or line.overlaps:
+                raise InputError(
+                    "A line with span_types, overlaps or an end_support needs a sequence of its spans."
+                )
             return line
         found = spans_of(line)
         alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
-        if not alike or len(set(found.encumbrances)) > 1:
+        if not alike or len(set(found.encumbrances)) > 1 or line.overlaps:
             return line
         names = (name for name in Span.model_fields if name != "contact_height")
         one = {name: getattr(found.each[0], name) for name in names}
@@ -143,6 +166,11 @@ class FlexibleCatenaryData(CatenaryData):
         return bool(self.sequence)
 
     @property
+    def one_by_one(self) -> bool:
+        """Whether what hangs on the wires is laid out on the grid one by one, not in equal rows."""
+        return bool(self.sequence) or self.stitch_wire is not None
+
+    @property
     def period(self) -> float:
         """Length after which the line as designed repeats (m): a span, or all of a sequence."""
         return self.alignment().length if self.sequence else self.span_length
@@ -153,17 +181,27 @@ class FlexibleCatenaryData(CatenaryData):
         return self.alignment().mean_length
 
     @property
-    def wires(self) -> tuple[Wire, Wire]:
+    def wires(self) -> tuple[Conductor, Conductor]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire
 
     def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
         """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
-        return clear_spans(self.wires, numerics, runs, last)
+        return clear_spans(self._wires_in(runs), numerics, runs, last)
 
     def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
         """Warn where a given window costs more than 1 % of the figures."""
-        warn_if_short(self.wires, numerics, runs)
+        warn_if_short(self._wires_in(runs), numerics, runs)
+
+    def _wires_in(self, runs: Runs) -> tuple[Conductor, Conductor]:
+        """The wires with their tension and ice in these runs: waves are faster in the cold."""
+        condition = runs.conditions[0]
+        if not (condition.temperature or condition.ice):
+            return self.wires
+        from .fixed_wires import tensions_of_fixed  # it imports this module
+        from .tension import with_tension_left
+
+        return with_tension_left(self, condition, tensions_of_fixed(self, condition)).wires
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.

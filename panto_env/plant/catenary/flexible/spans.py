@@ -82,12 +82,12 @@ def laid_out(droppers: Any, span_length: Any) -> Any:
     if "positions" in kept:
         if rule.keys() != {"pre_sag"}:
             raise InputError("Give the droppers either positions or a spacing, not both.")
-        depth = _valid(Spacing, {"spacing": span_length} | rule, "droppers").pre_sag
+        depth = valid(Spacing, {"spacing": span_length} | rule, "droppers").pre_sag
         given = kept["positions"] if isinstance(kept["positions"], list | tuple) else []
         if len(given) > 1 and all(isinstance(x, int | float) for x in given) and given[0] < given[-1]:
             return kept | {"sag": parabola(np.array(given), depth).tolist()}
         return kept | {"sag": [depth] * len(given)}  # of one dropper, or of positions that the schema refuses
-    found = _valid(Spacing, rule, "droppers")
+    found = valid(Spacing, rule, "droppers")
     first = found.spacing / 2 if found.first is None else found.first
     if 2 * first >= span_length:
         raise InputError(
@@ -116,6 +116,8 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
         "support": line.support.model_dump(),
         "steady_arm": line.steady_arm.model_dump(),
     }
+    if line.stitch_wire is not None:
+        own["stitch_wire"] = line.stitch_wire.model_dump()
     types = {
         name: _changed(own, changes, f"type '{name}' in span_types")
         for name, changes in line.span_types.items()
@@ -150,12 +152,12 @@ def _changed(own: Table, changes: Any, where: str) -> Span:
     if not isinstance(changes, Mapping):
         raise InputError(f"The {where} must be a table of a span's values.")
     table = {**own, **changes}
-    for key in ("support", "steady_arm"):
+    for key in ("support", "steady_arm", "stitch_wire"):
         if isinstance(changes.get(key), Mapping):
-            table[key] = {**own[key], **changes[key]}
+            table[key] = {**own.get(key, {}), **changes[key]}
     try:
         table["droppers"] = _droppers(own, changes.get("droppers", {}), table["span_length"])
-        return _valid(Span, table, "")
+        return valid(Span, table, "")
     except InputError as error:
         raise InputError(f"The {where} is not valid: {error}") from error
 
@@ -196,7 +198,8 @@ def _is_length(value: Any) -> bool:
     return isinstance(value, int | float) and SHORTEST_SPAN <= value <= LONGEST_SPAN
 
 
-def _valid(schema: type[S], table: Table, where: str) -> S:
+def valid(schema: type[S], table: Table, where: str) -> S:
+    """Settings from a table. Raises InputError, which begins with ``where``, for one that is not valid."""
     try:
         return schema.model_validate(table)
     except ValidationError as error:

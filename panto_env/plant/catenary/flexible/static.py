@@ -16,10 +16,13 @@ from ....base.errors import InputError
 from ....base.remember import remembered
 from ....base.shown import beside
 from .beams import GRAVITY, PeriodicWire
+from .overlaps import joined, tension_lengths
 from .parts import Span
 from .schema import FlexibleCatenaryData
 from .shape import StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
+from .stitched_static import StitchedMessenger
+from .stitches import stitches_of
 from .whole_line import settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
@@ -46,6 +49,8 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
     height 0 and yields under the load. Raises InputError where no shape is found. The shape may be one that
     no line can have, such as with a dropper that pushes; ``hang`` refuses that.
     """
+    if line.overlaps:
+        return joined(line, [solve(part.line) for part in tension_lengths(line)])
     with np.errstate(over="ignore", invalid="ignore"):
         return settle_line(line) if line.sequence else _settle(line)
 
@@ -58,6 +63,10 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
     the support, where it can't.
     """
     shape = solve(line)
+    if line.overlaps:
+        for part in tension_lengths(line):
+            hang(part.line)
+        return shape
     _check_supports(line, shape)
     for each in _each(line):
         _check_droppers(each, shape)
@@ -170,6 +179,7 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
     if line.steady_arm.holds_wire:
         held, heights = np.append(hung, support), np.append(heights, 0.0)
     lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
+    stitched = _stitched(line, x)
     contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
     lift, arm_force = lifts[: len(x)], float(lifts[len(x) :].sum())
 
@@ -177,6 +187,9 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
         dropper_mass = droppers.mass * length
         tension = lift + GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
         pulled = tension + GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
+        if stitched is not None:
+            above = stitched.hang(np.array([line.encumbrance]), -pulled)
+            return unloaded(droppers, above[stitched.tops] + sag, tension), (above, tension, dropper_mass)
         carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
         top = np.array([line.encumbrance - carried / line.support.stiffness])
         above, _ = upper.hang(top, np.append(0.0, -pulled))
@@ -185,5 +198,30 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
     length, (above, tension, mass) = settled(line.name, np.full(len(x), line.encumbrance), cut)
     stiffness = stiffness_of(droppers, length)
     return StaticShape(
-        lower.profile(contact), upper.profile(above), arm_force, tension, length, stiffness, mass
+        lower.profile(contact),
+        upper.profile(above) if stitched is None else stitched.profile(above),
+        arm_force,
+        tension,
+        length,
+        stiffness,
+        mass,
+        ropes=() if stitched is None else stitched.shapes(above),
+    )
+
+
+def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
+    """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
+    found = stitches_of(line, 1)
+    if not len(found.support):
+        return None
+    at_start = found.some(slice(1), np.minimum(found.carrying, 0))
+    half = line.span_length / 2
+    return StitchedMessenger(
+        line.messenger_wire,
+        at_start,
+        np.where(x > half, x - line.span_length, x),
+        np.zeros(1),
+        np.array([line.support.stiffness]),
+        (-half, half),
+        None,
     )

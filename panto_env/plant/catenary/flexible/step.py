@@ -18,12 +18,13 @@ from ..protocol import (
     apply_force,
     end_step,
     ending_by_wire,
+    has_second_wire,
     look_at_contact,
     place_contact,
     record_wire,
     rise_at_contact,
 )
-from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
+from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
 from .links import difference, follow_links, measure_extensions, pull_links
 from .scattered import (
     apply_masts,
@@ -36,6 +37,7 @@ from .scattered import (
 )
 from .scattered_arrays import LINK
 from .segments import shift_nodes
+from .stitched import advance_stitches, pull_messenger, stretch_of_hung
 from .wires import (
     apply_springs,
     deflection,
@@ -71,25 +73,47 @@ def follow(line, wire, lane, x):
 
 
 @inlined
-def unmoved_height(line, lane, x):
-    """Height (m) of the contact wire at rest at x (m)."""
-    height = static_height(line.shape[own_row(line.shape, lane)], line.shape_length, x)
-    if line.rise.shape[1] > 0:
-        row = own_row(line.rise, lane)
-        height += rise_by_defects(line.rise[row], line.rise_breaks, line.rise_decay[row], x)
+def unmoved_height(line, lane, pair, x):
+    """Height (m) of a pair's contact wire at rest at x (m)."""
+    if pair > 0:
+        return height_at_rest(line, line.beside, lane, x)
+    return height_at_rest(line, line, lane, x)
+
+
+@inlined
+def height_at_rest(line, tables, lane, x):
+    """Height (m) at rest at x (m) by the tables of the line or of its second pair of wires."""
+    height = static_height(tables.shape[own_row(tables.shape, lane)], line.shape_length, x)
+    if tables.rise.shape[1] > 0:
+        row = own_row(tables.rise, lane)
+        height += rise_by_defects(tables.rise[row], tables.rise_breaks, line.rise_decay[row], x)
     return height
+
+
+@inlined
+def pair_of(line, wire, contact):
+    """Pair of wires that a contact point is on."""
+    if line.pairs > 1 and 2 * contact >= wire.contact_row.shape[1]:
+        return 1
+    return 0
+
+
+@implements(has_second_wire, FlexibleLine)
+def _has_second_wire(line):
+    return line.pairs > 1
 
 
 @implements(place_contact, FlexibleLine)
 def _place(line, wire, lane, contact, x):
     if contact == 0:
         follow(line, wire, lane, x)
-    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    pair = pair_of(line, wire, contact)
+    u, d = wire.displacement[lane, 2 * pair], wire.increment[lane, 2 * pair]
     row, segment, weight = locate(x - window_start(line, wire, lane), line.spacing, line.rows)
     wire.contact_row[lane, contact], wire.contact_segment[lane, contact] = row, segment
     for k in range(4):
         wire.contact_weight[lane, contact, k] = weight[k]
-    height = unmoved_height(line, lane, x)
+    height = unmoved_height(line, lane, pair, x)
     wire.unmoved_height[lane, contact] = height
     before = height + deflection(u, d, row, segment, weight, 0.5)
     return before, height + deflection(u, d, row, segment, weight, 0.0)
@@ -98,13 +122,15 @@ def _place(line, wire, lane, contact, x):
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
     u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
-    masts, springs = wire.scattered.masts, line.spring_row.size
+    held, masts, springs = wire.scattered, wire.scattered.masts, line.spring_row.size
     keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
     keep_past_of_masts(line.scattered, masts, lane, d, spring_past, springs)
     measure_extensions(line, wire, lane)
     stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
+    advance_stitches(held, lane, u, d, stencil[MESSENGER])
     for w in range(u.shape[0]):
         leapfrog(u[w], d[w], inertia[w], stencil[w])
+    pull_messenger(held, lane, u, d, inertia)
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
     pull_links(line, wire, lane)
@@ -112,21 +138,23 @@ def _advance(line, wire, lane):
 
 @implements(rise_at_contact, FlexibleLine)
 def _rise(line, wire, lane, contact, x0, x1):
-    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    pair = pair_of(line, wire, contact)
+    u, d = wire.displacement[lane, 2 * pair], wire.increment[lane, 2 * pair]
     start, rows = window_start(line, wire, lane), line.rows
     row_0, segment_0, weight_0 = locate(x0 - start, line.spacing, rows)
     row_1, segment_1, weight_1 = locate(x1 - start, line.spacing, rows)
     before = deflection(u, d, row_0, segment_0, weight_0, 1.0)
     deflected = deflection(u, d, row_1, segment_1, weight_1, 1.0) - before
-    return unmoved_height(line, lane, x1) - unmoved_height(line, lane, x0) + deflected
+    return unmoved_height(line, lane, pair, x1) - unmoved_height(line, lane, pair, x0) + deflected
 
 
 @implements(look_at_contact, FlexibleLine)
 def _look(line, wire, lane, contact, x):
-    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    contact_wire = 2 * pair_of(line, wire, contact)
+    u, d = wire.displacement[lane, contact_wire], wire.increment[lane, contact_wire]
     row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
     weight = wire.contact_weight[lane, contact]
-    mobility = wire.mobility[own_row(wire.mobility, lane), CONTACT]
+    mobility = wire.mobility[own_row(wire.mobility, lane), contact_wire]
     compliance = 0.5 * yield_of_place(mobility, row, segment, weight)
     height = wire.unmoved_height[lane, contact] + deflection(u, d, row, segment, weight, 0.5)
     return height, compliance, 0.0, 0.0
@@ -134,10 +162,11 @@ def _look(line, wire, lane, contact, x):
 
 @implements(apply_force, FlexibleLine)
 def _apply(line, wire, lane, contact, x, force):
-    u, d = wire.displacement[lane, CONTACT], wire.increment[lane, CONTACT]
+    contact_wire = 2 * pair_of(line, wire, contact)
+    u, d = wire.displacement[lane, contact_wire], wire.increment[lane, contact_wire]
     row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
     weight = wire.contact_weight[lane, contact]
-    mobility = wire.mobility[own_row(wire.mobility, lane), CONTACT]
+    mobility = wire.mobility[own_row(wire.mobility, lane), contact_wire]
     move_place(u, d, mobility, row, segment, weight, force)
 
 
@@ -161,9 +190,9 @@ def _ending(line, wire, lane):
     masts, links = wire.scattered.masts, wire.scattered.links
     for s in range(masts.node.shape[1]):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        over = displacement_at(u[CONTACT], node, table) > line.free_uplift
+        over = displacement_at(u, node, table) > line.free_uplift
         if any_of(over):
-            moving = displacement_at(d[CONTACT], node, table)
+            moving = displacement_at(d, node, table)
             quickest = choose(over, larger(moving, -moving), 0.0 * moving)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.STOP
     # The wires are nearest to each other at a dropper: between two, the contact wire sags.
@@ -181,6 +210,16 @@ def _ending(line, wire, lane):
         touching = stretch_at(u, node, table) < -load_row(table, LINK.ROOM)
         if any_of(touching):
             closing = stretch_at(d, node, table)
+            quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
+            return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
+    hung = wire.scattered.hung
+    for s in range(hung.node.shape[1]):
+        node, table = hung.node[lane, s], hung.constants[lane, s]
+        touching = stretch_of_hung(u, wire.scattered.displacement[lane], node, table) < -load_row(
+            table, LINK.ROOM
+        )
+        if any_of(touching):
+            closing = stretch_of_hung(d, wire.scattered.increment[lane], node, table)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     return ENDING.NONE

@@ -1,7 +1,8 @@
-"""A line under another tension than the one it was designed for.
+"""A line whose wires have another tension, or another mass, than those that it was designed for.
 
-Its droppers and steady arms were cut and set for the design's tension. A line designed for the remaining
-tension would have other droppers: the real ones are too long or too short by the difference.
+Its droppers and steady arms were cut and set for the design's wires. A line designed for the tension that is
+left, and for wires with ice, would have other droppers: the real ones are too long or too short by the
+difference.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ from ....base.arrays import Array
 from ....base.remember import remembered
 from ...line_condition import LineCondition
 from .beams import GRAVITY
+from .overlaps import joined, tension_lengths
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 from .static import StaticShape, solve
 
 
 class Misfit(NamedTuple):
-    """Differences of a line that has lost tension from one that was designed for the remaining tension."""
+    """Differences of a line that has lost tension, or bears ice, from one that was designed for that."""
 
     too_long: Array  # (droppers of the spans that repeat,): excess length of the droppers (m)
     lighter: Array  # (droppers,): missing weight of each half of a dropper (N)
@@ -31,7 +33,7 @@ class Misfit(NamedTuple):
 def with_tension_left(
     data: FlexibleCatenaryData, condition: LineCondition, errors: tuple[float, float] = (1.0, 1.0)
 ) -> FlexibleCatenaryData:
-    """A line designed for the tension that remains in a condition; the same object where none is lost.
+    """A line designed for its wires' tension and mass in a condition; the same object where they are its own.
 
     errors: tension of contact and messenger wire, relative to the remaining one.
     """
@@ -41,16 +43,19 @@ def with_tension_left(
         "messenger_wire": (1 - condition.lost_messenger_tension) * messenger,
     }
     wires = {
-        name: wire.model_copy(update={"tension": share * wire.tension})
+        name: wire.model_copy(update={"tension": share * wire.tension, "mass": wire.mass + condition.ice})
         for name, share in left.items()
-        if share != 1 and (wire := getattr(data, name))
+        if (share != 1 or condition.ice) and (wire := getattr(data, name))
     }
     return data.model_copy(update=wires) if wires else data
 
 
 @remembered
 def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
-    """Static shape of a line for its remaining tension, with the mass and stiffness of the real droppers."""
+    """Static shape of a line for its wires as they are, with the mass and stiffness of the real droppers."""
+    if designed.overlaps:
+        both = zip(tension_lengths(designed), tension_lengths(left), strict=True)
+        return joined(left, [shape_left(own.line, now.line) for own, now in both])
     was = solve(designed)
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 

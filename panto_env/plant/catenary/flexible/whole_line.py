@@ -16,6 +16,8 @@ from .beams import GRAVITY, LongWire
 from .schema import FlexibleCatenaryData
 from .shape import StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
+from .stitched_static import StitchedMessenger
+from .stitches import stitches_of
 
 
 def settle_line(line: FlexibleCatenaryData) -> StaticShape:
@@ -45,10 +47,26 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     springs = np.zeros(len(breaks))
     springs[masts] = [span.support.stiffness for span in at_supports]
     springs[[0, -1]] /= 2
-    upper = LongWire(line.messenger_wire, breaks, _end_slopes(supports, tops), springs)
+    slopes, stitches = _end_slopes(supports, tops), stitches_of(line)
+    stitched = None
+    if len(stitches.support):
+        stitched = StitchedMessenger(
+            line.messenger_wire, stitches, x, supports, springs[masts], (0.0, float(supports[-1])), slopes
+        )
+    upper = LongWire(line.messenger_wire, breaks, slopes, springs)
     raised = np.zeros(len(breaks))
     raised[masts] = springs[masts] * tops
     no_nodes = np.zeros(0, dtype=np.int64)
+
+    def hang(pulled: Array) -> tuple[Array, Array]:
+        """Unknowns above droppers that pull down (N), and heights of the droppers' upper ends (m)."""
+        if stitched is not None:
+            above = stitched.hang(tops, -pulled)
+            return above, above[stitched.tops]
+        forces = raised.copy()
+        forces[hung] -= pulled
+        above, _ = upper.hang(no_nodes, np.zeros(0), forces)
+        return above, above[2 * hung]
 
     def of_droppers(key: str) -> Array:
         return np.repeat([getattr(span.droppers, key) for span in spans], counts)
@@ -59,10 +77,8 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     def cut(length: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         dropper_mass = per_length * length
         tension = lift + GRAVITY * (dropper_mass / 2 + below)
-        forces = raised.copy()
-        forces[hung] -= tension + GRAVITY * (dropper_mass / 2 + over)
-        above, _ = upper.hang(no_nodes, np.zeros(0), forces)
-        loaded = above[2 * hung] - lower_heights
+        above, ends = hang(tension + GRAVITY * (dropper_mass / 2 + over))
+        loaded = ends - lower_heights
         new = [unloaded(span.droppers, loaded[k], tension[k]) for span, k in zip(spans, own, strict=True)]
         return np.concatenate(new), (above, tension, dropper_mass)
 
@@ -71,13 +87,14 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     stiffness = [stiffness_of(span.droppers, length[k]) for span, k in zip(spans, own, strict=True)]
     return StaticShape(
         contact=lower.profile(contact),
-        messenger=upper.profile(above),
+        messenger=upper.profile(above) if stitched is None else stitched.profile(above, repeats=False),
         arm_force=lifts[len(x) :],
         dropper_tension=tension,
         dropper_length=length,
         dropper_stiffness=np.concatenate(stiffness),
         dropper_mass=mass,
         spans=len(spans),
+        ropes=() if stitched is None else stitched.shapes(above),
     )
 
 

@@ -40,7 +40,7 @@ class Stretch(NamedTuple):
 
     begin: float  # m
     end: float  # m
-    share: float  # worn share of the cross-section
+    share: float  # of the wire's mass, with ice, that is gone
     depth: float  # of wear (m)
 
 
@@ -52,6 +52,17 @@ class WireDefects(NamedTuple):
 
     def __bool__(self) -> bool:
         return bool(self.spots or self.stretches)
+
+    def within(self, begin: float, end: float) -> WireDefects:
+        """Those that begin from one position of the line up to before another (m); the end cuts stretches."""
+        return WireDefects(
+            tuple(spot for spot in self.spots if begin <= spot.position < end),
+            tuple(
+                stretch._replace(end=min(stretch.end, end))
+                for stretch in self.stretches
+                if begin <= stretch.begin < end
+            ),
+        )
 
     @property
     def lightest(self) -> float:
@@ -138,6 +149,8 @@ def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> 
         for span, offset, mass, stiffness in condition.hard_spots
     )
     stretches: list[Stretch] = []
+    wire = data.contact_wire
+    metal = wire.mass / (wire.mass + condition.ice)  # of the wire's mass, of which wear takes its share
     for span, offset, length, share in sorted(condition.worn_stretches):
         begin = position(span, offset)
         if stretches and begin < stretches[-1].end:
@@ -145,7 +158,7 @@ def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> 
                 "Worn stretches must not overlap: those that begin at "
                 f"{stretches[-1].begin:g} and {begin:g} m along the line do."
             )
-        stretches.append(Stretch(begin, begin + length, share, worn_depth(data.contact_wire, share)))
+        stretches.append(Stretch(begin, begin + length, share * metal, worn_depth(wire, share)))
     whole = alignment.length
     for spot in spots:
         if not 0 < spot.position < whole:

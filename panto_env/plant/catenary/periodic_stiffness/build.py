@@ -23,6 +23,7 @@ class PeriodicStiffness:
     """A massless spring with a stiffness that varies along the span; it needs no grid."""
 
     massless: bool = True
+    wires_per_collector: int = 1
     contact_gain: float = 0.0
     grid: Mapping[str, float] = {}
     wave_speed: float = np.inf  # no wave runs along a spring

@@ -46,6 +46,7 @@ class Rig:
     """A pantograph on a cylinder that follows a line's computed contact point."""
 
     massless = False
+    wires_per_collector = 1
     contact_gain = 0.0  # the cylinder does not respond to the force within a step
 
     def __init__(
@@ -61,12 +62,19 @@ class Rig:
         """Build the computed line, and the rig around it.
 
         Raises InputError where the line cannot be computed with these numerics, and for conditions with
-        irregularity, which the cylinder does not follow.
+        irregularity, which the cylinder does not follow, or with wind.
         """
         if any(condition.waves for condition in runs.conditions):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
                 "wire; use a line_condition without irregularity and wear, such as 'new'."
+            )
+        if any(condition.wind for condition in runs.conditions):
+            raise InputError(f"No wind blows on a rig; leave it out, or use another line than '{data.name}'.")
+        if getattr(data.line, "overlaps", ()):
+            raise InputError(
+                f"The cylinder of rig '{data.name}' follows one contact wire, and its line has overlaps of "
+                "two; take a line without them."
             )
         computer = data.computer
         interval = runs.whole_part(computer.interval)

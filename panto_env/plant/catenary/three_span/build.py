@@ -28,6 +28,7 @@ class ThreeSpan:
     """Paper 2's line; the wire has mass, but neither droppers nor an end."""
 
     massless: bool = False
+    wires_per_collector: int = 1
     grid: Mapping[str, float] = {}
     length: float = np.inf  # the line has no end
 

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.arrays import Array
+
 GRADIENTS = (
     (50.0, 25.0, 25.0),
     (60.0, 20.0, 10.0),
@@ -21,6 +27,15 @@ ROUNDING = 1e-6
 def gradient_limits(speed_kmh: float) -> tuple[float, float]:
     """Maximum gradient and maximum change of gradient (‰) for trains of a speed (km/h)."""
     return next(((most, change) for speed, most, change in GRADIENTS if speed_kmh <= speed), (0.0, 0.0))
+
+
+def gradients(heights: Sequence[float], supports: Sequence[float]) -> tuple[Array, Array]:
+    """Gradient of each span (‰), and its change at the span's first support (‰), 0 at the line's first one.
+
+    heights: of the contact wire at the supports (m), (spans + 1,). supports: their positions (m).
+    """
+    slopes = 1e3 * np.diff(heights) / np.diff(supports)
+    return slopes, np.diff(slopes, prepend=slopes[:1])
 
 
 def highest_speed(gradient: float, change: float) -> float:

@@ -1,0 +1,110 @@
+"""Tension of wires that are fixed at both ends, by temperature and by what they carry.
+
+Such a wire keeps its unstressed length but for its thermal expansion. It has to reach from anchor to anchor
+along its shape, whose slack is the mean of y'^2 / 2:
+
+    (T - T_0) / EA + alpha theta = slack - slack_0,
+
+with T_0 and slack_0 as built and theta the difference of temperature. For a wire that stays straight this is
+T = T_0 - EA alpha theta; for a parabola it is the usual equation of state of overhead lines.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import InputError
+from ....base.remember import remembered
+from ...line_condition import LineCondition
+from ..schema import LOWEST_TENSION
+from .defects import DefectiveLine
+from .schema import FlexibleCatenaryData
+from .stitches import stitches_of
+from .tension import shape_left, with_tension_left
+
+UNCHANGED = (1.0, 1.0)
+SPANS = 9
+"""Spans of a uniform line, of which the middle one is looked at: anchors are felt within two."""
+POINT_DISTANCE = 0.05
+"""Distance (m) of points between which a wire counts as straight."""
+
+
+def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
+    """Tensions of contact and messenger wire in a condition, relative to what they have lost or kept of the
+    design's; 1 for wires that are not fixed.
+
+    Raises InputError for a temperature where no wire is fixed, and where a fixed wire would have no tension.
+    """
+    fixed = [wire.axial_stiffness is not None for wire in data.wires]
+    if condition.temperature and not any(fixed):
+        raise InputError(
+            f"Temperature changes nothing on line '{data.name}', as weights keep the tension of both wires; "
+            "leave it out, or give a wire that is fixed at both ends its axial_stiffness."
+        )
+    if condition.ice and stitches_of(data).support.size:
+        raise InputError(
+            f"Line '{data.name}' has stitch wires, on which ice is not computed; leave it out, or take "
+            "stitch wires of length 0."
+        )
+    if not (any(fixed) and (condition.temperature or condition.ice)):
+        return UNCHANGED
+    if stitches_of(data).support.size or data.overlaps:
+        raise InputError(
+            f"Line '{data.name}' has stitch wires or overlaps, with which wires that are fixed at both ends "
+            "are not computed; leave out axial_stiffness, or ice and temperature."
+        )
+    names = ("lost_contact_tension", "lost_messenger_tension", "ice", "temperature")
+    return _solve(data, LineCondition(**{name: getattr(condition, name) for name in names}))
+
+
+@remembered
+def _solve(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
+    from scipy.optimize import root  # slow to import
+
+    without = condition.model_copy(update={"ice": 0.0, "temperature": 0.0})
+    begun = [wire.tension for wire in with_tension_left(data, without).wires]
+    fixed = [k for k, wire in enumerate(data.wires) if wire.axial_stiffness is not None]
+    before = _slack(data, without, UNCHANGED)
+
+    def factors(shares: Array) -> tuple[float, float]:
+        found = dict(zip(fixed, shares.tolist(), strict=True))
+        return found.get(0, 1.0), found.get(1, 1.0)
+
+    def excess(shares: Array) -> Array:
+        """By how much each fixed wire has too much tension for its length, relative to its tension."""
+        shares = np.maximum(shares, [LOWEST_TENSION / begun[k] for k in fixed])
+        slack = _slack(data, condition, factors(shares))
+        over = []
+        for k, share in zip(fixed, shares, strict=True):
+            wire, stretch = data.wires[k], float(data.wires[k].axial_stiffness or 0.0) / begun[k]
+            longer = slack[k] - before[k] - wire.expansion * condition.temperature
+            over.append(share - 1 - stretch * longer)
+        return np.array(over)
+
+    result = root(excess, np.ones(len(fixed)), tol=1e-10)
+    low = [k for k, share in zip(fixed, result.x, strict=True) if share * begun[k] <= LOWEST_TENSION]
+    if low or not result.success:
+        name = "contact" if low == [0] else "messenger"
+        raise InputError(
+            f"At {condition.temperature:+g} K the {name} wire of line '{data.name}', fixed at both ends, "
+            "would have no tension; take a smaller difference of temperature, or a softer axial_stiffness."
+        )
+    return factors(result.x)
+
+
+def _slack(data: FlexibleCatenaryData, condition: LineCondition, tensions: tuple[float, float]) -> Array:
+    """Slack of contact and messenger wire with these tensions, (2,): by how much they are longer than the
+    line.
+    """
+    spans = data.spans if data.sequence else SPANS
+    left = with_tension_left(data, condition, tensions)
+    shape = shape_left(data, left)
+    line = DefectiveLine(data, spans, condition, tensions)
+    rises = line.rises(line.solve())
+    begin, end = (0.0, data.period) if data.sequence else data.alignment(spans).limits((SPANS // 2 + 1,) * 2)
+    x = np.linspace(begin, end, int((end - begin) / POINT_DISTANCE) + 1)[:-1]
+    step = x[1] - x[0]
+    wires = (shape.contact, shape.messenger)
+    heights = [wire.height(x) + rise.height(x) for wire, rise in zip(wires, rises, strict=True)]
+    return np.array([float(np.mean(np.diff(each) ** 2)) / (2 * step**2) for each in heights])

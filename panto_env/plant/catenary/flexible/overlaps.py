@@ -1,0 +1,230 @@
+"""Tension lengths of a line: pairs of wires from anchor to anchor, two of them side by side in each overlap.
+
+Each is a line of its own: spans with heights of their own, its static shape, its defects. The wires of every
+second tension length form one pair of wires on the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....base.arrays import Array, Index
+from ....base.errors import InputError
+from ....base.remember import remembered
+from ..schema import FEWEST_SPANS
+from .beams import Profile
+from .parts import Overlap, Span
+from .schema import FlexibleCatenaryData
+from .shape import InUse, Rope, StaticShape
+from .spans import spans_of, valid
+
+FAR = 100.0
+"""Height (m) at which a wire counts that is not there: no pantograph reaches it."""
+
+
+class TensionLength(NamedTuple):
+    """One pair of wires; a line without overlaps has only one, which is the line itself."""
+
+    line: FlexibleCatenaryData  # of its spans alone
+    first_span: int  # number of its first span along the line, from 0
+    spans: int
+    begin: float  # where its anchors are (m)
+    end: float
+    in_use: tuple[float, float]  # between which trains run on it: middles of overlaps, ends of the line (m)
+    droppers: Index  # numbers along the line of its droppers, in their order
+    pair: int  # of wires on the grid, 0 or 1
+
+    @property
+    def wire(self) -> int:
+        """Number of its contact wire on the grid; the messenger's is the next one."""
+        return 2 * self.pair
+
+
+@remembered
+def tension_lengths(line: FlexibleCatenaryData, spans: int | None = None) -> tuple[TensionLength, ...]:
+    """The tension lengths of a line of its own sequence, or of a number of equal spans, in their order.
+
+    Droppers of a line count span by span, in an overlap first those of the ending wires. Raises InputError,
+    naming the overlap, for one that the line has no room for.
+    """
+    each, heights, _ = spans_of(line, spans)
+    counts = np.array([len(span.droppers.positions) for span in each])
+    supports = line.alignment(len(each)).supports
+    if not line.overlaps:
+        end = supports[-1]
+        return (TensionLength(line, 0, len(each), 0.0, end, (0.0, end), np.arange(counts.sum()), 0),)
+    _check(line, len(each))
+    begins = [0, *(overlap.first_span - 1 for overlap in line.overlaps)]
+    ends = [*(overlap.first_span - 1 + overlap.spans for overlap in line.overlaps), len(each)]
+    middles = [_middle(overlap, supports) for overlap in line.overlaps]
+    # In an overlap twice as many droppers, the first half of which are the ending wires'.
+    doubled = np.ones(len(each), dtype=np.int64)
+    for overlap in line.overlaps:
+        doubled[overlap.first_span - 1 : overlap.first_span - 1 + overlap.spans] = 2
+    firsts = np.append(0, np.cumsum(counts * doubled))
+    found = []
+    for k, (first, last) in enumerate(zip(begins, ends, strict=True)):
+        entering = line.overlaps[k - 1] if k else None
+        leaving = line.overlaps[k] if k < len(line.overlaps) else None
+        second = [entering is not None and span < first + entering.spans for span in range(first, last)]
+        droppers = [
+            firsts[span] + later * counts[span] + np.arange(counts[span])
+            for span, later in zip(range(first, last), second, strict=True)
+        ]
+        found.append(
+            TensionLength(
+                _own_line(line, k, first, last, heights, entering, leaving),
+                first,
+                last - first,
+                supports[first],
+                supports[last],
+                (middles[k - 1] if k else 0.0, middles[k] if k < len(middles) else supports[-1]),
+                np.concatenate(droppers),
+                k % 2,
+            )
+        )
+    return tuple(found)
+
+
+def pairs_of(line: FlexibleCatenaryData) -> int:
+    """Number of pairs of wires on the grid: 2 where any wires overlap."""
+    return 2 if line.overlaps else 1
+
+
+def _middle(overlap: Overlap, supports: tuple[float, ...]) -> float:
+    """Middle of an overlap's middle span (m): there trains pass from one wire to the other."""
+    span = overlap.first_span - 1 + overlap.spans // 2
+    return (supports[span] + supports[span + 1]) / 2
+
+
+def _check(line: FlexibleCatenaryData, spans: int) -> None:
+    """Raise InputError for overlaps that do not lie one after the other within the line."""
+    free = 1  # first span that the wires of a further overlap may begin in
+    for number, overlap in enumerate(line.overlaps, start=1):
+        first, last = overlap.first_span, overlap.first_span + overlap.spans - 1
+        where = f"Overlap {number} of line '{line.name}', over span{'s' if last > first else ''} {first}"
+        where += f" to {last}," if last > first else ","
+        if first < free or last > spans:
+            raise InputError(
+                f"{where} must lie within spans {free} to {spans}, after the one before it; change its "
+                "first_span."
+            )
+        length = last - (line.overlaps[number - 2].first_span if number > 1 else 1) + 1
+        if length < FEWEST_SPANS:
+            raise InputError(
+                f"{where} ends wires that reach over {length} spans, and {FEWEST_SPANS} are the least; "
+                "change its first_span."
+            )
+        middle = line.alignment().lengths[first - 1 + overlap.spans // 2]
+        if overlap.level >= middle:
+            raise InputError(
+                f"{where} has a level stretch of {overlap.level:g} m in a span of {middle:g} m; give less."
+            )
+        free = last + 1
+    if line.overlaps and spans - line.overlaps[-1].first_span + 1 < FEWEST_SPANS:
+        raise InputError(
+            f"The wires behind the last overlap of line '{line.name}' must reach over {FEWEST_SPANS} spans "
+            "at least; change its first_span."
+        )
+
+
+def _own_line(
+    line: FlexibleCatenaryData,
+    number: int,
+    first: int,
+    last: int,
+    heights: tuple[float, ...],
+    entering: Overlap | None,
+    leaving: Overlap | None,
+) -> FlexibleCatenaryData:
+    """The line of one tension length, whose contact wire rises over the line's own in overlaps."""
+    each, _, encumbrances = spans_of(line)
+    rise = np.zeros(last - first + 1)  # at its supports
+    tables: list[dict[str, Any]] = [each[span].model_dump(exclude_none=True) for span in range(first, last)]
+    if entering is not None:
+        count = len(entering.rises)
+        rise[:count] = entering.rises[::-1]
+        _rise(tables[count - 1], each[first + count - 1], entering, entering_wire=True)
+    if leaving is not None:
+        count = len(leaving.rises)
+        rise[-count:] = leaving.rises
+        _rise(tables[-count], each[last - count], leaving, entering_wire=False)
+    for k, table in enumerate(tables):
+        table["contact_height"] = heights[first + k] + float(rise[k])
+    changes = {
+        "name": f"{line.name}, tension length {number + 1}",
+        "sequence": tables,
+        "end_support": {
+            "encumbrance": encumbrances[last],
+            "contact_height": heights[last] + float(rise[-1]),
+        },
+    }
+    kept = line.model_dump(exclude={"sources", "spans", "span_types", "overlaps"}, exclude_none=True)
+    return valid(FlexibleCatenaryData, kept | changes, f"An overlap of line '{line.name}'")
+
+
+def _rise(table: dict[str, Any], span: Span, overlap: Overlap, entering_wire: bool) -> None:
+    """Give droppers of an overlap's middle span the sags with which the wire rises in a parabola."""
+    x, length, rise = np.array(span.droppers.positions), span.span_length, overlap.rises[0]
+    if entering_wire:
+        x = length - x
+    level = (length + overlap.level) / 2  # where it begins to rise
+    wanted = rise * (np.maximum(x - level, 0) / (length - level)) ** 2
+    table["droppers"]["sag"] = (np.array(span.droppers.sag) + rise * x / length - wanted).tolist()
+
+
+def joined(line: FlexibleCatenaryData, shapes: Sequence[StaticShape]) -> StaticShape:
+    """The static shape of a whole line, whose wires are those in use, from that of each tension length."""
+    parts = tension_lengths(line)
+    limits = np.array([part.in_use[0] for part in parts[1:]])
+    begins, whole = np.array([part.begin for part in parts]), (0.0, parts[-1].end)
+    count = sum(len(part.droppers) for part in parts)
+
+    def of_droppers(name: str) -> Array:
+        values = np.zeros(count)
+        for part, shape in zip(parts, shapes, strict=True):
+            values[part.droppers] = getattr(shape, name)
+        return values
+
+    return StaticShape(
+        contact=InUse(limits, begins, tuple(shape.contact for shape in shapes), whole),
+        messenger=InUse(limits, begins, tuple(shape.messenger for shape in shapes), whole),
+        arm_force=np.zeros(0),
+        dropper_tension=of_droppers("dropper_tension"),
+        dropper_length=of_droppers("dropper_length"),
+        dropper_stiffness=of_droppers("dropper_stiffness"),
+        dropper_mass=of_droppers("dropper_mass"),
+        spans=len(line.sequence),
+        ropes=tuple(
+            Rope(part.begin + rope.places, rope.heights, part.wire)
+            for part, shape in zip(parts, shapes, strict=True)
+            for rope in shape.ropes
+        ),
+    )
+
+
+def profiles(
+    line: FlexibleCatenaryData, shape: StaticShape, spans: int | None = None
+) -> list[tuple[TensionLength, Profile, Profile]]:
+    """Each tension length with its contact wire and its messenger at rest, along itself."""
+    parts = tension_lengths(line, spans)
+    if isinstance(shape.contact, InUse) and isinstance(shape.messenger, InUse):
+        return list(zip(parts, shape.contact.profiles, shape.messenger.profiles, strict=True))
+    assert isinstance(shape.contact, Profile)
+    assert isinstance(shape.messenger, Profile)
+    return [(parts[0], shape.contact, shape.messenger)]
+
+
+def heights_of_pair(line: FlexibleCatenaryData, shape: StaticShape, pair: int, x: Array) -> Array:
+    """Height of a pair's contact wire at positions x (m), (n,); ``FAR`` where it has none."""
+    if not line.overlaps:
+        return shape.contact.height(x)
+    found = np.full(len(x), FAR)
+    for part, profile, _ in profiles(line, shape):
+        if part.pair == pair:
+            ours = (x >= part.begin) & (x <= part.end)
+            found[ours] = profile.height(x[ours] - part.begin)
+    return found

@@ -1,0 +1,157 @@
+"""Present shape of a flexible line about a train, for pictures."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....base.arrays import Array, Index
+from ..view import LineView
+from .arrays import CONTACT, MESSENGER, PAD
+from .beams import Profile
+from .overlaps import FAR, profiles, tension_lengths
+from .scattered_build import present, rope_nodes
+from .segments import along
+from .shape import StaticShape
+from .stitches import moving_stitches
+
+if TYPE_CHECKING:
+    from .model import FlexibleCatenary
+
+VIEW_POINTS = 401
+"""Number of points of a span at which the messenger's height is kept for pictures."""
+NONE = np.zeros(0)
+
+
+def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> LineView:
+    """The line of a lane from begin to end (m), as far as it is computed there.
+
+    The contact wire's height is the one that the pantograph feels. The messenger's is without the static
+    effect of defective droppers and supports. In overlaps both are those of the wires in use.
+    """
+    line, wire, data = model.line, model.wire, model.data
+    moved = along(wire.displacement[lane] - 0.5 * wire.increment[lane])[:, PAD:-PAD]
+    x = wire.travelled[lane] * line.stride + line.spacing * np.arange(moved.shape[1])
+    inside = (x >= begin) & (x <= end)
+    x, moved = x[inside], moved[:, inside]
+    place = x if data.sequence else model.alignment.place(x)
+    shape = model.shape_of(lane)
+    contacts, messengers = [], []
+    for pair in range(line.pairs):
+        tables: Any = line.beside if pair else line
+        of_shape = np.linspace(0.0, line.shape_length, tables.shape.shape[1])
+        rest = np.interp(place, of_shape, tables.shape[min(lane, len(tables.shape) - 1)])
+        contacts.append(rest + _rise(line, tables, lane, x) + moved[2 * pair + CONTACT])
+        messengers.append(_messenger(model, shape, pair, x, place) + moved[2 * pair + MESSENGER])
+    used = np.zeros(len(x), dtype=int)
+    for part in tension_lengths(data) if line.pairs > 1 else ():
+        used[(x >= part.in_use[0]) & (x <= part.in_use[1])] = part.pair
+    ropes = _ropes(model, shape, lane, x, messengers)
+    number, tension = _links(model, lane)
+    droppers = model.droppers[number]
+    hanging = (droppers >= begin) & (droppers <= end)
+    number, droppers, tension = number[hanging], droppers[hanging], tension[hanging]
+    tops, bottoms = _ends(model, number, droppers, x, contacts, messengers, ropes)
+    here = np.arange(len(x))
+    further = [rope for rope in ropes.values() if rope[0][0] >= begin and rope[0][-1] <= end]
+    for pair in range(line.pairs) if line.pairs > 1 else ():
+        idle = (used != pair) & (contacts[pair] < FAR / 2)
+        further += [(x[idle], height[pair][idle]) for height in (contacts, messengers)]
+    return LineView(
+        x=x,
+        contact=np.array(contacts)[used, here] if len(x) else NONE,
+        messenger=np.array(messengers)[used, here] if len(x) else NONE,
+        supports=model.supports[(model.supports >= begin) & (model.supports <= end)],
+        droppers=droppers,
+        tops=tops,
+        bottoms=bottoms,
+        further=tuple(further),
+        slack=tension <= 0,
+    )
+
+
+def _links(model: FlexibleCatenary, lane: int) -> tuple[Index, Array]:
+    """Numbers of the droppers in a lane's window, (n,), in their order, and their tension (N)."""
+    line, wire = model.line, model.wire
+    if line.scattered.mobility.size:
+        return present(line, wire, lane)
+    links = line.link_set.size
+    first = int(wire.travelled[lane]) * (links // line.window)
+    tension = (wire.static[lane] + wire.change[lane])[line.link_set, line.link_segment]
+    return first + np.arange(links), tension
+
+
+def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
+    """Static change of a contact wire's height by defects (m), (n,), as ``rise_by_defects``."""
+    if not tables.rise.shape[1]:
+        return np.zeros(len(x))
+    row = min(lane, len(tables.rise) - 1)
+    return Profile(tables.rise_breaks, tables.rise[row], line.rise_decay[row]).height(x)
+
+
+def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
+    """Height of a pair's messenger at rest (m), (n,)."""
+    if model.data.overlaps:
+        found = np.full(len(x), FAR)
+        for part, _, profile in profiles(model.data, shape):
+            ours = (x >= part.begin) & (x <= part.end) & (part.pair == pair)
+            found[ours] = profile.height(x[ours] - part.begin)
+        return found
+    heights = messenger_heights(shape)
+    return np.interp(place, np.linspace(0.0, model.line.shape_length, len(heights)), heights)
+
+
+@lru_cache(maxsize=64)
+def messenger_heights(shape: StaticShape) -> Array:
+    """Height (m) of the messenger wire at even distances, ``VIEW_POINTS`` of them over one span."""
+    points = (VIEW_POINTS - 1) * shape.spans + 1
+    return np.asarray(shape.messenger.height(np.linspace(0.0, shape.messenger.breaks[-1], points)))
+
+
+def _ropes(
+    model: FlexibleCatenary, shape: StaticShape, lane: int, x: Array, messengers: list[Array]
+) -> dict[int, tuple[Array, Array]]:
+    """Places and heights (m) of the stitch wires in a lane's window, by their number along the line."""
+    stitches = moving_stitches(model.data, model.alignment.spans)
+    found: dict[int, tuple[Array, Array]] = {}
+    for k, moved in rope_nodes(model.line, model.wire, lane):
+        if not len(x) or stitches.begin[k] < x[0] or stitches.end[k] > x[-1]:
+            continue
+        places = np.linspace(stitches.begin[k], stitches.end[k], len(moved))
+        support = 0.0
+        if model.data.sequence:
+            own = [each for each in shape.ropes if each.wire == stitches.wire[k]]
+            rope = min(own, key=lambda each: float(np.abs(each.places[[0, -1]] - places[[0, -1]]).sum()))
+        else:
+            rope, support = shape.ropes[0], float((places[0] + places[-1]) / 2)
+        heights = np.interp(places - support, rope.places, rope.heights) + moved
+        messenger = messengers[stitches.wire[k] // 2]
+        heights[[0, -1]] = np.interp(places[[0, -1]], x, messenger)
+        found[k] = places, heights
+    return found
+
+
+def _ends(
+    model: FlexibleCatenary,
+    number: Index,
+    droppers: Array,
+    x: Array,
+    contacts: list[Array],
+    messengers: list[Array],
+    ropes: dict[int, tuple[Array, Array]],
+) -> tuple[Array, Array]:
+    """Heights of the upper and of the lower ends of droppers (m)."""
+    pair = np.zeros(len(model.droppers), dtype=int)
+    for part in tension_lengths(model.data, model.alignment.spans):
+        pair[part.droppers] = part.pair
+    own, carrying = pair[number], moving_stitches(model.data, model.alignment.spans).carrying[number]
+    tops, bottoms = np.zeros(len(number)), np.zeros(len(number))
+    for k in range(len(contacts)):
+        ours = own == k
+        tops[ours] = np.interp(droppers[ours], x, messengers[k]) if len(x) else 0.0
+        bottoms[ours] = np.interp(droppers[ours], x, contacts[k]) if len(x) else 0.0
+    for k, (places, heights) in ropes.items():
+        tops[carrying == k] = np.interp(droppers[carrying == k], places, heights)
+    return tops, bottoms

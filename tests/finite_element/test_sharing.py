@@ -1,0 +1,44 @@
+"""How both codes share the contact force between the two wires of an overlap."""
+
+import numpy as np
+import pytest
+
+from panto_env import simulate
+from panto_env.plant.state import Row
+
+from .sections import sections
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["overlap-2002", "overlap-330"])
+def test_wires_are_touched_at_the_same_places_by_the_same_forces(name):
+    section = sections()[name]
+    (overlap,) = section.line.overlaps
+    seen = []
+    run = simulate(
+        section.line,
+        section.pantograph,
+        section.speed_kmh,
+        policy="passive",
+        distance=section.distance,
+        window=0,
+        control_interval=0.005,
+        watch=lambda task: seen.append([task.plant.of(0, row) for row in ROWS]),
+    )
+    step, total, second = np.array(seen).T
+    x, ours = step * (run.position[1] - run.position[0]), np.stack([total - second, second], axis=1)
+    other = section.by_finite_elements(0.5)
+    theirs = np.stack([np.interp(x, other.position, force) for force in other.wire_forces.T], axis=1)
+
+    places = np.array(
+        [[x[np.flatnonzero(each[:, 1])[0]], x[np.flatnonzero(each[:, 0])[-1]]] for each in (ours, theirs)]
+    )
+    assert places[0] == pytest.approx(places[1], abs=1.0)
+    supports, middle = section.line.alignment().supports, overlap.first_span + overlap.spans // 2
+    inside = (x > supports[middle - 1]) & (x < supports[middle])
+    means = ours[inside].mean(axis=0), theirs[inside].mean(axis=0)
+    assert means[0] == pytest.approx(means[1], abs=0.02 * means[1].sum())
+    assert min(means[1]) > 0.2 * means[1].sum()
+
+
+ROWS = Row.STEP, Row.CONTACT_FORCE, Row.SECOND_FORCE

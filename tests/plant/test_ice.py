@@ -1,0 +1,157 @@
+"""Ice on the wires of a line that was built without it: at rest and under a train against finite elements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import spsolve
+
+from panto_env import InputError, simulate
+from panto_env.backend import python_function
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.static import solve
+from panto_env.plant.catenary.flexible.tension import with_tension_left
+from panto_env.plant.catenary.flexible.wires import rise_by_defects
+from panto_env.plant.line_condition import LineCondition
+
+from ..finite_element import simulation as finite_element
+from ..finite_element.hermite import matrices, uniform_load
+from ..finite_element.static import GRAVITY
+from ..finite_element.system import _placement, build
+from .test_flexible import WHOLE
+from .test_uneven import MIXED, line_of
+
+of_defects = python_function(rise_by_defects)
+EN50318 = "en50318-2002"
+LINES = [EN50318, "benchmark-2015", "re250"]
+
+
+def iced(data, spans, element, ice):
+    """Finite elements of a line on whose wires ice lies: a load and a mass, on the line as it was built."""
+    system = build(data, spans, element)
+    size, load, mass = system.free.size, np.zeros(system.free.size), 0 * system.mass
+    for first in (0, 2):  # messenger, contact wire
+        place = _placement(size, 4 * np.arange(len(system.nodes))[:, None] + [first, first + 1])
+        load -= place @ uniform_load(system.nodes, ice * GRAVITY)
+        coat = data.contact_wire.model_copy(update={"mass": ice})
+        mass = mass + place @ matrices(system.nodes, coat)[1] @ place.T
+    keep = diags_array(system.free)
+    change = spsolve((system.stiffness + diags_array(1 - system.free)).tocsc(), system.free * load)
+    tension = system.dropper_tension + system.dropper_stiffness * (system.extension @ change)
+    assert (tension > 0).all()
+    return replace(
+        system,
+        static=system.static + change.reshape(-1, 4)[:, 2:],
+        mass=(system.mass + keep @ mass @ keep).tocsr(),
+        damping=(system.damping + data.damping.alpha * (keep @ mass @ keep)).tocsr(),
+        dropper_tension=tension,
+    )
+
+
+@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("ice", [0.3, 1.0])
+def test_static_state_agrees_with_finite_elements(name, ice):
+    data, spans = load_catenary(name), 10
+    condition = LineCondition(ice=ice)
+    whole, other = build(data, spans, 0.1), iced(data, spans, 0.1, ice)
+    line = DefectiveLine(data, spans, condition)
+    state = line.solve()
+    inner = (whole.nodes > 3 * data.span_length) & (whole.nodes < 7 * data.span_length)
+    own = slice(3 * len(data.droppers.positions), 7 * len(data.droppers.positions))
+    start = build(with_tension_left(data, condition), spans, 0.1).static[:, 0]
+    ours = start + [of_defects(state.rise, line.breaks, line.decay, x) for x in whole.nodes]
+    np.testing.assert_allclose(ours[inner], other.static[inner, 0], atol=2e-4)
+    np.testing.assert_allclose(state.tension[own], other.dropper_tension[own], atol=0.5)
+    assert np.abs(ours - whole.static[:, 0])[inner].max() > 0.05 * ice
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_droppers_and_supports_carry_the_wires_and_the_ice(name):
+    """Forces balance: a span's droppers and its steady arm hold the contact wire's weight and its ice's."""
+    data, spans, ice = load_catenary(name), 12, 0.8
+    line = DefectiveLine(data, spans, LineCondition(ice=ice))
+    state, designed, droppers = line.solve(), solve(data), data.droppers
+    own = slice(5 * len(droppers.positions), 6 * len(droppers.positions))
+    at_mast = 5 * data.span_length
+    left = solve(with_tension_left(data, LineCondition(ice=ice)))
+    sunk = designed.contact.height(np.zeros(1))[0] - left.contact.height(np.zeros(1))[0]
+    sunk -= of_defects(state.rise, line.breaks, line.decay, at_mast)
+    arm = designed.arm_force + data.steady_arm.stiffness * sunk
+    hung = GRAVITY * (designed.dropper_mass / 2 + droppers.contact_clamp_mass).sum()
+    weight = GRAVITY * (data.contact_wire.mass + ice) * data.span_length
+    assert state.tension[own].sum() + arm == pytest.approx(weight + hung, rel=1e-5)
+
+
+def test_both_wires_together_carry_the_ice_between_droppers():
+    """Closed form: where taut droppers hold both together, T_c y_c + T_m y_m bends by the ice on both."""
+    base = load_catenary(EN50318)
+    wires = {
+        name: getattr(base, name).model_copy(update={"bending_stiffness": 0.0})
+        for name in ("contact_wire", "messenger_wire")
+    }
+    arm = base.steady_arm.model_copy(update={"holds_wire": False, "stiffness": 0.0})
+    many = tuple(np.arange(1.0, 60.0, 2.0).tolist())
+    hung = base.droppers.model_copy(update={"positions": many, "sag": (0.0,) * len(many), "stiffness": 1e8})
+    data = base.model_copy(update={"droppers": hung, "steady_arm": arm, **wires})
+    line = DefectiveLine(data, 20, LineCondition(ice=0.5))
+    left = solve(with_tension_left(data, LineCondition(ice=0.5))).contact
+    x = 60 * 10 + np.array([1.0, 29.0])  # droppers, 29 and 1 m from mid-span
+    now = left.height(x) + line.rise(line.solve()).height(x)
+    was = solve(data).contact.height(x)
+    tension = data.contact_wire.tension + data.messenger_wire.tension
+    expected = 2 * 0.5 * GRAVITY / tension * (29**2 - 1**2) / 2
+    assert (now - was)[0] - (now - was)[1] == pytest.approx(expected, rel=1e-4)
+
+
+def test_under_a_train_it_is_the_finite_elements_line(monkeypatch):
+    data, condition, speed = load_catenary(EN50318), LineCondition(ice=0.4), 250.0
+    monkeypatch.setattr(
+        finite_element, "build", lambda data, spans, element: iced(data, spans, element, condition.ice)
+    )
+    other = finite_element.simulate(
+        data, load_pantograph(EN50318), speed, element=0.5, time_step=5e-4, distance=361.0
+    )
+    fine = {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE
+    near = np.linspace(3.05 * 60, 360, 3000)
+    runs = [
+        simulate(speed_kmh=speed, line_condition=c, distance=361.0, spans=10, **fine)
+        for c in (condition, "new")
+    ]
+    ours, bare = (np.interp(near, run.position, run.contact_force) for run in runs)
+    theirs = np.interp(near, other.position, other.contact_force)
+    assert (ours - theirs).std() < 3.0
+    assert (bare - theirs).std() > 9.0
+    assert ours.std() == pytest.approx(theirs.std(), rel=0.02)
+    uplift = other.uplift.max(axis=0)[3:5]
+    np.testing.assert_allclose(runs[0].uplift.max(axis=0)[3:5], uplift, atol=1e-3)
+    mass = data.contact_wire.mass
+    assert runs[0].line.wave_speed == pytest.approx(runs[1].line.wave_speed * np.sqrt(mass / (mass + 0.4)))
+
+
+def test_what_cannot_hang_or_has_no_wires_is_refused():
+    with pytest.raises(
+        InputError, match=r"would differ by 0.\d+ m in height, more than 0.5 m, in this line_c"
+    ):
+        simulate(EN50318, speed_kmh=100.0, line_condition={"ice": 3.0}, distance=100.0)
+    with pytest.raises(InputError, match="and wires that bear ice"):
+        simulate("periodic-stiffness", "three-mass", line_condition={"ice": 1.0})
+    with pytest.raises(InputError, match=r"must not differ in .* ice or temp"):
+        simulate(line_condition=["new", {"ice": 0.3}])
+
+
+def test_spans_that_differ_bear_ice_as_finite_elements_say():
+    data, ice = line_of(MIXED), 0.6
+    condition, spans = LineCondition(ice=ice), len(MIXED)
+    other, line = iced(data, spans, 0.1, ice), DefectiveLine(data, spans, condition)
+    state, begins = line.solve(), data.alignment().supports
+    ours = solve(with_tension_left(data, condition)).contact.height(other.nodes)
+    ours = ours + line.rise(state).height(other.nodes)
+    inner = (other.nodes > begins[3]) & (other.nodes < begins[-4])
+    np.testing.assert_allclose(ours[inner], other.static[inner, 0], atol=5e-4)
+    droppers = np.concatenate(
+        [begin + np.array(own.positions) for begin, own in zip(begins, data.dropper_tables, strict=False)]
+    )
+    own = (droppers > begins[3]) & (droppers < begins[-4])
+    np.testing.assert_allclose(state.tension[own], other.dropper_tension[own], atol=0.5)

@@ -1,0 +1,314 @@
+"""Overlaps: two pairs of wires side by side, each from anchor to anchor, each touched by a force of its own.
+
+Finite elements of such lines are in ``tests/finite_element``.
+"""
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from panto_env import InputError, simulate
+from panto_env.backend import WIDTH, python_function
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.build import at_rest
+from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.overlaps import heights_of_pair, tension_lengths
+from panto_env.plant.catenary.flexible.scattered_arrays import LINK
+from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.static import hang
+from panto_env.plant.contact import shared_forces
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.plant import Plant
+from panto_env.plant.state import Row
+from panto_env.plant.train import Train
+
+from .test_flexible import constants_of, travel, undamped
+
+SPANS, FIRST, LENGTH = 24, 11, 65.0
+RISES = [0.1, 0.5]
+MIDDLE = (FIRST + 0.5) * LENGTH
+STITCH = {"length": 18.0, "tension": 3500.0, "mass": 0.31}
+STITCHED_DROPPERS = {
+    "positions": [2.5, 6.5, 12.5, 18.75, 25.625, 32.5, 39.375, 46.25, 52.5, 58.5, 62.5],
+    "sag": [0.0] * 11,
+}
+
+
+def line_of(overlaps=({"first_span": FIRST, "rises": RISES},), spans=SPANS, stitched=False, **changes):
+    table = load_catenary("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    if stitched:
+        table |= {"stitch_wire": STITCH, "droppers": table["droppers"] | STITCHED_DROPPERS}
+    # The last support is a hair higher, so that the line is no uniform one without overlaps.
+    end = {"encumbrance": table["encumbrance"] + 1e-9}
+    table |= {"sequence": [{}] * spans, "end_support": end, "overlaps": list(overlaps)}
+    return FlexibleCatenaryData.model_validate(table | changes)
+
+
+def run(line, distance=17 * LENGTH, pantograph="dsa380", speed=300.0, **settings):
+    return simulate(line, pantograph, speed, distance=distance, **settings)
+
+
+def test_tension_lengths_of_a_line():
+    overlaps = [{"first_span": FIRST, "rises": RISES}, {"first_span": 18, "rises": [0.3]}]
+    first, second, third = tension_lengths(line_of(overlaps))
+    assert [(part.first_span, part.spans, part.pair) for part in (first, second, third)] == [
+        (0, 13, 0),
+        (10, 8, 1),
+        (17, 7, 0),
+    ]
+    assert (first.end, second.begin) == (13 * LENGTH, 10 * LENGTH)
+    assert first.in_use == (0.0, MIDDLE)
+    assert second.in_use == (MIDDLE, 17.5 * LENGTH)
+    assert first.line.contact_heights == (*[0.0] * 12, 0.1, 0.5)
+    assert second.line.contact_heights == (0.5, 0.1, *[0.0] * 6, 0.3)
+    # Droppers count span by span, those of the ending wires first.
+    per_span = 9
+    assert first.droppers[10 * per_span :].tolist() == [90 + k + 18 * n for n in range(3) for k in range(9)]
+    assert second.droppers[: 2 * per_span].tolist() == [99 + k + 18 * n for n in range(2) for k in range(9)]
+    every = np.concatenate([first.droppers, second.droppers, third.droppers])
+    assert sorted(every.tolist()) == list(range((SPANS + 4) * per_span))
+
+
+def test_wires_in_the_middle_span_are_level_and_rise_in_a_parabola():
+    line, x = line_of(), np.linspace(0, LENGTH, 131)
+    shape = hang(line)
+    ending, beginning = (heights_of_pair(line, shape, k, FIRST * LENGTH + x) for k in (0, 1))
+    np.testing.assert_allclose(ending, beginning[::-1], atol=1e-9)
+    level = (LENGTH + 4.0) / 2
+    wanted = 0.1 * (np.maximum(x - level, 0) / (LENGTH - level)) ** 2
+    at = np.array(line.droppers.positions)
+    places = heights_of_pair(line, shape, 0, FIRST * LENGTH + at)
+    exact = 0.1 * (np.maximum(at - level, 0) / (LENGTH - level)) ** 2
+    np.testing.assert_allclose(places, exact, atol=1e-9)
+    assert np.abs(ending - wanted).max() < 0.01  # between droppers the wire sags
+    assert abs(ending[65] - beginning[65]) < 1e-9
+    assert heights_of_pair(line, shape, 0, np.array([13 * LENGTH]))[0] == pytest.approx(0.5, abs=0.01)
+    assert heights_of_pair(line, shape, 0, np.array([13 * LENGTH + 1.0]))[0] > 50
+    in_use = shape.contact.height(np.array([0.0, MIDDLE - 1e-9, MIDDLE + 1e-9, 15 * LENGTH]))
+    assert np.abs(in_use).max() < 0.02
+
+
+def test_droppers_of_both_pairs_carry_both_wires():
+    """All that hangs between two mirrored ends is carried; the table counts droppers span by span."""
+    line = line_of()
+    table = droppers_at_rest(line)
+    assert [each.number for each in table if each.span == FIRST] == list(range(1, 19))
+    assert len(table) == 27 * 9
+    force = np.array([each.static_force for each in table])
+    for part in tension_lengths(line):
+        wire, count = line.contact_wire, part.spans
+        slopes = np.array(part.line.contact_heights)
+        lifted = wire.tension * (slopes[-1] - slopes[-2] - slopes[1] + slopes[0]) / LENGTH
+        assert force[part.droppers].sum() == pytest.approx(
+            9.81 * wire.mass * count * LENGTH - lifted, rel=1e-3
+        )
+
+
+def test_compressed_droppers_are_refused_by_their_tension_length():
+    with pytest.raises(
+        InputError, match=r"dropper 6 of span 12 of line 're330, tension length 1'.*only pull"
+    ):
+        hang(line_of([{"first_span": FIRST, "rises": [0.4, 0.8]}]))
+
+
+@pytest.mark.parametrize(("one", "other"), [(1.0, 1.0), (1.0, -0.5), (-1.0, 0.4), (0.3, 2.0), (-1.0, -1.0)])
+def test_shared_forces_solve_the_complementarity(one, other):
+    """Beside non-negative least squares: forces solve A f = b where positive, and A f >= b where 0."""
+    (a, b), through = (2e-5, 3e-5), 1.3e-5
+    matrix, gaps = np.array([[a, through], [through, b]]), np.array([one, other]) * 1e-3
+    root = np.linalg.cholesky(matrix).T
+    expected, _ = nnls(root, np.linalg.solve(root.T, gaps))
+    found = python_function(shared_forces)((gaps[0], a), (gaps[1], b), through)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_before_an_overlap_the_line_is_as_without_it():
+    """Up to where waves from the overlap meet the train."""
+    with_it, without = run(line_of(), 12 * LENGTH), run(line_of(()), 12 * LENGTH)
+    before = with_it.position < 5 * LENGTH
+    np.testing.assert_allclose(with_it.contact_force[before], without.contact_force[before], atol=5e-3)
+    differ = np.abs(with_it.contact_force - without.contact_force)
+    assert differ[with_it.position < 9 * LENGTH].max() < 1.0
+    assert differ[with_it.position > 11 * LENGTH].max() > 10.0
+
+
+@pytest.mark.parametrize("stitched", [False, True])
+def test_the_force_passes_from_one_wire_to_the_other(stitched):
+    line = line_of(stitched=stitched)
+    plant = Plant(line, Train.of(load_pantograph("dsa380")), runs=Runs((300 / 3.6,) * 2))
+    plant.start(0, 300 / 3.6)
+    samples, found = plant.samples(1), []
+    steps = int(14 * LENGTH / (300 / 3.6) / plant.time_step)
+    for _ in range(steps):
+        plant.advance_passively(1, samples)
+        step, total, second = (plant.of(0, row) for row in (Row.STEP, Row.CONTACT_FORCE, Row.SECOND_FORCE))
+        found.append((step * plant.time_step * 300 / 3.6, total - second, second))
+        assert 0 <= second <= total
+    x, first, second = np.array(found).T
+    touched = x[second > 0]
+    assert FIRST * LENGTH - 20 < touched[0] < MIDDLE
+    assert MIDDLE < x[first > 0][-1] < (FIRST + 1) * LENGTH + 20
+    both = (first > 0) & (second > 0)
+    assert 5 < (x[both][-1] - x[both][0]) < 65
+    assert (np.abs(x[both] - MIDDLE) < 30).all()
+    np.testing.assert_array_equal(second[x < FIRST * LENGTH - 20], 0.0)
+    np.testing.assert_array_equal(first[x > (FIRST + 1) * LENGTH + 20], 0.0)
+
+
+def test_uplift_is_that_of_the_wire_in_use():
+    found = run(line_of())
+    uplift = found.uplift.max(axis=0)[5:16]
+    assert uplift.min() > 0.04
+    assert uplift.max() < 0.08
+
+
+def test_a_travelling_window_and_defects_on_both_pairs():
+    """Beside the whole line; a dropper that is broken in the beginning wires, and a raised support."""
+    for condition in ("new", {"broken_droppers": [(FIRST, 15)], "raised_supports": [(FIRST + 1, 0.03)]}):
+        ours, whole = (
+            run(line_of(stitched=True), line_condition=condition, precision="double", window=window)
+            for window in (16, 0)
+        )
+        np.testing.assert_allclose(ours.contact_force, whole.contact_force, atol=0.02)
+        largest = (each.uplift.max(axis=0) for each in (ours, whole))
+        np.testing.assert_allclose(*largest, atol=1e-5)
+    assert whole.dropper_force[:, 10 * 11 + 14].max() == 0
+    new = run(line_of(stitched=True), precision="double")
+    assert np.abs(whole.contact_force - new.contact_force).max() > 5
+
+
+def test_a_line_as_built_and_lines_that_are_worn_run_through_overlaps():
+    new = run(line_of())
+    for condition in (
+        "as-built",
+        {"worn_stretches": [(FIRST, 10.0, 90.0, 0.2)]},
+        {"lost_contact_tension": 0.05},
+    ):
+        found = run(line_of(), line_condition=condition, seed=3)
+        inside = found.summary((FIRST, FIRST + 2))
+        assert inside.mean == pytest.approx(new.summary((FIRST, FIRST + 2)).mean, rel=0.02)
+        assert inside.std > 10
+        assert (
+            np.abs(np.interp(new.position, found.position, found.contact_force) - new.contact_force).max() > 5
+        )
+
+
+def test_ice_weighs_on_both_pairs_and_not_on_stitch_wires():
+    """The wires in use hang lower, by a parabola between droppers on the messenger that sags more."""
+    dry, iced = (run(line_of(), line_condition=each) for each in ("new", {"ice": 0.3}))
+    inside = (dry.position > FIRST * LENGTH) & (dry.position < (FIRST + 2) * LENGTH)
+    assert dry.wire[inside].mean() - iced.wire[inside].mean() > 0.01
+    with pytest.raises(InputError, match="has stitch wires, on which ice is not computed"):
+        run(line_of(stitched=True), line_condition={"ice": 0.3})
+    fixed = load_catenary("re330").messenger_wire.model_dump() | {"axial_stiffness": 1e7}
+    for line in (line_of(messenger_wire=fixed), line_of((), stitched=True, messenger_wire=fixed)):
+        with pytest.raises(InputError, match="wires that are fixed at both ends are not computed"):
+            run(line, line_condition={"temperature": 10.0})
+
+
+def test_default_grid_is_fine_enough_in_an_overlap():
+    ours, fine = (run(line_of(), **own).summary((FIRST, FIRST + 2)) for own in ({}, {"spacing": 0.1}))
+    assert ours.std == pytest.approx(fine.std, rel=0.01)
+    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
+
+
+def test_elasticity_of_an_overlap_is_that_of_the_wire_in_use():
+    places, yields = elasticity(line_of(), 100.0)
+    outer = elasticity(line_of(()), 100.0)[1].reshape(SPANS - 2, -1)[5]
+    per_span = yields.reshape(SPANS - 2, -1)
+    np.testing.assert_allclose(per_span[3], outer, rtol=1e-3)
+    assert places[0] == LENGTH
+    assert 0.5 * outer.min() < per_span[FIRST - 1 : FIRST + 1].min()
+    assert per_span[FIRST - 1 : FIRST + 1].max() < 2 * outer.max()
+
+
+def energy(line, wire, data, step):
+    """Energy (J) of the discrete line at mid-step, of both pairs of wires."""
+    now, move = along(wire.displacement[0]), along(wire.increment[0])
+    old, middle, total = now - move, now - move / 2, 0.0
+    for w in range(4):
+        own, mobility = data.wires[w % 2], line.scattered.mobility[w, : now.shape[1]]
+        moves = mobility > 0
+        mass = step**2 / np.where(moves, mobility, 1.0)
+        total += (mass * move[w] ** 2)[moves].sum() / (2 * step**2)
+        near, far = line.stencil[0, w, :2]
+        u = old[w]
+        pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
+        total -= (now[w, 2:-2] * pull).sum() * own.mass * line.spacing / (2 * step**2)
+
+    def at(things, above):
+        four = middle[things.wire[:, None] + above, PAD + things.first + np.arange(4)]
+        return (things.constants[:, :4] * four).sum(axis=1)
+
+    masts, links = line.scattered.masts, line.scattered.links
+    total += (data.support.stiffness * at(masts, MESSENGER) ** 2).sum() / 2
+    extension, stiffness = at(links, MESSENGER) - at(links, CONTACT), links.constants[:, LINK.STIFFNESS]
+    static = line.link_static[0, links.number]
+    slack = -static * extension - static**2 / stiffness / 2
+    return total + np.where(stiffness * extension > -static, stiffness * extension**2 / 2, slack).sum()
+
+
+@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
+    """A pulse on all wires runs into the anchors, and comes back."""
+    step, numerics = 1e-3, Numerics(spacing=0.25, time_step=1e-3, window=0, precision="double")
+    data = undamped(line_of([{"first_span": 4, "rises": RISES}], 10))
+    built = constants_of(data, 10, numerics)
+    wire = at_rest(built, 1, 1)
+    pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 290) / 4) ** 2))
+    for w in range(4):
+        moves = built.scattered.mobility[w, : len(pulse)] > 0
+        wire.displacement[0, w] = lay_out(pulse * moves, built.rows, float)
+    steps = np.zeros(100)
+    travel(built, wire, 260.0, 0.0, 0.0, steps[:1])
+    first, largest, slack = energy(built, wire, data, step), 0.0, False
+    for _ in range(100):
+        travel(built, wire, 260.0, 0.0, 0.0, steps)
+        largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
+        slack |= bool((wire.change[0] <= -wire.static[0]).any())
+    assert largest < 1e-6
+    assert slack == goes_slack
+    beyond = np.arange(PAD, PAD + built.rows * WIDTH) * built.spacing > 6.1 * LENGTH
+    assert np.abs(along(wire.displacement[0])[0, PAD : PAD + built.rows * WIDTH][beyond]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("overlaps", "message"),
+    [
+        ([{"first_span": 23, "rises": RISES}], "spans 23 to 25, must lie within spans 1 to 24"),
+        ([{"first_span": 1, "rises": [0.3]}], "reach over 1 spans, and 3 are the least"),
+        ([{"first_span": 24, "rises": [0.3]}], "behind the last overlap .* 3 spans at least"),
+        (
+            [{"first_span": 11, "rises": RISES}, {"first_span": 12, "rises": [0.3]}],
+            "Overlap 2 .* must lie within spans 14 to 24",
+        ),
+        ([{"first_span": 11, "rises": [0.1], "level": 0.0}, {"first_span": 13, "rises": [0.1]}], None),
+    ],
+)
+def test_overlaps_that_the_line_has_no_room_for_are_refused(overlaps, message):
+    if message is None:
+        assert len(tension_lengths(line_of(overlaps))) == 3
+        return
+    with pytest.raises(InputError, match=message):
+        hang(line_of(overlaps))
+
+
+def test_what_knows_one_wire_refuses_overlaps():
+    with pytest.raises(
+        InputError, match=r"may pull \(bilateral\) has one wire, and line 're330' has overlaps"
+    ):
+        run(line_of(), bilateral=True)
+    rig = load_catenary("rig-flexible")
+    with pytest.raises(InputError, match="follows one contact wire, and its line has overlaps of two"):
+        simulate(rig.model_copy(update={"line": line_of()}), "dsa380", 200.0, distance=100.0)
+
+
+def test_a_uniform_line_has_no_overlaps():
+    with pytest.raises(ValueError, match="needs a sequence of its spans"):
+        FlexibleCatenaryData.model_validate(
+            load_catenary("re330").model_dump(exclude={"sources"}, exclude_none=True)
+            | {"overlaps": [{"first_span": 4, "rises": RISES}]}
+        )

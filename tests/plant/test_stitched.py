@@ -1,0 +1,226 @@
+"""Lines with stitch wires: their balance at rest, their energy in motion, and what they do to a line.
+
+Finite elements of such lines are in ``tests/finite_element``.
+"""
+
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.catalog import load_catenary
+from panto_env.plant.catenary.flexible import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.build import at_rest
+from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.scattered_arrays import HUNG, LINK, STITCH
+from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.static import hang
+from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
+from panto_env.plant.line_condition import NEW, LineCondition
+from panto_env.plant.numerics import Numerics
+
+from .test_flexible import constants_of, travel, undamped
+from .test_uneven import energy as energy_of_wires
+
+STITCH_WIRE = {"length": 18.0, "tension": 3500.0, "mass": 0.31, "clamp_mass": 0.4}
+DROPPERS = {"positions": [2.5, 6.5, 14.0, 22.0, 30.5, 38.0, 46.0, 54.0, 59.0, 62.5], "sag": [0.0] * 10}
+"""Not symmetric about the middle of the span."""
+SPANS = 20
+
+
+def line_of(spans=SPANS, droppers=DROPPERS, **changes):
+    table = load_catenary("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    heavy = table["droppers"] | {"mass": 0.1, "contact_clamp_mass": 0.2, "messenger_clamp_mass": 0.3}
+    table |= {"droppers": heavy | droppers, "stitch_wire": STITCH_WIRE}
+    if "sequence" not in changes:
+        table["spans"] = spans
+    return FlexibleCatenaryData.model_validate(table | changes)
+
+
+def written_out(height=1e-9, spans=SPANS, **changes):
+    """Span by span, and not uniform for a height that does not matter."""
+    return line_of(sequence=[{}] * 7 + [{"contact_height": height}] + [{}] * (spans - 8), **changes)
+
+
+def test_equal_spans_written_out_are_the_uniform_line():
+    written = line_of(sequence=[{}] * SPANS)
+    assert written == line_of().model_copy(update={"sources": written.sources})
+
+
+def test_shape_at_rest_is_that_of_each_span_written_out():
+    one, all_of_them = hang(line_of()), hang(written_out())
+    for name in ("dropper_tension", "dropper_length"):
+        each = getattr(all_of_them, name).reshape(SPANS, -1)[2:-2]  # a mirrored end is not this span
+        np.testing.assert_allclose(each, np.tile(getattr(one, name), (len(each), 1)), atol=2e-6)
+    x = np.linspace(130.0, 1160.0, 3001)
+    np.testing.assert_allclose(all_of_them.messenger.height(x), one.messenger.height(x), atol=1e-7)
+    assert len(all_of_them.ropes) == SPANS + 1
+    np.testing.assert_allclose(all_of_them.ropes[5].heights, one.ropes[0].heights, atol=1e-7)
+    np.testing.assert_allclose(all_of_them.ropes[5].places, one.ropes[0].places + 5 * 65.0)
+
+
+@pytest.mark.parametrize("line", [line_of(), written_out()], ids=["uniform", "written out"])
+def test_forces_are_in_balance_at_clamps_and_along_the_stitch_wire(line):
+    """By slopes, which the own weight of wires and ropes changes by a known amount."""
+    shape, k = hang(line), 0 if not line.sequence else 5
+    rope, stitch = shape.ropes[k], line.stitch_wire
+    slopes = np.diff(rope.heights) / np.diff(rope.places)  # each piece hangs in a parabola about that slope
+    weight = 9.81 * stitch.mass * np.diff(rope.places)
+    pulled = stitch.tension * np.diff(slopes) - (weight[1:] + weight[:-1]) / 2
+    number = np.flatnonzero(stitches_of(line).carrying == k) if k else np.array([8, 9, 0, 1])
+    mass = shape.dropper_mass[number] / 2 + line.droppers.messenger_clamp_mass
+    np.testing.assert_allclose(pulled, shape.dropper_tension[number] + 9.81 * mass, rtol=1e-6)
+
+    place, messenger = rope.places[0], line.messenger_wire
+    place += 65.0 if place < 0 else 0.0
+    inside = messenger.tension - stitch.tension
+
+    def slope(x):  # bending has died out there
+        return float(np.diff(shape.messenger.height(np.array([x - 0.3, x + 0.3])))[0] / 0.6)
+
+    out = slope(place - 1.3) + 9.81 * messenger.mass * 1.3 / messenger.tension
+    beyond = slope(place + 1.3) - 9.81 * messenger.mass * 1.3 / inside
+    up = inside * beyond - messenger.tension * out + stitch.tension * slopes[0] - weight[0] / 2
+    assert up == pytest.approx(9.81 * stitch.clamp_mass, abs=0.2)
+
+
+def test_stitch_wire_makes_the_elasticity_even():
+    (_, stitched), (_, plain) = (elasticity(each, 100.0) for each in (line_of(), line_of(stitch_wire=None)))
+    assert non_uniformity(stitched) < 0.4 * non_uniformity(plain)
+    assert stitched[0] > 2 * plain[0]  # at the support
+
+
+def test_defects_at_rest_where_droppers_hang_from_stitch_wires():
+    """A dropper that is too long carries less; a broken one nothing, and its neighbours carry its load."""
+    line, dropper = line_of(), 11  # the second one of the second span, on the stitch wire
+    new = DefectiveLine(line, 6, NEW).solve()
+    assert abs(new.rise).max() < 1e-12
+    broken = DefectiveLine(line, 6, LineCondition(broken_droppers=((2, 2),))).solve()
+    assert broken.tension[dropper] == 0
+    assert broken.tension.sum() == pytest.approx(new.tension.sum(), rel=0.02)
+    assert (broken.tension[[dropper - 1, dropper + 1]] > new.tension[[dropper - 1, dropper + 1]] + 5).all()
+    written = DefectiveLine(written_out(spans=9), 9, LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
+    again = DefectiveLine(line, 9, LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
+    np.testing.assert_allclose(written.tension[20:-20], again.tension[20:-20], atol=1e-4)
+    assert again.tension[48] < hang(line).dropper_tension[8] - 3
+
+
+def energy(line, wire, data, step):
+    """Energy (J) of the discrete line at mid-step, stitch wires included."""
+    total = energy_of_wires(line, wire, data, step)
+    scattered, held = line.scattered, wire.scattered
+    now, move = along(wire.displacement[0])[MESSENGER], along(wire.increment[0])[MESSENGER]
+    old, steps = now - move, np.diff(now)
+    missing = moving(stitches_of(data, data.spans), data.spans)
+    x = line.spacing * window_nodes(line.rows)
+    total -= (missing.deficit(x[:-1], x[1:]) * steps * np.diff(old)).sum() / (2 * line.spacing)
+    nodes = held.displacement.shape[1] // held.stitches.node.shape[1]
+    sets = held.stitches.node.shape[1]
+    middle = along(wire.displacement[0] - wire.increment[0] / 2)
+    for k, table in enumerate(scattered.stitches.constants):
+        ropes = []
+        for x_of, rope in ((now, held.displacement[0]), (old, held.displacement[0] - held.increment[0])):
+            own = rope[k % sets * nodes : (k % sets + 1) * nodes, k // sets].copy()
+            for end, clamp in ((0, 0), (-1, 1)):
+                four = x_of[PAD + scattered.stitches.first[k, clamp] + np.arange(4)]
+                own[end] = table[4 * clamp : 4 * clamp + 4] @ four
+            ropes.append(own)
+        pull, length = table[STITCH.PULL], missing.end[k] - missing.begin[k]
+        total += pull * (np.diff(ropes[0]) * np.diff(ropes[1])).sum() / 2
+        mass = missing.mass[k] * length / (nodes - 1) / table[STITCH.INERTIA + 1 : -1]
+        total += (mass * (ropes[0] - ropes[1])[1:-1] ** 2).sum() / (2 * step**2)
+    for number, table, first, upper, k in zip(
+        scattered.hung.number,
+        scattered.hung.constants,
+        scattered.hung.first[:, 0],
+        scattered.upper,
+        scattered.carrying,
+        strict=True,
+    ):
+        row, column = k % sets * nodes + upper, k // sets
+        rope = held.displacement[0] - held.increment[0] / 2
+        extension = table[HUNG.UPPER : HUNG.MOVE] @ rope[row : row + 2, column]
+        extension -= table[:4] @ middle[CONTACT, PAD + first + np.arange(4)]
+        stiffness, static = table[LINK.STIFFNESS], line.link_static[0, number]
+        if stiffness * extension > -static:
+            total += stiffness * extension**2 / 2
+        else:
+            total += -static * extension - static**2 / stiffness / 2
+    return total
+
+
+@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
+    step, numerics = 1e-3, Numerics(spacing=0.25, time_step=1e-3, window=0, precision="double")
+    data = undamped(line_of(spans=9))
+    built = constants_of(data, 9, numerics)
+    wire = at_rest(built, 1, 1)
+    pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 190) / 4) ** 2))
+    wire.displacement[0] = lay_out(pulse, built.rows, float)
+    steps = np.zeros(100)
+    travel(built, wire, 260.0, 0.0, 0.0, steps[:1])
+    first, largest, slack, moved = energy(built, wire, data, step), 0.0, False, 0.0
+    for _ in range(100):
+        travel(built, wire, 260.0, 0.0, 0.0, steps)
+        largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
+        slack |= bool((wire.change[0] <= -wire.static[0]).any())
+        moved = max(moved, np.abs(wire.scattered.displacement).max())
+    assert largest < 1e-6
+    assert slack == goes_slack
+    assert moved > 0.2 * height
+
+
+@pytest.mark.parametrize("settings", [{}, {"window": 0}, {"line_condition": "as-built", "seed": 3}], ids=str)
+def test_uniform_and_written_out_lines_move_alike(settings):
+    """The window travels; defects and other tensions are the same."""
+    runs = [
+        simulate(each, "dsa380", 300.0, distance=12 * 65.0, spans=SPANS, precision="double", **settings)
+        for each in (line_of(), written_out())
+    ]
+    one, other = runs
+    after = one.position > 130  # at the mirrored start droppers have other lengths
+    np.testing.assert_allclose(other.contact_force[after], one.contact_force[after], atol=0.02)
+    np.testing.assert_allclose(other.uplift, one.uplift, atol=1e-5)
+    assert one.contact_force.std() > 10
+
+
+def test_default_grid_is_fine_enough():
+    settings = {"catenary": line_of(), "pantograph": "dsa380", "speed_kmh": 300, "record_droppers": False}
+    ours, fine = (
+        simulate(**settings, distance=780, **own).summary((4, 10)) for own in ({}, {"spacing": 0.1})
+    )
+    assert ours.std == pytest.approx(fine.std, rel=0.01)
+    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
+    assert ours.max_uplift == pytest.approx(fine.max_uplift, abs=5e-4)
+
+
+def test_a_slight_stitch_wire_without_droppers_changes_little():
+    """With hardly any tension and mass it takes nothing from the line."""
+    outside = {"positions": [5.0, 12.0, 20.0, 28.0, 37.0, 45.0, 53.0, 60.0], "sag": [0.0] * 8}
+    slight = {"length": 9.0, "tension": 500.0, "mass": 0.05}
+    lines = [line_of(droppers=outside, stitch_wire=stitch) for stitch in (slight, None)]
+    ours, plain = (simulate(each, "dsa380", 300.0, distance=780).summary((4, 10)) for each in lines)
+    assert ours.std == pytest.approx(plain.std, rel=0.02)
+    assert ours.max_uplift == pytest.approx(plain.max_uplift, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"tension": 20e3}, "more than 90 % of the messenger's 21000 N"),
+        ({"length": 14.0}, "a dropper 0.5 m from its clamp"),
+        ({"mass": 0.05, "tension": 9000}, "too coarse for the stitch wires"),
+    ],
+)
+def test_stitch_wires_that_do_not_go_with_the_line_are_refused(changes, message):
+    line = line_of(stitch_wire=STITCH_WIRE | changes)
+    with pytest.raises(InputError, match=message):
+        simulate(line, "dsa380", 300.0, distance=200)
+
+
+def test_stitch_wires_that_reach_each_other_are_refused():
+    droppers = {"positions": [3.0, 15.0], "sag": [0.0] * 2}
+    short = line_of(span_length=18.0, droppers=droppers, stitch_wire=STITCH_WIRE)
+    with pytest.raises(InputError, match="reaches to the one before it"):
+        hang(short)
