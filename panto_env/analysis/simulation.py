@@ -17,6 +17,7 @@ from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
+from ..plant.catenary import CATENARIES
 from ..plant.state import Row
 from ..policies import Policy, checked_action, errors_name, find_policy, wishes
 
@@ -61,7 +62,8 @@ def simulate(
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(driver) | settings
     task = _ready(given, seed, evaluated, record_droppers)
-    task.settings.line.warn_if_short(task.settings.numerics, task.settings.runs)
+    line = task.settings.line
+    CATENARIES[line.kind].warn_if_short(line, task.settings.numerics, task.settings.runs)
     if driver is None:
         task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)

@@ -7,6 +7,7 @@ from functools import partial
 
 from ..base.errors import InputError
 from ..base.shown import beside
+from ..plant.catenary import CATENARIES
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.plant import Plant
 from .cost import FEW_LANES, check_lanes
@@ -23,7 +24,7 @@ def spans(settings: RunSettings) -> int | None:
     last: int = math.ceil(line.alignment().in_spans(settings.distance) + before)
     most, clear = (line.spans, 0) if line.ends else (MOST_SPANS, 1)  # a train may run up to a line's end
     if not line.ends and last >= line.spans:
-        clear = line.clear_spans(settings.numerics, settings.runs, last)
+        clear = CATENARIES[line.kind].clear_spans(line, settings.numerics, settings.runs, last)
     needed = last + clear
     if needed > most:
         longest = line.alignment().support(max(math.floor(most - clear - before), 0))

@@ -25,7 +25,7 @@ from ..catalog.loader import Lines
 from ..estimation.settings import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
-from ..plant.catenary import CatenaryData
+from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count
 from ..plant.drift import largest_drift
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
@@ -298,7 +298,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
     if given or line.ends:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
-    spans = last + line.clear_spans(settings.numerics, settings.runs, last)
+    spans = last + CATENARIES[line.kind].clear_spans(line, settings.numerics, settings.runs, last)
     return settings.model_copy(update={"distance": line.alignment(last).length, "spans": spans})
 
 

@@ -9,6 +9,7 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.arrays import CONTACT
 from panto_env.plant.catenary.flexible.build import at_rest, constants
+from panto_env.plant.catenary.flexible.clear import clear_spans
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
 from panto_env.plant.catenary.flexible.static import solve
@@ -100,7 +101,7 @@ def test_a_whole_line_is_as_long_as_the_train_is_slow():
     line, whole = load_catenary("en50318-2002"), Numerics(window=0)
     for kmh in (50.0, 100.0, 400.0):
         speed, wave = kmh / 3.6, max(wire.wave_speed for wire in line.wires)
-        spans = 19 + line.clear_spans(whole, Runs((speed, speed)), 19)
+        spans = 19 + clear_spans(line, whole, Runs((speed, speed)), 19)
         train_at_end, wave_back = 19 / speed, (2 * spans - 19) / wave
         assert train_at_end <= wave_back or spans == 19 + CLEAR
         assert (2 * spans - 21) / wave < train_at_end or spans == 19 + CLEAR  # and no longer than needed

@@ -24,7 +24,7 @@ from ...base.units import from_kmh, to_kmh
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from ..valid_range import ENDING
-from .schema import CatenaryData
+from .schema import CLEAR, CatenaryData
 from .view import LineView
 
 SLOWEST = 1e-9
@@ -91,12 +91,26 @@ def accept(data: Any) -> None:
     """Accept every line that the schema accepts."""
 
 
+def usual_clear_spans(data: Any, numerics: Numerics, runs: Runs, last: int) -> int:
+    """As ``CatenaryKind.clear_spans``, on lines along which no wave comes back from far away."""
+    return CLEAR
+
+
+def say_nothing(data: Any, numerics: Numerics, runs: Runs) -> None:
+    """As ``CatenaryKind.warn_if_short``, of lines without a window."""
+
+
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
     check: Callable[[Any], Any] = accept  # raises InputError where a line with these values cannot exist
+    # Spans of a line beyond the last one of a pass that keep its far end from the train; raises InputError
+    # where that takes too many.
+    clear_spans: Callable[[Any, Numerics, Runs, int], int] = usual_clear_spans
+    # Warns where a given window costs more than 1 % of the figures.
+    warn_if_short: Callable[[Any, Numerics, Runs], None] = say_nothing
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:

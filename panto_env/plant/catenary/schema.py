@@ -12,7 +12,6 @@ from ...base.ranges import Between
 from ...base.settings import Settings
 from ...base.shown import shown
 from ..alignment import Alignment
-from ..numerics import Numerics, Runs
 from ..valid_range import FREE_UPLIFT
 
 PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV"]
@@ -81,16 +80,6 @@ class CatenaryData(Settings):
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)
-
-    def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
-        """Spans of the line beyond the ``last`` one of a pass that keep its far end from the train.
-
-        Raises InputError where that takes too many.
-        """
-        return CLEAR
-
-    def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
-        """Warn where a given window costs more than 1 % of the figures; without a window nothing is said."""
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Reflection coefficients of a dropper and of a support at a frequency (Hz); nan for none."""

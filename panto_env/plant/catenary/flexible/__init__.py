@@ -13,10 +13,11 @@ are anchors where the line ends and absorb waves elsewhere. A window of all span
 
 from ..protocol import CatenaryKind
 from . import step as step
+from .clear import clear_spans, warn_if_short
 from .model import FlexibleCatenary
 from .schema import FlexibleCatenaryData
 from .static import hang
 
 __all__ = ["KIND", "FlexibleCatenary", "FlexibleCatenaryData"]
 
-KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary, hang)
+KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary, hang, clear_spans, warn_if_short)

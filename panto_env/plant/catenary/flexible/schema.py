@@ -12,7 +12,6 @@ from ....base.errors import InputError
 from ....base.ranges import Between
 from ....base.settings import Settings
 from ...alignment import Alignment
-from ...numerics import Numerics, Runs
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
 from .parts import (
     CLOSEST,
@@ -28,7 +27,6 @@ from .parts import (
     check_inside,
 )
 from .spans import laid_out, spans_of
-from .window import clear_spans, warn_if_short
 
 __all__ = [
     "CLOSEST",
@@ -184,24 +182,6 @@ class FlexibleCatenaryData(CatenaryData):
     def wires(self) -> tuple[Conductor, Conductor]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire
-
-    def clear_spans(self, numerics: Numerics, runs: Runs, last: int) -> int:
-        """Spans beyond the ``last`` one of a pass; a whole line needs more of them for a slower train."""
-        return clear_spans(self._wires_in(runs), numerics, runs, last)
-
-    def warn_if_short(self, numerics: Numerics, runs: Runs) -> None:
-        """Warn where a given window costs more than 1 % of the figures."""
-        warn_if_short(self._wires_in(runs), numerics, runs)
-
-    def _wires_in(self, runs: Runs) -> tuple[Conductor, Conductor]:
-        """The wires with their tension and ice in these runs: waves are faster in the cold."""
-        condition = runs.conditions[0]
-        if not (condition.temperature or condition.ice):
-            return self.wires
-        from .fixed_wires import tensions_of_fixed  # it imports this module
-        from .tension import with_tension_left
-
-        return with_tension_left(self, condition, tensions_of_fixed(self, condition)).wires
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
