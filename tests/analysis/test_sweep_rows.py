@@ -62,6 +62,15 @@ def test_headings_of_a_file_have_the_units_of_what_was_swept(tmp_path):
         assert "mean (N)" in first
 
 
+def test_a_heading_has_its_unit_wherever_its_name_stands_in_the_alphabet(tmp_path):
+    """Before "policy" or behind it: the swept values are the columns before it."""
+    names = {"sensors.speed_noise": " (m/s)", "catenary.mean_stiffness": " (N/m)", "policy.gain": ""}
+    for one, unit in names.items():
+        save([{one: 0.01, "policy": "p", "catenary": "it"}], tmp_path / "s.csv", **RUN)
+        with (tmp_path / "s.csv").open(encoding="utf-8-sig") as file:
+            assert next(csv.reader(file)) == [f"{one}{unit}", "policy", "catenary"]
+
+
 def test_labels_take_the_entries_of_the_settings_given():
     assert labels(["catenary.mean_stiffness"], catenary="periodic-stiffness", seed=3) == {
         "speed_kmh": "speed of the train (km/h)",
