@@ -90,8 +90,15 @@ def test_methods_show_their_own_arguments_and_help(kind, method, parameters):
     assert len(function.__doc__) > 40
 
 
-@pytest.mark.parametrize("use", [lambda e: e.reset(), lambda e: e.step(np.zeros((2, 1))), lambda e: e.render(),
-                                 lambda e: e.context(0)], ids=["reset", "step", "render", "context"])  # fmt: skip
+USES = {
+    "reset": lambda envs: envs.reset(),
+    "step": lambda envs: envs.step(np.zeros((2, 1))),
+    "render": lambda envs: envs.render(),
+    "context": lambda envs: envs.context(0),
+}
+
+
+@pytest.mark.parametrize("use", USES.values(), ids=USES)
 def test_no_method_of_a_vector_environment_runs_while_it_is_in_use(use):
     envs = PantographVectorEnv(num_envs=2, distance=20.0)
     envs.reset(seed=0)
