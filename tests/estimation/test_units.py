@@ -9,7 +9,7 @@ from panto_env.estimation.motion_file import COLUMNS, FORCES, SHORTEST, SPEEDS, 
 from panto_env.estimation.score import phases
 
 FACTORS = {"m": 1.0, "mm": 1e-3, "m/s": 1.0, "mm/s": 1e-3, "N": 1.0, "kN": 1e3}
-FACTORS |= dict.fromkeys(("um", "µm", "μm"), 1e-6)  # noqa: RUF001 - the sign and the letter
+FACTORS |= dict.fromkeys(("um", "µm", "μm"), 1e-6)
 
 
 def file_of(path, headers, count=SHORTEST):
