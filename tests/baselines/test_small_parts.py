@@ -117,9 +117,10 @@ def test_the_place_within_the_span_is_an_angle_unless_nothing_measures_it(monkey
         assert policy._distance(None) == pytest.approx(60.0 * (1 + 0.1 / (2 * np.pi)))  # the next span
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("episodes", "mean", "error"), [(1, 10.0, None), (2, 11.0, 1.0), (4, 13.0, 1.291)])
 def test_a_mean_return_has_the_standard_error_of_its_episodes(monkeypatch, episodes, mean, error):
-    """Of policies alone: controls and the mean of several trainings are none. A single episode has no error."""
+    """Of policies alone, not controls or means of trainings. A single episode has no error."""
     given = []
 
     def spread(jobs, workers, progress):
