@@ -1,7 +1,10 @@
 """What commands hand on, with the work itself replaced; and the steps by which gains are fitted."""
 
 import importlib
+import json
 import pkgutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from types import SimpleNamespace
 
 import click
@@ -17,7 +20,7 @@ from panto_baselines.policies.repetitive import Repetitive
 from panto_baselines.policies.span_learner import PACE
 from panto_env.cli import make_app
 
-from ..command import whole
+from ..command import panto, whole
 
 CONFIG = """
 policies = ["p"]
@@ -102,6 +105,55 @@ def test_other_options_replace_one_setting_each(handed):
     assert drawn[0] != drawn[1]
     assert all(len(salt) == 32 and int(salt, 16) >= 0 for salt in drawn)
     assert handed("--control-interval", "0.02").settings.control_interval == 0.02
+
+
+@dataclass
+class Made:
+    """What is made of a data set, with its folder as a property as in the original."""
+
+    dataset_id: str = "pantograph/it-v0"
+    episodes: int = 1200
+    steps: int = 34567
+    megabytes: float = 1.26
+    designs: int = 2048
+    refused: int = 3
+    ended_early: int = 1004
+    warned: int = 5
+
+    @property
+    def folder(self):
+        return Path("data") / "it"
+
+
+def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path):
+    got = []
+
+    def make(several):
+        def made(settings, output, **named):
+            got.append((settings, output, named["workers"], named["ray"]))
+            return [Made()] if several else Made()
+
+        return made
+
+    monkeypatch.setattr("panto_baselines.dataset.make_episodes.make_episodes", make(True))
+    monkeypatch.setattr("panto_baselines.dataset.make_designs.make_designs", make(False))
+    output = tmp_path / "data"
+    words = ("--output", output, "--workers", 3)
+    shown = panto("dataset", "episodes", "dataset-known-line", *words, "--episodes", 2)
+    assert shown.returncode == 0, shown.stderr
+    assert all(word in shown.stdout for word in ("pantograph/it-v0", "1,200", "34,567", "1.3", str(output)))
+    told = json.loads(panto("dataset", "episodes", "dataset-known-line", *words, "--json").stdout)
+    assert told == [asdict(Made()) | {"folder": str(Path("data") / "it")}]
+    (fewer, _, *rest), (usual, *_) = got
+    assert rest == [3, None]
+    assert {each.episodes for each in fewer.sets} == {2}
+    assert [each.model_copy(update={"episodes": 2}) for each in usual.sets] == list(fewer.sets)
+    shown = panto("dataset", "designs", *words, "--count", 4)
+    assert all(word in shown.stdout for word in ("2,048", "3", "1,004", "5", "1.3"))
+    told = json.loads(panto("dataset", "designs", *words, "--json").stdout)
+    assert told == asdict(Made()) | {"folder": str(Path("data") / "it")}
+    assert got[2][0].count == 4
+    assert got[3][0].count != 4
 
 
 def groups(group, name="panto"):
