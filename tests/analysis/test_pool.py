@@ -4,14 +4,15 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from functools import partial
 from types import SimpleNamespace
 
 import pytest
 
 from panto_env import InputError
-from panto_env.analysis import worker
-from panto_env.analysis.pool import in_processes, in_threads, one_by_one
+from panto_env.analysis import pool, worker
+from panto_env.analysis.pool import collect, in_processes, in_threads, one_by_one, workers_for
 from panto_env.base.machine import cores
 
 
@@ -69,6 +70,64 @@ def test_there_are_as_many_threads_as_cores_unless_told_otherwise():
 
     assert len(set(in_threads([name] * 50))) <= cores()
     assert len(set(in_threads([name] * 50, workers=3))) <= 3
+
+
+@pytest.mark.parametrize(
+    ("jobs", "workers", "taken"),
+    [
+        (50, None, 3),  # one per core
+        (2, None, 2),  # but not more than there are jobs
+        (1, None, 1),
+        (0, None, 1),
+        (50, 1, 1),
+        (50, 2, 2),
+        (50, 12, 12),  # at most four per core
+        (50, 13, 12),
+        (11, 12, 11),
+    ],
+)
+def test_the_number_of_workers(monkeypatch, jobs, workers, taken):
+    monkeypatch.setattr(pool, "cores", lambda: 3)
+    assert workers_for(jobs, workers) == taken
+
+
+@pytest.mark.parametrize("workers", [0, -1])
+def test_less_than_one_worker_is_refused(workers):
+    with pytest.raises(InputError, match=f"^workers must be 1 or more, not {workers}.$"):
+        workers_for(5, workers)
+
+
+def test_each_result_is_taken_with_its_place_as_soon_as_it_is_there():
+    first, second = Future(), Future()
+    second.set_result("b")
+    taken, done = [], []
+
+    def take(place, result):
+        taken.append((place, result))
+        if not first.done():
+            first.set_result("a")
+
+    assert collect([first, second], lambda *counts: done.append(counts), take) == ["a", "b"]
+    assert taken == [(1, "b"), (0, "a")]
+    assert done == [(1, 2), (2, 2)]
+    assert collect([], None) == []
+
+
+def test_the_environment_is_as_it_was_after_processes_and_after_their_error(monkeypatch):
+    given = {"OPENBLAS_NUM_THREADS": None, "MKL_NUM_THREADS": "5", "OMP_NUM_THREADS": None}
+    for name, value in given.items():
+        monkeypatch.setenv(name, value or "1")
+        if value is None:
+            monkeypatch.delenv(name)
+
+    def during():
+        with pool._one_thread_of_linear_algebra():
+            assert {name: os.environ[name] for name in given} == dict.fromkeys(given, "1")
+            fail()
+
+    with pytest.raises(InputError):
+        during()
+    assert {name: os.environ.get(name) for name in given} == given
 
 
 def test_a_script_without_main_guard_is_told_what_to_do(tmp_path):

@@ -1,0 +1,194 @@
+"""Names, labels and changes of parameters, and spans as a command reads them."""
+
+import pytest
+import typer
+
+from panto_env import InputError
+from panto_env.analysis import parameters
+from panto_env.analysis.options import parse_spans, with_settings
+from panto_env.analysis.parameters import (
+    change,
+    change_together,
+    check_name,
+    parameter_label,
+    parameter_names,
+)
+from panto_env.analysis.sweep import FAMILIES, labels, sweep
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.control.settings import fields, run_settings
+
+from .test_line_check import of_unlike_spans
+
+
+def test_the_names_of_an_entry_are_all_its_numbers():
+    assert parameter_names(load_pantograph("three-mass"), "p") == [
+        *(f"p.{key}.{k}" for key in ("masses", "stiffnesses", "dampings") for k in (1, 2, 3)),
+        *("p.static_force", "p.aerodynamic_coefficient", "p.contact_stiffness", "p.contact_damping"),
+        "p.frame_friction",
+    ]
+    names = parameter_names(load_catenary("re250"), "c")
+    assert {"c.contact_wire.tension", "c.droppers.stiffness", "c.droppers.positions.1", "c.spans"} <= set(
+        names
+    )
+    assert not {"c.name", "c.sources", "c.contact_wire", "c.droppers.positions", "c.ends"} & set(names)
+
+
+ORDINALS = "1st 2nd 3rd 4th 9th 10th 11th 12th 13th 20th 21st 22nd 23rd 100th 101st 111th 112th 113th 121st"
+
+
+@pytest.mark.parametrize("word", ORDINALS.split())
+def test_ordinal_numbers(word):
+    assert parameters._ordinal(int(word[:-2])) == word
+
+
+def test_labels_have_the_unit_at_their_end_or_none():
+    line = load_catenary("re250")
+    assert parameter_label("line.spans", line).startswith("line: default number of spans")
+    assert parameter_label("line_condition.irregularity", run_settings({}).line_condition[0]).startswith(
+        "line condition: "
+    )
+    assert parameter_label("catenary.droppers.positions.2", line) == (
+        "catenary: droppers: distance from support, 2nd (m)"
+    )
+    assert labels(["policy.gain", "speed_kmh"]) == {
+        "speed_kmh": "speed of the train (km/h)",
+        "policy.gain": "policy: gain",
+    }
+
+
+@pytest.mark.parametrize("name", ["masses", "x.masses", "x.mases.1", "x.masses.4", "x.masses.0"])
+def test_an_unknown_name_is_refused_with_what_is_known(name):
+    with pytest.raises(InputError) as told:
+        check_name(name.replace("x.", "pantograph."), load_pantograph("three-mass"))
+    assert str(told.value).startswith("Unknown parameter '")
+    assert "' of three-mass: " in str(told.value)
+    assert str(told.value).endswith("frame_friction (lists count from 1).")
+    with pytest.raises(InputError) as told:
+        check_name("sensors.nothing", run_settings({}).sensors)
+    assert str(told.value).startswith("Unknown parameter 'sensors.nothing': ")
+    assert "lists count" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "name", sorted({*fields(), "speedy", "speed_kmh.1", "zzz", "a", "policy", ""} - {"speed_kmh"})
+)
+def test_only_the_speed_and_the_families_values_are_swept(name):
+    """Each setting by its bare name would change nothing without a word."""
+    with pytest.raises(InputError, match="Unknown parameter"):
+        sweep({name: [250.0]}, workers=1)
+    if name not in FAMILIES:
+        with pytest.raises(InputError) as told:
+            sweep({name: [250.0]}, workers=1)
+        assert (
+            "it must be speed_kmh or begin with one of 'catenary.', 'pantograph.', 'actuator.', 'sensors.', "
+            in str(told.value)
+        )
+
+
+def test_a_change_is_of_one_value_and_the_entry_stays():
+    one = load_pantograph("three-mass")
+    other = change(one, "pantograph.masses.2", 11.0)
+    assert other.masses == (one.masses[0], 11.0, one.masses[2])
+    assert other.model_dump(exclude={"masses"}) == one.model_dump(exclude={"masses"})
+    both = change_together(one, {"pantograph.masses.3": 12.0, "pantograph.static_force": 60.0})
+    assert both.masses == (*one.masses[:2], 12.0)
+    assert both.static_force == 60.0
+    nested = change(load_catenary("re250"), "catenary.contact_wire.tension", 14000.0)
+    assert nested.contact_wire.tension == 14000.0
+    assert nested.messenger_wire == load_catenary("re250").messenger_wire
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"catenary.span_length": -5.0}, "must be a number from"),  # from its schema
+        ({"catenary.messenger_wire.tension": 200.0}, "."),  # from what hangs it
+    ],
+)
+def test_what_cannot_be_is_said_after_which_value_it_was(values, message):
+    line = load_catenary("re250")
+    (name, value), *_ = values.items()
+    with pytest.raises(InputError) as told:
+        change(line, name, value)
+    assert str(told.value).startswith(f"{name} cannot be {value:g}: ")
+    assert message in str(told.value)
+    with pytest.raises(InputError) as told:
+        change_together(line, values)
+    assert str(told.value).startswith("These values do not go together: ")
+    assert message in str(told.value)
+
+
+def test_a_value_that_every_span_replaces_is_refused():
+    line = of_unlike_spans()
+    given = line.model_dump(exclude_none=True)
+    own = {"sequence": [span | {"encumbrance": 1.7} for span in given["sequence"]]}
+    line = type(line).model_validate(given | own)
+    with pytest.raises(
+        InputError, match=r"cannot be 1\.5: Each span in the sequence of line 're250' has values"
+    ):
+        change(line, "catenary.encumbrance", 1.5)
+    with pytest.raises(InputError, match=r"together: Each span .* in the place of encumbrance, so nothing"):
+        change_together(line, {"catenary.encumbrance": 1.5})
+    assert change(line, "catenary.encumbrance", line.encumbrance) == line
+    assert change(line, "catenary.contact_wire.tension", 14000.0).contact_wire.tension == 14000.0
+    both = {"catenary.encumbrance": 1.5, "catenary.contact_wire.tension": 14000.0}
+    assert change_together(line, both).contact_wire.tension == 14000.0
+
+
+SPANS = {
+    None: None,
+    "all": "all",
+    "5-6": (5, 6),
+    " 5 - 16 ": (5, 16),
+    "7-7": (7, 7),
+    "1-1000": (1, 1000),
+}
+
+
+@pytest.mark.parametrize(("text", "spans"), SPANS.items())
+def test_spans_that_a_command_takes(text, spans):
+    assert parse_spans(text) == spans
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "5", "5-", "-6", "-", "5-6-7", "a-6", "5-b", "٥-٦", "1234567890-2", "1-1234567890", "5.0-6", "ALL"],
+)
+def test_spans_that_it_does_not_take(text):
+    with pytest.raises(InputError, match=r"^--spans must read first-last, e\.g\. 5-6, or all, not '"):
+        parse_spans(text)
+
+
+@pytest.mark.parametrize("text", ["6-5", "0-3", "1-1001", "123456789-999999999"])
+def test_spans_that_are_none(text):
+    with pytest.raises(InputError):
+        parse_spans(text)
+
+
+def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
+    @with_settings(left_out=("precision",))
+    def command(settings, more: int = 3):
+        """Do nothing."""
+
+    options = {each.name: each for each in command.__signature__.parameters.values()}
+    assert "more" in options
+    assert "settings" not in options
+    assert "precision" not in options
+    assert options["more"].default == 3
+    renamed = {"speed": "speed_kmh", "line_spans": "spans"}
+    for name, option in options.items():
+        if name == "more":
+            continue
+        field = fields()[renamed.get(name, name)]
+        kind, info = option.annotation.__metadata__[0], option.annotation.__metadata__[-1]
+        assert kind is info
+        assert option.default is None
+        own = field.description.replace("(s)", "(ms)", 1) if name == "time_step" else field.description
+        flag = isinstance(field.default, bool)
+        default = "" if flag or field.default is None else f" Default: {field.default}."
+        assert info.help == f"{own[:1].upper()}{own[1:]}.{default}"
+    app = typer.Typer()
+    app.command()(command)
+    for option in typer.main.get_command(app).params:
+        assert option.opts == [f"--{option.name.replace('_', '-')}"] or option.opts[0].endswith("completion")
+        assert option.secondary_opts == [], "a flag has no second one that switches it off"

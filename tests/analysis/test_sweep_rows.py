@@ -1,0 +1,155 @@
+"""Each column of a sweep's rows, its file's headings, and the memory that is asked for before it begins."""
+
+import csv
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.analysis import sweep as module
+from panto_env.analysis.sweep import labels, save, sweep
+from panto_env.analysis.sweep_plots import plot_sweep
+
+SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0, "spans": "all"}
+RUN = {name: value for name, value in SHORT.items() if name != "spans"}
+
+
+def test_a_row_says_what_was_run_and_what_came_of_it():
+    values = {"speed_kmh": [250.0], "policy.gain": [0.3]}
+    (row,) = sweep(values, policies=["p"], seed=4, sensors="realistic", **SHORT | {"spans": (3, 4)})
+    run = simulate(**RUN, speed_kmh=250.0, policy="p:gain=0.3", seed=4, sensors="realistic")
+    expected = {
+        "speed_kmh": 250.0,
+        "policy.gain": 0.3,
+        "policy": "p",
+        "catenary": "periodic-stiffness",
+        "pantograph": "three-mass",
+        "system": run.line.system,
+        "seed": 4,
+        **{name: run.settings[name] for name in ("time_step", "spacing", "window")},
+        "nominal_force": run.nominal_force,
+        "terminated": False,
+        "ending": "",
+        "spans": "3-4",
+    } | run.summary((3, 4)).as_dict()
+    assert list(row) == list(expected)
+    assert row == pytest.approx(expected, nan_ok=True)
+
+
+def test_a_run_that_ended_early_says_where_and_has_no_figures():
+    lifting = {"actuator": {"force_limit": 5000.0}}
+    (row,) = sweep({"policy.gain": [40.0]}, policies=["p"], **lifting, **SHORT)
+    assert row["terminated"] is True
+    assert row["spans"] == ""
+    assert row["ending"] == simulate(policy="p:gain=40.0", **lifting, **RUN).ending != ""
+    assert row["policy"] == "p"
+    assert all(math.isnan(row[name]) for name in ("mean", "std", "max", "min", "contact_loss", "effort"))
+
+
+def test_headings_of_a_file_have_the_units_of_what_was_swept(tmp_path):
+    values = {"speed_kmh": [250.0], "policy.gain": [0.3]}
+    rows = sweep(values, policies=["p"], **SHORT)
+    for names, of in (
+        (["speed (km/h)", "policy.gain", "policy"], rows),
+        (["pantograph.masses.1 (kg)", "speed (km/h)", "policy"],
+         sweep({"pantograph.masses.1": [7.0], "speed_kmh": [250.0]}, **SHORT)),
+    ):  # fmt: skip
+        save(of, tmp_path / "s.csv", **RUN)
+        with (tmp_path / "s.csv").open(encoding="utf-8-sig") as file:
+            first = next(csv.reader(file))
+        assert first[:3] == names
+        assert "mean (N)" in first
+
+
+def test_a_heading_has_its_unit_wherever_its_name_stands_in_the_alphabet(tmp_path):
+    """Before "policy" or behind it: the swept values are the columns before it."""
+    names = {"sensors.speed_noise": " (m/s)", "catenary.mean_stiffness": " (N/m)", "policy.gain": ""}
+    for one, unit in names.items():
+        save([{one: 0.01, "policy": "p", "catenary": "it"}], tmp_path / "s.csv", **RUN)
+        with (tmp_path / "s.csv").open(encoding="utf-8-sig") as file:
+            assert next(csv.reader(file)) == [f"{one}{unit}", "policy", "catenary"]
+
+
+def test_labels_take_the_entries_of_the_settings_given():
+    assert labels(["catenary.mean_stiffness"], catenary="periodic-stiffness", seed=3) == {
+        "speed_kmh": "speed of the train (km/h)",
+        "catenary.mean_stiffness": "catenary: mean stiffness k_m (N/m)",
+    }
+
+
+@pytest.mark.parametrize(
+    ("values", "settings", "longest"),
+    [
+        ({"speed_kmh": [200.0, 100.0, 300.0]}, {}, {"speed_kmh": 100.0}),
+        ({"catenary.span_length": [50.0, 60.0, 40.0]}, {"distance": None}, {"span_length": 60.0}),
+    ],
+)
+def test_memory_is_checked_of_the_longest_pass_as_often_as_passes_run_at_once(
+    monkeypatch, values, settings, longest
+):
+    asked, built = [], []
+
+    class Cost:
+        memory = 10.0
+
+        def _replace(self, memory):
+            asked.append(memory)
+            return self
+
+        def check(self, what, less):
+            asked.append((what, less))
+            raise InputError("That is too much.")
+
+    monkeypatch.setattr(module, "workers_for", lambda jobs, workers: jobs * 10 + (workers or 0))
+    monkeypatch.setattr(module, "Task", lambda given: built.append(given) or SimpleNamespace(cost=Cost()))
+    given = {key: each for key, each in {**RUN, **settings}.items() if each is not None}
+    with pytest.raises(InputError, match=r"^That is too much\.$"):
+        sweep(values, workers=2, **given)
+    assert asked == [320.0, ("32 passes at once", ", or fewer workers")]
+    (settings,) = built
+    assert (
+        longest.items()
+        <= ({"speed_kmh": settings.speed_kmh[0], "span_length": settings.catenary.span_length}).items()
+    )
+
+
+def test_what_is_refused_of_a_pass_names_its_values():
+    with pytest.raises(
+        InputError, match=r"^At speed_kmh = 600, pantograph\.masses\.1 = 7: The speed must lie"
+    ):
+        sweep({"speed_kmh": [600.0], "pantograph.masses.1": [7.0]})
+    with pytest.raises(InputError, match=r"^speed_kmh has the value 250 twice; give each once\.$"):
+        sweep({"speed_kmh": [250.0, 300.0, 250.0]})
+    with pytest.raises(InputError, match="This sweep has 100,002 passes"):
+        sweep({"speed_kmh": [100.0 + k / 1e3 for k in range(50_001)]}, policies=[None, "p"])
+    with pytest.raises(InputError, match=r"^sensors\.delay changes nothing without a policy; name one\.$"):
+        sweep({"sensors.delay": [0.01]})
+    with pytest.raises(InputError, match=r"has no speed_kmh or policy\.gain|has no policy\.gain"):
+        sweep({"policy.gain": [0.3]}, policies=["p", None])
+
+
+def test_a_plot_of_one_value_and_without_figures_can_be_drawn():
+    (row,) = sweep({"speed_kmh": [250.0]}, **SHORT)
+    figure = plot_sweep([row], ["speed_kmh"])
+    assert figure.get_suptitle() == "pantograph three-mass, line periodic-stiffness, spans all"
+    assert figure.axes[-1].get_xlabel() == "speed_kmh"
+    other = row | {"pantograph.masses.1": 7.0, "spans": "1-2", "terminated": True}
+    figure = plot_sweep([row | {"pantograph.masses.1": 6.0}, other], ["pantograph.masses.1"])
+    assert figure.get_suptitle() == (
+        "pantograph three-mass, line periodic-stiffness, 250 km/h, spans 1-2 or all\n"
+        "1 of 2 passes ended early and are not shown"
+    )
+    maps = plot_sweep(
+        [
+            row | {"a": a, "b": b, "std": a + 10 * b, "min": math.nan}
+            for a in (1.0, 2.0, 3.0)
+            for b in (5.0, 6.0)
+        ],
+        ["a", "b"],
+    )
+    mesh = maps.axes[0].collections[0]
+    assert mesh.get_array().tolist() == [[51.0, 52.0, 53.0], [61.0, 62.0, 63.0]]
+    assert (mesh.norm.vmin, mesh.norm.vmax) == (51.0, 63.0)
+    assert (maps.axes[2].collections[0].norm.vmin, maps.axes[2].collections[0].norm.vmax) == (0.0, 1.0)
+    assert (maps.get_supxlabel(), maps.get_supylabel()) == ("a", "b")

@@ -1,0 +1,214 @@
+"""What commands hand on, with the work itself replaced; and the steps by which gains are fitted."""
+
+import importlib
+import json
+import pkgutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import click
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from panto_baselines import policies
+from panto_baselines.benchmark import command
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.policies.lanes_law import Gain, TunableLaw
+from panto_baselines.policies.repetitive import Repetitive
+from panto_baselines.policies.span_learner import PACE
+from panto_env.cli import make_app
+
+from ..command import panto, whole
+
+CONFIG = """
+policies = ["p"]
+seeds = 3
+[trainings]
+sac = ["one.safetensors", "two.safetensors"]
+[[lines]]
+catenary = "re250"
+pantograph = "dsa250"
+speeds_kmh = [200.0]
+[[lines]]
+catenary = "en50318-2002"
+pantograph = "en50318-2002"
+speeds_kmh = [250.0, 300.0]
+"""
+
+
+class EnoughError(Exception):
+    """The work would begin."""
+
+
+@pytest.fixture
+def handed(monkeypatch, tmp_path):
+    """The settings with which the command would run, from its words; CONFIG is its file."""
+    path = tmp_path / "mine.toml"
+    path.write_text(CONFIG)
+    got = {}
+
+    def run(settings, workers, progress, ray):
+        got.update(settings=settings, workers=workers, ray=ray)
+        raise EnoughError
+
+    monkeypatch.setattr(command, "run", run)
+
+    def of(*words, config=True):
+        app = typer.Typer()
+        app.command()(command.benchmark)
+        given = [*words, "--config", str(path)] if config else list(words)
+        done = CliRunner().invoke(app, given)
+        assert isinstance(done.exception, EnoughError), done.output
+        return SimpleNamespace(**got)
+
+    return of
+
+
+def lines(settings):
+    return [(each.catenary, each.pantograph, tuple(each.speeds_kmh)) for each in settings.lines]
+
+
+def test_without_options_the_benchmark_is_that_of_its_file_or_the_usual_one(handed, tmp_path):
+    found = handed()
+    assert found.settings == load_benchmark(tmp_path / "mine.toml")
+    assert found.settings.trainings == {"sac": ("one.safetensors", "two.safetensors")}
+    assert (found.workers, found.ray) == (None, None)
+    assert handed(config=False).settings == BenchmarkSettings()
+
+
+def test_policies_on_the_command_line_replace_the_file_s_and_its_trainings(handed):
+    settings = handed("pd", "p:gain=0.5").settings
+    assert settings.policies == ("passive", "pd", "p:gain=0.5")
+    assert settings.trainings == {}
+    assert settings.seeds == (0, 1, 2)
+    assert lines(settings) == lines(handed().settings)
+
+
+def test_a_line_on_the_command_line_replaces_all_and_a_speed_holds_on_each(handed):
+    before = handed().settings
+    settings = handed("--speed", "210", "--speed", "220").settings
+    assert lines(settings) == [(c, p, (210.0, 220.0)) for c, p, _ in lines(before)]
+    settings = handed("--catenary", "re330", "--speed", "280").settings
+    assert len(settings.lines) == 1
+    assert settings.lines[0].catenary != before.lines[0].catenary
+    assert settings.lines[0].speeds_kmh == (280.0,)
+    assert settings.policies == ("passive", "p")
+
+
+def test_other_options_replace_one_setting_each(handed):
+    found = handed("--seeds", "5", "--trusted", "--workers", "2", "--salt", "mine")
+    assert (found.settings.seeds, found.settings.trusted, found.workers) == ((0, 1, 2, 3, 4), True, 2)
+    assert found.settings.salt == "mine"
+    drawn = [handed("--salt", "draw").settings.salt for _ in range(2)]
+    assert drawn[0] != drawn[1]
+    assert all(len(salt) == 32 and int(salt, 16) >= 0 for salt in drawn)
+    assert handed("--control-interval", "0.02").settings.control_interval == 0.02
+
+
+@dataclass
+class Made:
+    """What is made of a data set, with its folder as a property as in the original."""
+
+    dataset_id: str = "pantograph/it-v0"
+    episodes: int = 1200
+    steps: int = 34567
+    megabytes: float = 1.26
+    designs: int = 2048
+    refused: int = 3
+    ended_early: int = 1004
+    warned: int = 5
+
+    @property
+    def folder(self):
+        return Path("data") / "it"
+
+
+def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path):
+    got = []
+
+    def make(several):
+        def made(settings, output, **named):
+            got.append((settings, output, named["workers"], named["ray"]))
+            return [Made()] if several else Made()
+
+        return made
+
+    monkeypatch.setattr("panto_baselines.dataset.make_episodes.make_episodes", make(True))
+    monkeypatch.setattr("panto_baselines.dataset.make_designs.make_designs", make(False))
+    output = tmp_path / "data"
+    words = ("--output", output, "--workers", 3)
+    shown = panto("dataset", "episodes", "dataset-known-line", *words, "--episodes", 2)
+    assert shown.returncode == 0, shown.stderr
+    assert all(word in shown.stdout for word in ("pantograph/it-v0", "1,200", "34,567", "1.3", str(output)))
+    told = json.loads(panto("dataset", "episodes", "dataset-known-line", *words, "--json").stdout)
+    assert told == [asdict(Made()) | {"folder": str(Path("data") / "it")}]
+    (fewer, _, *rest), (usual, *_) = got
+    assert rest == [3, None]
+    assert {each.episodes for each in fewer.sets} == {2}
+    assert [each.model_copy(update={"episodes": 2}) for each in usual.sets] == list(fewer.sets)
+    shown = panto("dataset", "designs", *words, "--count", 4)
+    assert all(word in shown.stdout for word in ("2,048", "3", "1,004", "5", "1.3"))
+    told = json.loads(panto("dataset", "designs", *words, "--json").stdout)
+    assert told == asdict(Made()) | {"folder": str(Path("data") / "it")}
+    assert got[2][0].count == 4
+    assert got[3][0].count != 4
+
+
+def groups(group, name="panto"):
+    yield name
+    for word, below in getattr(group, "commands", {}).items():
+        if isinstance(below, click.Group) or hasattr(below, "commands"):
+            yield from groups(below, f"{name} {word}")
+
+
+GROUPS = list(groups(whole()))
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_a_group_of_commands_shows_its_help_where_none_is_named(name):
+    words = name.split()[1:]
+    bare, asked = (CliRunner().invoke(make_app(), [*words, *more]) for more in ([], ["--help"]))
+    assert "Usage" in bare.output
+    assert bare.output.strip() == asked.output.strip()
+
+
+def test_the_groups_are_those_with_commands_of_their_own():
+    assert {"panto", "panto dataset", "panto submission"} <= set(GROUPS)
+
+
+LAWS = {
+    name: law
+    for module in pkgutil.iter_modules(policies.__path__)
+    for name, law in vars(importlib.import_module(f"{policies.__name__}.{module.name}")).items()
+    if isinstance(law, type) and issubclass(law, TunableLaw) and hasattr(law, "TUNED")
+}
+STEPS = {
+    "TunedProportionalDerivative": (0.05, 0.001, 20.0, 1.0),
+    "TunedFeedbackFeedforward": (0.05, 2.0, 2.0, 1.0),
+    "LinearQuadraticGaussian": (0.1, 0.2, 0.2, 0.05, 0.1, 0.2),
+    "HInfinity": (0.1, 0.05, 0.1),
+    "Skyhook": (20.0, 20.0),
+    "Repetitive": (0.13, 0.002, 0.1),
+}
+"""Changes by which the effect of gains is measured: they decide what a fit finds."""
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_gains_are_fitted_by_these_steps(name):
+    assert [each.step for each in LAWS[name].TUNED.values()] == pytest.approx(STEPS[name], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_step_is_small_beside_what_the_fit_starts_from(name):
+    for gain in LAWS[name].TUNED.values():
+        assert isinstance(gain, Gain)
+        assert 0 < gain.step <= (0.41 * abs(gain.first) or 20.0)
+
+
+def test_repetitive_control_is_fitted_from_its_usual_pace():
+    assert {key: gain.first for key, gain in Repetitive.TUNED.items()} == PACE._asdict()
+    assert {key: gain.step / gain.first for key, gain in Repetitive.TUNED.items()} == pytest.approx(
+        dict.fromkeys(PACE._fields, 0.2)
+    )

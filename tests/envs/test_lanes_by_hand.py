@@ -1,0 +1,94 @@
+"""Lanes in groups, and what is drawn of them: at the edges."""
+
+import copy
+import itertools
+import pickle
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from panto_env import InputError
+from panto_env.base.errors import AccuracyWarning
+from panto_env.base.machine import cores
+from panto_env.envs import PantographVectorEnv
+from panto_env.envs.lanes import ended_figures
+
+from .test_lines import FAMILY, make_vec, values_of
+
+QUICK = FAMILY | {"distance": 12.0}
+
+
+@pytest.mark.parametrize("way", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
+def test_groups_are_copied_without_the_threads_that_step_them(monkeypatch, way):
+    monkeypatch.setattr("panto_env.backend.threads.WORTH", 0.0)  # on threads, however short a step is
+    envs = make_vec(4, lines=2, **QUICK)
+    envs.reset(seed=0)
+    still = np.zeros((4, 1), np.float32)
+    for _ in range(6):
+        envs.step(still)
+    assert cores() == 1 or envs.unwrapped._lanes._threads._pool
+    twin = way(envs)
+    assert twin.unwrapped._lanes._threads._pool is None
+    np.testing.assert_array_equal(twin.step(still)[0], envs.step(still)[0])
+
+
+def test_an_action_that_is_not_finite_moves_no_group_while_other_lanes_wait():
+    envs = make_vec(4, lines=2, **QUICK | {"speed_kmh": (200, 350)})
+    envs.reset(seed=0)
+    ended, still = np.zeros(4, bool), np.zeros((4, 1), np.float32)
+    while not ended.any():
+        *_, terminated, truncated, _ = envs.step(still)
+        ended = terminated | truncated
+    assert not ended.all()
+    wrong = int(np.flatnonzero(~ended)[-1])
+    twin, actions = copy.deepcopy(envs), still.copy()
+    actions[wrong] = np.nan
+    with pytest.raises(InputError, match=f"The action of lane {wrong} must be finite"):
+        envs.step(actions)
+    for _ in range(2):
+        np.testing.assert_array_equal(envs.step(still)[0], twin.step(still)[0])
+
+
+def test_a_line_that_has_had_more_than_enough_episodes_is_drawn_anew():
+    """Two of three lanes begin at a time, so that the count of three is passed and not met."""
+    envs = make_vec(3, lines=1, **QUICK)
+    envs.reset(seed=0)
+    lines = []
+    for _ in range(6):
+        envs.reset(options={"reset_mask": np.array([True, True, False])})
+        lines.append(values_of(envs.unwrapped.context(0)))
+    assert [one == other for one, other in itertools.pairwise(lines)] == [
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
+
+
+def test_lanes_that_are_drawn_are_those_that_there_are():
+    PantographVectorEnv(num_envs=3, render_lanes=(0, 2))
+    for lanes, beyond in (((3,), 3), ((0, 5, 7), 5)):
+        with pytest.raises(InputError, match=f"render_lanes has lane {beyond}, but lanes are 0 to 2"):
+            PantographVectorEnv(num_envs=3, render_lanes=lanes)
+    with pytest.raises(InputError, match="3 lanes are too few for 4 lines; give fewer lines"):
+        PantographVectorEnv(num_envs=3, lines=4, **FAMILY)
+    assert len(PantographVectorEnv(num_envs=3, lines=3, **FAMILY)._lanes._groups) == 3
+    assert len(PantographVectorEnv(num_envs=3, **FAMILY)._lanes._groups) == 3
+
+
+def test_a_run_that_diverged_has_no_figures_and_the_warning_is_the_caller_s():
+    without = np.array([False, True])
+    task = SimpleNamespace(
+        figures_of=lambda lanes: ({"mean": np.array([1.0, 2.0])}, without),
+        divergence=lambda lane: f"Lane {lane} diverged.",
+    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        figures = ended_figures(task, np.array([4, 7]))
+    np.testing.assert_array_equal(figures["mean"], [1.0, np.nan])
+    (warning,) = said
+    assert (str(warning.message), warning.category) == ("Lane 7 diverged.", AccuracyWarning)
+    assert warning.filename == __file__
