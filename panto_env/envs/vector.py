@@ -165,6 +165,7 @@ class PantographVectorEnv(
         waiting = None  # in "NextStep": lanes that are reset instead of stepped
         if self._any_ended:
             waiting = self._ended
+            force = np.where(waiting[:, None], 0.0, force)  # nobody acts there, whatever was given
         ended = self._lanes.step(force, waiting, self._generator)
         answer = self._lanes.answer()
         results = answer.results

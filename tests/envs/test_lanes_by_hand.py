@@ -6,6 +6,7 @@ import pickle
 import warnings
 from types import SimpleNamespace
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -92,3 +93,23 @@ def test_a_run_that_diverged_has_no_figures_and_the_warning_is_the_caller_s():
     (warning,) = said
     assert (str(warning.message), warning.category) == ("Lane 7 diverged.", AccuracyWarning)
     assert warning.filename == __file__
+
+
+@pytest.mark.parametrize("lines", [{}, {"catenary": "family:high-speed", "lines": 2}], ids=["one", "groups"])
+def test_the_action_of_a_lane_that_is_reset_does_not_count(lines):
+    """Not even where it is no number, in lanes of one line or of several."""
+    settings = {"distance": 12.0, "settle": 0.0, "speed_kmh": (200, 320), "accuracy": "fast"} | lines
+    observed = []
+    for of_waiting in (0.0, np.nan):
+        envs = gymnasium.make_vec("panto_env:Pantograph-v0", 4, **settings)
+        envs.reset(seed=0)
+        ended = np.zeros(4, dtype=bool)
+        while not ended.any():
+            *_, terminated, truncated, _ = envs.step(np.zeros((4, 1), np.float32))
+            ended = terminated | truncated
+        assert not ended.all()
+        observed.append(envs.step(np.where(ended, of_waiting, 0.0)[:, None].astype(np.float32))[0])
+        with pytest.raises(InputError, match="lane"):
+            envs.step(np.full((4, 1), np.nan, np.float32))
+        envs.close()
+    np.testing.assert_array_equal(*observed)
