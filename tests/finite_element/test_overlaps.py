@@ -196,7 +196,9 @@ def test_energy_is_balanced_through_an_overlap():
 OVERLAPS = [name for name, section in sections().items() if section.line.overlaps]
 
 
-@pytest.mark.parametrize("name", OVERLAPS)
+@pytest.mark.parametrize(
+    "name", [OVERLAPS[0], *(pytest.param(name, marks=pytest.mark.slow) for name in OVERLAPS[1:])]
+)
 def test_the_force_passes_from_one_wire_to_the_other_in_the_middle_span(name, capsys):
     section = sections()[name]
     (overlap,) = section.line.overlaps
