@@ -13,6 +13,7 @@ from panto_env.plant.catenary.flexible.clear import clear_spans
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
 from panto_env.plant.catenary.flexible.static import solve
+from panto_env.plant.catenary.flexible.window import STITCHED_ERROR, STITCHED_SHARE
 from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
 from panto_env.plant.catenary.schema import CLEAR
 from panto_env.plant.numerics import Numerics, Runs
@@ -149,6 +150,11 @@ def test_a_window_that_costs_more_than_one_per_cent_is_warned_of():
 )
 def test_default_window_agrees_with_the_whole_line(case):
     (check,) = windows.check_windows(case, [None])
-    assert abs(check.std) < 1
-    assert max(abs(check.max), abs(check.min)) < 1  # % of the mean force
+    wires, bound = case.line.wires, 1
+    if case.line.stitch_wire and case.speed_kmh / 3.6 < STITCHED_SHARE * max(
+        wire.wave_speed for wire in wires
+    ):
+        bound = STITCHED_ERROR  # of which a warning tells
+    assert abs(check.std) < bound
+    assert max(abs(check.max), abs(check.min)) < bound  # % of the mean force
     assert abs(check.uplift) < 2

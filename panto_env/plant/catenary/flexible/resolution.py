@@ -22,6 +22,7 @@ from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
+from .stitches import stitches_of
 from .waves import carrying_grid
 from .window import window_of
 
@@ -200,7 +201,7 @@ def _lightest(runs: Runs) -> float:
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
-    window, lightest = window_of(data.wires, numerics, runs, bool(data.overlaps)), _lightest(runs)
+    window, lightest = _window(data, numerics, runs), _lightest(runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(required.time_step)
@@ -217,6 +218,11 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
         if stable(data, span / count, step, lightest):
             return Resolution(span / count, step, window)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
+
+
+def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
+    stitched = stitches_of(data).support.size > 0
+    return window_of(data.wires, numerics, runs, bool(data.overlaps), stitched)
 
 
 def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:

@@ -22,6 +22,10 @@ line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (doc
 WITH_OVERLAPS = 10
 """Minimum number of spans about a train that passes overlaps, whose anchors send waves back: with 5 or 8 of
 them sigma there is wrong by up to 13 or 6 %, with 10 by less than 1 %."""
+STITCHED = 40
+"""Spans about a train on a line with stitch wires, past whose supports waves travel far."""
+STITCHED_SHARE, STITCHED_ERROR = 0.45, 4
+"""Share of the faster wire's wave speed below which even so many leave an error in sigma; the error (%)."""
 ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
 """From a number of spans on: error (%) of figures where more are needed."""
 
@@ -32,8 +36,10 @@ def enough_spans(wires: tuple[Wire, Wire], runs: Runs) -> int:
     return next((spans for limit, spans in ENOUGH if share <= limit), ENOUGH[-1][1])
 
 
-def window_of(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, overlaps: bool = False) -> int:
-    """Spans computed about the train; 0: the whole line. overlaps: whether the line has any.
+def window_of(
+    wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, overlaps: bool = False, stitched: bool = False
+) -> int:
+    """Spans computed about the train; 0: the whole line. overlaps, stitched: whether the line has such.
 
     Raises InputError for a given window where the wire itself has defects.
     """
@@ -46,16 +52,20 @@ def window_of(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, overlaps
     if numerics.window is not None or whole:
         return numerics.window or 0
     usual = max(WINDOW[numerics.accuracy], WITH_OVERLAPS if overlaps else 0)
-    return max(usual, enough_spans(wires, runs)) if numerics.accuracy == "full" else usual
+    if numerics.accuracy != "full":
+        return usual
+    return max(usual, enough_spans(wires, runs), STITCHED if stitched else 0)
 
 
-def clear_spans(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, last: int) -> int:
+def clear_spans(
+    wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, last: int, stitched: bool = False
+) -> int:
     """Spans of a line beyond the ``last`` one of a pass that keep its far anchor's waves from the train.
 
     Waves and the train leave the line's start together. Raises InputError where a whole line would be too
     long.
     """
-    window = window_of(wires, numerics, runs)
+    window = window_of(wires, numerics, runs, stitched=stitched)
     if window:
         return max(CLEAR, window // 2)
     speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
@@ -69,6 +79,19 @@ def clear_spans(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, last: 
             "spans."
         )
     return max(CLEAR, needed - last)
+
+
+def warn_if_slow(wires: tuple[Wire, Wire], runs: Runs) -> None:
+    """Warn of slow trains on a line with stitch wires."""
+    limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
+    if runs.speeds[0] < limit:
+        warnings.warn(
+            f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
+            f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
+            "spans; give window=0 for the whole line.",
+            AccuracyWarning,
+            stacklevel=4,
+        )
 
 
 def warn_if_short(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs) -> None:
