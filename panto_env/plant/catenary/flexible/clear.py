@@ -7,25 +7,21 @@ from . import window
 from .fixed_wires import tensions_of_fixed
 from .parts import Conductor
 from .schema import FlexibleCatenaryData
-from .stitches import stitches_of
+from .stitches import stitched
 from .tension import with_tension_left
 
 
 def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last: int) -> int:
     """As ``CatenaryKind.clear_spans``; a whole line needs more of them for a slower train."""
-    return window.clear_spans(_wires_in(data, runs), numerics, runs, last, _stitched(data))
+    return window.clear_spans(_wires_in(data, runs), numerics, runs, last, stitched(data))
 
 
 def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
     """As ``CatenaryKind.warn_if_short``."""
     wires = _wires_in(data, runs)
     window.warn_if_short(wires, numerics, runs)
-    if _stitched(data) and numerics.accuracy == "full" and numerics.window is None:
+    if stitched(data) and numerics.accuracy == "full" and numerics.window is None:
         window.warn_if_slow(wires, runs)
-
-
-def _stitched(data: FlexibleCatenaryData) -> bool:
-    return stitches_of(data).support.size > 0
 
 
 def _wires_in(data: FlexibleCatenaryData, runs: Runs) -> tuple[Conductor, Conductor]:

@@ -20,7 +20,7 @@ from ...line_condition import LineCondition
 from ..schema import LOWEST_TENSION
 from .defects import DefectiveLine
 from .schema import FlexibleCatenaryData
-from .stitches import stitches_of
+from .stitches import stitched
 from .tension import shape_left, with_tension_left
 
 UNCHANGED = (1.0, 1.0)
@@ -42,14 +42,14 @@ def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> t
             f"Temperature changes nothing on line '{data.name}', as weights keep the tension of both wires; "
             "leave it out, or give a wire that is fixed at both ends its axial_stiffness."
         )
-    if condition.ice and stitches_of(data).support.size:
+    if condition.ice and stitched(data):
         raise InputError(
             f"Line '{data.name}' has stitch wires, on which ice is not computed; leave it out, or take "
             "stitch wires of length 0."
         )
     if not (any(fixed) and (condition.temperature or condition.ice)):
         return UNCHANGED
-    if stitches_of(data).support.size or data.overlaps:
+    if stitched(data) or data.overlaps:
         raise InputError(
             f"Line '{data.name}' has stitch wires or overlaps, with which wires that are fixed at both ends "
             "are not computed; leave out axial_stiffness, or ice and temperature."

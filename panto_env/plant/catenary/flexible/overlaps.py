@@ -15,6 +15,7 @@ from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ....base.remember import remembered
 from ..schema import FEWEST_SPANS
+from .arrays import CONTACT
 from .beams import Profile
 from .parts import Overlap, Span
 from .schema import FlexibleCatenaryData
@@ -218,13 +219,15 @@ def profiles(
     return [(parts[0], shape.contact, shape.messenger)]
 
 
-def heights_of_pair(line: FlexibleCatenaryData, shape: StaticShape, pair: int, x: Array) -> Array:
-    """Height of a pair's contact wire at positions x (m), (n,); ``FAR`` where it has none."""
+def heights_of_pair(
+    line: FlexibleCatenaryData, shape: StaticShape, pair: int, x: Array, wire: int = CONTACT
+) -> Array:
+    """Height of a pair's contact wire or messenger at positions x (m), (n,); ``FAR`` where it has none."""
     if not line.overlaps:
-        return shape.contact.height(x)
+        return (shape.contact, shape.messenger)[wire].height(x)
     found = np.full(len(x), FAR)
-    for part, profile, _ in profiles(line, shape):
+    for part, *both in profiles(line, shape):
         if part.pair == pair:
             ours = (x >= part.begin) & (x <= part.end)
-            found[ours] = profile.height(x[ours] - part.begin)
+            found[ours] = both[wire].height(x[ours] - part.begin)
     return found

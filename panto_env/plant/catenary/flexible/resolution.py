@@ -22,7 +22,7 @@ from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import nodes_per_span, stable
 from .schema import FlexibleCatenaryData
-from .stitches import stitches_of
+from .stitches import stitched
 from .waves import carrying_grid
 from .window import window_of
 
@@ -221,8 +221,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
 
 
 def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    stitched = stitches_of(data).support.size > 0
-    return window_of(data.wires, numerics, runs, bool(data.overlaps), stitched)
+    return window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data))
 
 
 def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:

@@ -139,6 +139,11 @@ def moving(stitches: Stitches, spans: int) -> Stitches:
     return stitches.some(inner, number[stitches.carrying])
 
 
+def stitched(line: FlexibleCatenaryData) -> bool:
+    """Whether a line has any stitch wire."""
+    return stitches_of(line).support.size > 0
+
+
 def _check(line: FlexibleCatenaryData, stitches: Stitches, x: Array) -> None:
     """Raise InputError for stitch wires that overlap, take too much tension, or hold a dropper at a clamp."""
     which = [f"The stitch wire of line '{line.name}' at support {k + 1}" for k in stitches.support]

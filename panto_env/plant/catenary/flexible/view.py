@@ -11,7 +11,7 @@ from ....base.arrays import Array, Index
 from ..view import LineView
 from .arrays import CONTACT, MESSENGER, PAD
 from .beams import Profile
-from .overlaps import FAR, profiles, tension_lengths
+from .overlaps import FAR, heights_of_pair, tension_lengths
 from .scattered_build import present, rope_nodes
 from .segments import along
 from .shape import StaticShape
@@ -94,11 +94,7 @@ def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
 def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
     """Height of a pair's messenger at rest (m), (n,)."""
     if model.data.overlaps:
-        found = np.full(len(x), FAR)
-        for part, _, profile in profiles(model.data, shape):
-            ours = (x >= part.begin) & (x <= part.end) & (part.pair == pair)
-            found[ours] = profile.height(x[ours] - part.begin)
-        return found
+        return heights_of_pair(model.data, shape, pair, x, MESSENGER)
     heights = messenger_heights(shape)
     return np.interp(place, np.linspace(0.0, model.line.shape_length, len(heights)), heights)
 
