@@ -53,8 +53,6 @@ class LaneGroups:
     def step(self, action: Array, waiting: Flags | None, random: OfLane) -> bool:
         """As ``VectorLanes.step``."""
         wrong = ~np.isfinite(action).all(axis=1)
-        if waiting is not None:
-            wrong &= ~waiting
         if wrong.any():  # before any group has moved
             raise not_finite(action, int(wrong.argmax()), several=True)
         return self._threads.step(action, waiting, random) > 0
