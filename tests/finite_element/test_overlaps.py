@@ -10,7 +10,6 @@ from scipy.sparse.linalg import splu
 from panto_env.catalog import load_catenary, load_pantograph
 
 from .energy import balance
-from .figures import figures
 from .pairs import pairs_of
 from .rest import at_rest, pair_at_rest
 from .sections import STITCHED_330, line_of, sections, stitched
@@ -228,15 +227,3 @@ def test_the_force_passes_from_one_wire_to_the_other_in_the_middle_span(name, ca
     for pair, away in ((1, begin - run.position), (0, run.position - end)):
         assert (run.wire_forces[away > 5, pair] == 0).all()
     assert (run.support_position == np.array(supports[1:-1])).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", OVERLAPS)
-def test_half_of_element_and_step_change_the_figures_little(name):
-    """Extremes by a share of the mean force: the minimum converges last."""
-    section = sections()[name]
-    coarse, fine = (figures(section.by_finite_elements(element), section.spans) for element in (0.5, 0.25))
-    assert (coarse.std, coarse.mean) == pytest.approx((fine.std, fine.mean), rel=0.005)
-    extremes = coarse.maximum, coarse.minimum
-    assert extremes == pytest.approx((fine.maximum, fine.minimum), abs=0.012 * fine.mean)
-    assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)

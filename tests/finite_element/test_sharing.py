@@ -27,7 +27,7 @@ def test_wires_are_touched_at_the_same_places_by_the_same_forces(name):
     )
     step, total, second = np.array(seen).T
     x, ours = step * (run.position[1] - run.position[0]), np.stack([total - second, second], axis=1)
-    other = section.by_finite_elements(0.5)
+    other = section.by_finite_elements()
     theirs = np.stack([np.interp(x, other.position, force) for force in other.wire_forces.T], axis=1)
 
     places = np.array(

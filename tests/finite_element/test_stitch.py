@@ -8,7 +8,6 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.schema import StitchWire
 
 from .energy import balance
-from .figures import figures
 from .pairs import pairs_of
 from .rest import at_rest
 from .sections import BARE, STITCHED_330, sections, stitched
@@ -221,15 +220,3 @@ def test_what_cannot_be_is_refused():
     )
     with pytest.raises(ValueError, match="stitch wires at 65 and 80 m overlap"):
         at_rest(close, 3, 1.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["stitched-330", "stitched-250", "some-stitched"])
-def test_half_of_element_and_step_change_the_figures_little(name):
-    """Extremes by a share of the mean force: the minimum converges last."""
-    section = sections()[name]
-    coarse, fine = (figures(section.by_finite_elements(element), section.spans) for element in (0.5, 0.25))
-    assert (coarse.std, coarse.mean) == pytest.approx((fine.std, fine.mean), rel=0.005)
-    extremes = coarse.maximum, coarse.minimum
-    assert extremes == pytest.approx((fine.maximum, fine.minimum), abs=0.012 * fine.mean)
-    assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)

@@ -125,17 +125,6 @@ def test_energy_is_balanced_under_a_bridge():
     assert found.error < 1e-3 * found.turnover
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "minimum"), [("mixed", 0.005), ("bridge", 0.005), ("both", 0.02)])
-def test_half_of_element_and_step_change_the_figures_little(name, minimum):
-    """The minimum converges last, with the element: what a wire yields to a force within one is missing."""
-    section = SECTIONS[name]
-    coarse, fine = (figures(section.by_finite_elements(element), section.spans) for element in (0.5, 0.25))
-    for key, share in {"std": 0.005, "maximum": 0.005, "minimum": minimum, "mean": 0.005}.items():
-        assert getattr(coarse, key) == pytest.approx(getattr(fine, key), rel=share)
-    assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)
-
-
 def test_figures_of_a_stretch_are_those_of_its_spans():
     section = SECTIONS["mixed"]
     run = simulate(
