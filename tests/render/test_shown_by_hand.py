@@ -21,12 +21,13 @@ from panto_env.metrics.labels import LABELS
 from panto_env.plant.state import Row
 from panto_env.render import live as live_module
 from panto_env.render.canvas import Canvas, rgb, zigzag
-from panto_env.render.filmed import alike
+from panto_env.render.film import Excerpt, frames
+from panto_env.render.filmed import alike, policy_pass
 from panto_env.render.layout import Layout
 from panto_env.render.moment import Felt, felt, moment_of
 from panto_env.render.strip import Strip, _characters, _round, chart
 from panto_env.render.video import _failure
-from panto_env.render.viewer import figures_so_far
+from panto_env.render.viewer import Viewer, figures_so_far
 
 STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 
@@ -273,3 +274,52 @@ def test_the_exaggeration_is_of_the_messenger_or_of_the_contact_wire_where_there
         )
         of[name] = Layout.of(replace(now, line=line), 640, 360).exaggeration
     assert of["contact"] == of["messenger"] < Layout.of(now, 640, 360).exaggeration
+
+
+def test_a_viewer_opens_one_window_until_it_is_closed(monkeypatch):
+    events = []
+
+    class Window:
+        def __init__(self, size, title):
+            events.append(("opened", size, title))
+
+        def show(self, frame, rate):
+            events.append((frame, rate))
+
+        def close(self):
+            events.append("closed")
+
+    monkeypatch.setattr("panto_env.render.window.Window", Window)
+    viewer = Viewer((64, 48))
+    viewer.close()
+    for number in (1, 2):
+        viewer.show(number, "a title", 25.0)
+    viewer.close()
+    viewer.close()
+    viewer.show(3, "another", 50.0)
+    assert events == [
+        ("opened", (64, 48), "a title"), (1, 25.0), (2, 25.0), "closed",
+        ("opened", (64, 48), "another"), (3, 50.0),
+    ]  # fmt: skip
+
+
+def test_each_lane_keeps_its_picture_and_shows_the_reward():
+    task, viewer = driven(5), Viewer((320, 180))
+    first = viewer.frame(task, 0, "a title", 1.234).copy()
+    kept = viewer._pictures[0]
+    assert first.shape == (180, 320, 3)
+    assert np.any(viewer.frame(task, 0, "a title", -7.0) != first)
+    assert viewer._pictures == {0: kept}
+
+
+def test_the_frames_of_a_film_and_the_share_that_is_drawn():
+    """A fifth of the way is the run up to where it begins, the rest its frames: every second step."""
+    filmed, shares = policy_pass("p", STIFFNESS | {"distance": 510.0}, 0), []
+    what = Excerpt(begin=0.5, end=0.6, every=2, rate=25.0)
+    seen = list(frames([filmed], what, (64, 64), shares.append))
+    before, during = shares[: -len(seen)], shares[-len(seen) :]
+    assert (len(before), len(seen)) == (49, 6)
+    assert before == pytest.approx([0.2 * k / 50 for k in range(1, 50)])
+    assert during == pytest.approx([0.2 + 0.8 * k / 5 for k in range(6)])
+    above = list(frames([filmed, filmed], what, (64, 128)))
+    assert [frame.shape for frame in above] == [(128, 64, 3)] * 6
