@@ -167,6 +167,9 @@ def test_what_a_moment_says_of_its_task():
     gaps = np.diff(now.places)
     np.testing.assert_allclose(gaps, 200 / 3.6 * task.plant.time_step, rtol=1e-6)
     assert now.places[-1] == pytest.approx(now.position - gaps[0] / 2)
+    later = moment_of(driven(300), 0, "", {})  # at 167 m, of which the last 65 m are shown
+    assert later.position - 65.0 <= later.places.min() < later.position - 65.0 + gaps[0]
+    assert len(later.places) == len(later.force) == len(later.filtered)
 
 
 def test_a_window_shows_every_pixel_where_it_is(monkeypatch):

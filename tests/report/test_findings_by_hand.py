@@ -90,6 +90,7 @@ def drawn(monkeypatch):
 
 def test_charts_stand_on_the_page_of_runs_that_have_them(whole, short, drawn):
     assert (short.figures, whole.figures is None) == (None, False)
+    np.testing.assert_allclose(whole.folded.share, np.arange(240) / 240)
     for runs, shown in (
         ([whole], ["force_along:whole.parquet;", "force_folded:whole.parquet;", "spectrum:whole.parquet;"]),
         ([short], ["force_along:short.parquet;"]),
