@@ -30,6 +30,12 @@ def drawn(seed, **other):
     return lines_of.DrawnLine(seed=seed, ending="", **values | other)
 
 
+@pytest.fixture(autouse=True)
+def wide(monkeypatch):
+    """Whole cells in one line, whatever the terminal."""
+    monkeypatch.setenv("COLUMNS", "200")
+
+
 @pytest.fixture
 def made(monkeypatch):
     """Lets a command find lines that are made up; what it asked for is in the list that is returned."""

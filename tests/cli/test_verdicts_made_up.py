@@ -8,7 +8,7 @@ import pytest
 from panto_env.base.table import Table
 
 from ..command import panto
-from .test_printed_made_up import cells
+from .test_printed_made_up import cells, wide  # noqa: F401  # a fixture
 
 
 def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
