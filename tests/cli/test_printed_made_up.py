@@ -10,6 +10,7 @@ from panto_env.analysis import family as lines_of
 from panto_env.base.table import Table
 from panto_env.catalog import load_catenary, load_drawn
 from panto_env.studies import Comparison, Outcome
+from panto_env.terminal import console
 
 from ..command import panto
 
@@ -33,7 +34,7 @@ def drawn(seed, **other):
 @pytest.fixture(autouse=True)
 def wide(monkeypatch):
     """Whole cells in one line, whatever the terminal."""
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(console, "_width", 200)
 
 
 @pytest.fixture
