@@ -7,6 +7,7 @@ import pytest
 
 from panto_baselines.benchmark import returns as returns_of
 from panto_baselines.benchmark.controls import BLIND, TAPE, control_of, policy_of
+from panto_baselines.benchmark.replay import _difference
 from panto_baselines.benchmark.submission import REQUIREMENTS, read_submission
 from panto_baselines.benchmark.submission_command import _report
 from panto_baselines.oracle.solver import MEAN_TOLERANCE, MEAN_WEIGHT, _mean_met, merit
@@ -25,6 +26,26 @@ def test_a_policy_is_no_control(given):
 def test_a_control_names_the_policy_behind_it(kind):
     assert control_of(f"{kind}pd:gain=1") == kind
     assert policy_of(f"{kind}pd:gain=1") == "pd:gain=1"
+
+
+@pytest.mark.parametrize(
+    ("stored", "again", "difference"),
+    [
+        ({"a": 2.0, "b": "x", "c": None}, {"a": 2.0, "b": "x", "c": None}, 0.0),
+        ({"a": 4.0, "b": -1.0}, {"a": 3.0, "b": -1.5}, 1 / 3),
+        ({"a": 3.0}, {"a": 4.0}, 0.25),
+        ({"a": -1.0}, {"a": 1.0}, 2.0),
+        ({"a": 1.0}, {"a": None}, np.inf),
+        ({"a": None}, {"a": 1.0}, np.inf),
+        ({"a": 1.0}, {"a": 2}, np.inf),
+        ({"a": 1, "b": 1.0}, {"a": 2, "b": 1.0}, np.inf),
+        ({"a": "x"}, {"a": "y"}, np.inf),
+        ({"a": 1.0}, {"b": 1.0}, np.inf),
+        ({"a": 1.0}, {"a": 1.0, "b": 1.0}, np.inf),
+    ],
+)
+def test_rows_differ_by_their_largest_relative_difference(stored, again, difference):
+    assert _difference(stored, again) == pytest.approx(difference)
 
 
 def test_a_scale_goes_from_its_lowest_to_its_highest_value():

@@ -1,0 +1,168 @@
+"""What a report finds in runs that are made up, and which charts stand on its page."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from panto_env import InputError, simulate
+from panto_env.report import charts, findings
+from panto_env.report.findings import Findings
+from panto_env.report.page import MOST, _different, _side_by_side, _title, number, page
+
+from ..metrics.test_summary import RUN
+
+SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
+CHARTS = ("force_along", "force_folded", "spectrum", "uplifts", "stiffness")
+
+
+def alone(**facts):
+    """A run of four spans of 5 m: the whole of it, since its usual spans would begin with the tenth."""
+    return Findings(replace(RUN, **facts), "it.parquet")
+
+
+def test_what_is_found_in_a_run_of_four_spans():
+    """Samples every 0.5 m from 0.25 m on; the supports at 5, 10 and 15 m rise by up to 239, 139 and 39 mm."""
+    one = alone()
+    assert (one.covered, one.figures, one.criteria, one.folded, one.by_span) == (None, None, [], None, [])
+    assert one.inside.all()
+    force = np.full(40, 100.0)
+    force[[3, 4, 5, 39]] = 0.0, -2.0, 0.0, 0.0
+    lost = alone(contact_force=force).losses
+    assert [(loss.position, loss.duration) for loss in lost] == [
+        (pytest.approx(1.75), pytest.approx(0.03)),
+        (pytest.approx(19.75), pytest.approx(0.01)),
+    ]
+    assert [(k, place) for k, place, _ in one.uplifts] == [(1, 5.0), (2, 10.0), (3, 15.0)]
+    assert [uplift for *_, uplift in one.uplifts] == pytest.approx([0.239, 0.139, 0.039])
+    assert [k for k, *_ in alone(uplift=RUN.uplift[:, :2]).uplifts] == [1, 2]
+    # A support counts up to one and a half strides, 0.75 m, from the first sample or the last.
+    for begin, end, place, counts in (
+        (11, 39, 5.1, True), (11, 39, 4.9, False), (0, 7, 4.4, True), (0, 7, 4.6, False), (12, 13, 6.3, True)
+    ):  # fmt: skip
+        part = alone(support_position=np.array([place, 99.0, 99.0]))
+        part.__dict__["inside"] = np.isin(np.arange(40), np.arange(begin, end + 1))
+        assert [k for k, *_ in part.uplifts] == [1] * counts, (begin, end, place)
+
+
+@pytest.mark.parametrize(("covered", "choice"), [(None, "all"), ((10, 12), None)])
+def test_what_is_judged_by_span_stretch_and_dropper_is_what_is_evaluated(monkeypatch, covered, choice):
+    asked = []
+    for name in ("by_span", "by_stretch", "moving_droppers"):
+        monkeypatch.setattr(
+            findings, name, lambda run, spans, name=name: asked.append((name, spans)) or [name]
+        )
+
+    def spans():
+        if covered is None:
+            raise InputError("The run is too short.")
+        return covered
+
+    one = Findings(SimpleNamespace(spans=spans, spans_differ=True), "it")
+    assert one.covered == covered
+    assert (one.by_span, one.by_stretch, one.droppers) == (["by_span"], ["by_stretch"], ["moving_droppers"])
+    assert asked == [(name, choice) for name in ("by_span", "by_stretch", "moving_droppers")]
+    assert Findings(SimpleNamespace(spans=spans, spans_differ=False), "it").by_span == []
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return Findings(simulate(**SHORT), "whole.parquet")
+
+
+@pytest.fixture(scope="module")
+def short():
+    return Findings(simulate(**SHORT, distance=120.0), "short.parquet")
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Charts that are only their names, with those of the runs that they were given."""
+    for name in CHARTS:
+
+        def told(given, *_, name=name):
+            files = [one.file for one in given] if isinstance(given, dict) else [given.file]
+            return f"{name}:{','.join(files)};"
+
+        monkeypatch.setattr(charts, name, told)
+
+
+def test_charts_stand_on_the_page_of_runs_that_have_them(whole, short, drawn):
+    assert (short.figures, whole.figures is None) == (None, False)
+    np.testing.assert_allclose(whole.folded.share, np.arange(240) / 240)
+    for runs, shown in (
+        ([whole], ["force_along:whole.parquet;", "force_folded:whole.parquet;", "spectrum:whole.parquet;"]),
+        ([short], ["force_along:short.parquet;"]),
+        (
+            [short, whole],
+            [
+                "force_along:short.parquet;",
+                "force_along:whole.parquet;",
+                "force_folded:whole.parquet;",
+                "spectrum:whole.parquet;",
+            ],
+        ),
+    ):
+        text = page(runs)
+        assert [each for each in shown if each in text] == shown
+        assert sum(text.count(f"{name}:") for name in CHARTS) == len(shown)
+
+
+def test_a_page_holds_one_to_eight_runs(short, drawn):
+    assert MOST == 8
+    names = [f"{k}.parquet" for k in range(9)]
+    runs = [Findings(short.run, name) for name in names]
+    assert all(f"force_along:{name};" in page(runs[:8]) for name in names[:8])
+    for count in (0, 9):
+        with pytest.raises(InputError, match=f"^A report shows 1 to 8 runs, not {count}\\.$"):
+            page(runs[:count])
+
+
+def test_a_run_without_its_design_is_refused(short):
+    with pytest.raises(InputError, match=r"^old\.parquet was written by an older version"):
+        _ = Findings(replace(short.run, design={}), "old.parquet").line
+    assert short.line.name == "periodic-stiffness"
+    assert short.pantograph.name == "three-mass"
+
+
+def test_titles_and_names_tell_runs_apart():
+    def of(file, **facts):
+        usual = {"catenary": "a", "pantograph": "b", "speed_kmh": 250.0, "policy": "passive", "seed": 0}
+        return Findings(SimpleNamespace(**usual | facts), file)
+
+    runs = [of("1"), of("2", speed_kmh=80.5), of("3", pantograph="c")]
+    assert _title(runs) == "b on a, c on a at 80.5, 250 km/h"
+    assert [*charts.names_of(runs).values()] == ["b, 250 km/h", "b, 80.5 km/h", "c, 250 km/h"]
+    assert [*charts.names_of(runs[:1]).values()] == ["250 km/h"]
+    assert [*charts.names_of([of("1"), of("2")]).values()] == ["250 km/h (1)", "250 km/h (2)"]
+    assert [*charts.names_of([of("1"), of("2", seed=3)]).values()] == ["seed 0", "seed 3"]
+    same = [of("1"), of("2", policy="pd"), of("3", policy="pd")]
+    assert [*charts.names_of(same).values()] == ["passive (1)", "pd (2)", "pd (3)"]
+
+
+def test_criteria_of_unlike_runs_stand_in_one_row_each():
+    def of(*keys):
+        return SimpleNamespace(criteria=[SimpleNamespace(key=key) for key in keys])
+
+    runs = [of("max", "slack"), of("mean", "max")]
+    rows = _side_by_side(runs)
+    assert [first.key for first, _ in rows] == ["max", "slack", "mean"]
+    assert [[each and each.key for each in own] for _, own in rows] == [
+        ["max", "max"], ["slack", None], [None, "mean"]
+    ]  # fmt: skip
+    assert rows[0][0] is runs[0].criteria[0]
+    assert rows[2][0] is runs[1].criteria[0]
+
+
+def test_runs_of_one_line_are_grouped_by_its_values():
+    texts = {"1": "x", "2": "y", "3": "x"}
+    runs = [Findings(SimpleNamespace(), file) for file in texts]
+    for one in runs:
+        one.__dict__["line"] = SimpleNamespace(model_dump_json=lambda text=texts[one.file]: text)
+    assert _different(runs, "line") == {runs[0]: ["1", "3"], runs[1]: ["2"]}
+    assert [number(value, digits) for value, digits in ((1.25, 1), (-3.0, 0), (np.inf, 1))] == [
+        "1.2",
+        "-3",
+        "–",
+    ]
