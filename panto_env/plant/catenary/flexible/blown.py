@@ -29,6 +29,8 @@ COPPER, ICE = 8900.0, 900.0
 """kg/m^3."""
 STRAND = 0.76
 """Share of a strand's circle that is metal, for a messenger (nineteen wires)."""
+HEAVIEST = 1.6
+"""Metal of one wire (kg/m); a heavier one stands for two side by side, each in the wind."""
 POINTS_PER_WAVE = 6
 """Of the shortest gusts along the track."""
 INTERVAL = 0.01
@@ -40,9 +42,11 @@ NO_AIR = Air(np.zeros(0), 1, 1)
 
 
 def diameter(wire: Wire, strand: bool, ice: float) -> float:
-    """Of a wire (m): as its mass without ice has it in copper, with a coat of ice (kg/m) about it."""
-    metal = 4 * (wire.mass - ice) / (math.pi * COPPER * (STRAND if strand else 1.0))
-    return math.sqrt(metal + 4 * ice / (math.pi * ICE))
+    """Of a wire (m), or of those that it stands for in sum: their mass as copper, ice (kg/m) in a coat."""
+    metal = wire.mass - ice
+    count = math.ceil(metal / HEAVIEST)
+    area = metal / (COPPER * (STRAND if strand else 1.0)) + ice / ICE
+    return math.sqrt(4 * count * area / math.pi)
 
 
 def air_about(line: FlexibleLine, wires: tuple[Wire, Wire], ice: float, time_step: float) -> Air:
