@@ -14,6 +14,7 @@ from ..plant.drift import draw_drift
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.build import with_scatter
 from ..plant.pantograph.schema import PantographData
+from ..plant.side_wind import draw_side_wind
 from ..plant.wind import draw_wind
 from .settings import RunSettings
 
@@ -56,6 +57,7 @@ def draw_starts(
     if not (low < high or lines_differ or scatter or run_in or rms):
         return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way, None)
     windy = any(condition.wind for condition in conditions)
+    windy_across = any(condition.side_wind for condition in conditions)
     line, pantograph, drift = [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
@@ -71,4 +73,7 @@ def draw_starts(
         if windy:  # drawn last: all else is as in still air
             wind = draw_wind(line[k].condition.weather, time_step, own)
             line[k] = replace(line[k], wind=wind)
+        if windy_across:
+            side_wind = draw_side_wind(line[k].condition.across, time_step, own)
+            line[k] = replace(line[k], side_wind=side_wind)
     return Starts(speed, line, pantograph, way, np.array(drift) if drift else None)

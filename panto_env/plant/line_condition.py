@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 from ..base.arrays import Array
 from ..base.ranges import Between
 from ..base.settings import Settings
+from .side_wind import SideWind
 from .wind import Wind
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a smooth wire (seen in one toy model). It
@@ -113,6 +114,13 @@ class LineCondition(Settings):
         "that are fixed at both ends (axial_stiffness)",
     )
 
+    side_wind: Annotated[float, Between(0, 40, "m/s")] = Field(
+        0.0,
+        description="mean wind across the track (m/s) on the wires of a flexible line, which its drag damps; "
+        "vertical gusts, half as strong as turbulence says of those along the wind, are drawn at random from "
+        "Panofsky's spectrum",
+    )
+
     @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
     @classmethod
     def _each_once(cls, value: tuple[Any, ...], info: Any) -> tuple[Any, ...]:
@@ -126,17 +134,23 @@ class LineCondition(Settings):
     def random(self) -> bool:
         """Whether two lines in this condition differ."""
         uneven = self.irregularity > 0 or (self.wear_drawn and self.wear_depth > 0)
-        return uneven or self.scatters or self.weather.gusts
+        return uneven or self.scatters or self.weather.gusts or self.across.gusts
 
     @property
     def weather(self) -> Wind:
-        """The wind."""
+        """The wind along the track."""
         return Wind(self.wind, self.turbulence)
+
+    @property
+    def across(self) -> SideWind:
+        """The wind across the track."""
+        return SideWind(self.side_wind, self.turbulence)
 
     @property
     def in_still_air(self) -> LineCondition:
         """The same line without wind."""
-        return self.model_copy(update={"wind": 0.0}) if self.wind else self
+        windy = self.wind or self.side_wind
+        return self.model_copy(update={"wind": 0.0, "side_wind": 0.0}) if windy else self
 
     @property
     def scatters(self) -> bool:
@@ -228,6 +242,7 @@ class DrawnLine:
     tensions: tuple[float, float] = (1.0, 1.0)
     """Tensions of contact and messenger wire, relative to those in the condition."""
     wind: Array | None = None  # (GUST_ROWS,): with its gusts; None for the condition's mean wind
+    side_wind: Array | None = None  # (SIDE_ROWS,): likewise
 
 
 def draw(

@@ -18,6 +18,7 @@ from panto_env.plant.pantograph.schema import PantographData
 
 from .figures import Figures, figures, stretch
 from .hermite import Array
+from .side_wind import SideWind
 from .solvers import complementarity, narrow
 from .static import StaticShape, static_shape
 from .system import LineSystem, build
@@ -57,12 +58,13 @@ class Newmark:
         self.step, self.rate, self.shift = step, step / 2, step**2 / 4
         self.matrix = mass + self.rate * damping + self.shift * stiffness
         self.u, self.v, self.a = np.zeros((3, mass.shape[0]))
+        self.load: Array | float = 0.0  # what else pushes (N)
 
     def predict(self) -> Array:
         """Advance as if the new acceleration were 0; return what the rest then exerts (N)."""
         self.u = self.u + self.step * self.v + self.shift * self.a
         self.v = self.v + self.rate * self.a
-        return -(self.damping @ self.v) - self.stiffness @ self.u
+        return self.load - self.damping @ self.v - self.stiffness @ self.u
 
     def correct(self, acceleration: Array) -> None:
         """Give the new acceleration."""
@@ -96,12 +98,15 @@ def ride(
     speed_kmh: float,
     time_step: float,
     distance: float | None = None,
+    wind: SideWind | None = None,
 ) -> Result:
-    """A run as ``simulate`` makes it, on matrices that are given."""
+    """A run as ``simulate`` makes it, on matrices that are given; wind: on its wires."""
     speed, whole = speed_kmh / 3.6, float(system.nodes[-1])
     steps = int(min(distance or whole, whole) / (speed * time_step) + 1e-9)
     wires = Newmark(system.mass, system.damping, system.stiffness, time_step)
     solver = _Contact(system, wires, pantograph, speed)
+    if wind is not None:
+        wind.settle(wires, solver.solve)
 
     time = time_step * np.arange(steps + 1)
     forces, tension = (
@@ -112,6 +117,8 @@ def ride(
     forces[0], *motion[0] = solver.start()
     tension[0] = system.dropper_tension
     for n in range(1, steps + 1):
+        if wind is not None:
+            wires.load = wind.push(time[n])
         (forces[n], *motion[n]), tension[n] = solver.advance(speed * time[n])
         uplift[n] = wires.u[system.supports]
     return Result(
@@ -146,7 +153,7 @@ class _Contact:
         # What a newton of extra tension in each dropper does to all unknowns and all extensions.
         droppers, pairs = system.extension.shape[0], len(system.pairs)
         self.droppers = droppers
-        self.per_tension = self._solve(system.extension.T.toarray())
+        self.per_tension = self.solve(system.extension.T.toarray())
         gain = wires.shift * system.dropper_stiffness + wires.rate * system.dropper_damping
         self.gain = gain
         self.matrix = np.eye(droppers + pairs)
@@ -183,7 +190,7 @@ class _Contact:
         columns[:, 0] = wires.predict()
         for k, (unknowns, values, *_) in enumerate(points):
             columns[unknowns, 1 + k] = values
-        acceleration, *per_forces = self._solve(columns).T
+        acceleration, *per_forces = self.solve(columns).T
         wires.correct(acceleration)
         chain.correct(self.chain_inverse @ (chain.predict() + self.lift))
 
@@ -222,7 +229,8 @@ class _Contact:
         lowest = min(height + values @ wires.u[unknowns] for unknowns, values, _, height, _ in points)
         return (on_wires, chain.u[0], lowest), rest[:n]
 
-    def _solve(self, right: Array) -> Array:
+    def solve(self, right: Array) -> Array:
+        """Accelerations under loads, each a column."""
         found = np.empty_like(right)
         found[self.order] = cho_solve_banded(self.factor, right[self.order], check_finite=False)
         return found

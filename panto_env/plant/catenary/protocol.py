@@ -128,6 +128,11 @@ def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:
 
 def refuse_defects(data: CatenaryData, conditions: Sequence[LineCondition]) -> None:
     """Raise InputError where a condition has defects: for lines without droppers and supports."""
+    if any(condition.side_wind for condition in conditions):
+        raise InputError(
+            "Wind across the track blows on the wires of a flexible catenary, and line "
+            f"'{data.name}' is not one; leave out side_wind, or take another line."
+        )
     if any(condition.defective for condition in conditions):
         raise InputError(
             "Only a flexible catenary has droppers and supports that can be defective or scatter, and wires "

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from ....base.arrays import Array, Index
 from ...alignment import AlignmentArrays
+from .blown_arrays import Air, Gusts
 from .scattered_arrays import Scattered, ScatteredWindow
 
 PAD = 2  # rows beyond each end of the segments, for the five-point stencil
@@ -86,6 +87,7 @@ class FlexibleLine(NamedTuple):
     scattered: Scattered  # what has rows of its own, of the whole line
     pairs: int  # of wires: 2 where wires overlap
     beside: Beside
+    air: Air
 
 
 class FlexibleWire(NamedTuple):
@@ -113,3 +115,4 @@ class FlexibleWire(NamedTuple):
     static: Array  # (lanes, sets, WIDTH): ``link_static`` of the window's links (N)
     gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of the window's links (m)
     scattered: ScatteredWindow
+    gusts: Gusts

@@ -14,6 +14,7 @@ from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .attached import joined_springs, links_of, springs_of
+from .blown import NO_AIR, still
 from .grid import nodes_per_span, stencil_weights
 from .on_grid import in_equal_rows, on_grid
 from .overlaps import heights_of_pair, pairs_of, tension_lengths
@@ -112,6 +113,7 @@ def constants(
         scattered=scattered(grid if differ else None, real),
         pairs=pairs_of(data),
         beside=Beside(tensioned.beside[None], np.zeros((1, 0, 5)), np.zeros(0)),
+        air=NO_AIR,
         **in_equal_rows(grid, differ, rows, real),
     )
 
@@ -173,6 +175,7 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
         static=of_links(1.0),  # where there is no link, none is ever slack
         gap=of_links(0.0),
         scattered=own,
+        gusts=still(line.air, line.rows, lanes, real),
     )
     for lane in range(lanes):
         settle(line, wire, lane)

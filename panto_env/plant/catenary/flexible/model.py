@@ -10,9 +10,11 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
+from ...side_wind import draw_side_wind
 from ..protocol import StartPoint, check_speeds
 from ..view import LineView
 from .attached import dropper_positions
+from .blown import air_about, start_wind
 from .build import at_rest, constants, of_tension, settle
 from .defective_parts import DefectiveParts
 from .defects import DefectiveLine
@@ -91,6 +93,9 @@ class FlexibleCatenary:
             self._make_defective(designed, spans, runs.conditions, lanes)
         if data is not designed:
             self._check_loaded(designed, data, condition, spans)
+        if any(each.side_wind for each in runs.conditions):
+            air = air_about(self.line, data.wires, condition.ice, self.time_step)
+            self.line = self.line._replace(air=air)
         self.wire = at_rest(self.line, lanes, collectors)
 
     def _make_defective(
@@ -158,6 +163,9 @@ class FlexibleCatenary:
         if self._lines_differ:
             self._write_defects(lane, drawn)
         settle(self.line, self.wire, lane)
+        if self.line.air.drag.size:
+            mean = draw_side_wind(drawn.condition.across, self.time_step)
+            start_wind(self.line, self.wire, lane, mean if drawn.side_wind is None else drawn.side_wind)
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""

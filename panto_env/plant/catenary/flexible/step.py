@@ -25,6 +25,7 @@ from ..protocol import (
     rise_at_contact,
 )
 from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
+from .blown import blow
 from .links import difference, follow_links, measure_extensions, pull_links
 from .scattered import (
     apply_masts,
@@ -130,6 +131,7 @@ def _advance(line, wire, lane):
     advance_stitches(held, lane, u, d, stencil[MESSENGER])
     for w in range(u.shape[0]):
         leapfrog(u[w], d[w], inertia[w], stencil[w])
+    blow(line, wire.gusts, lane, u, d, inertia)
     pull_messenger(held, lane, u, d, inertia)
     apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
     apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)

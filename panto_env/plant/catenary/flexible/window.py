@@ -41,13 +41,13 @@ def window_of(
 ) -> int:
     """Spans computed about the train; 0: the whole line. overlaps, stitched: whether the line has such.
 
-    Raises InputError for a given window where the wire itself has defects.
+    Raises InputError for a given window where the wire itself has defects, or is blown upon before a run.
     """
-    whole = any(condition.hard_spots or condition.worn_stretches for condition in runs.conditions)
+    whole = any(each.hard_spots or each.worn_stretches or each.side_wind for each in runs.conditions)
     if whole and numerics.window:
         raise InputError(
-            "A line with hard_spots or worn_stretches is computed as a whole, not in a window that travels "
-            f"with the train: leave out window={numerics.window}, or set it to 0."
+            "A line with hard_spots, worn_stretches or side_wind is computed as a whole, not in a window "
+            f"that travels with the train: leave out window={numerics.window}, or set it to 0."
         )
     if numerics.window is not None or whole:
         return numerics.window or 0

@@ -69,7 +69,7 @@ class Rig:
                 f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
                 "wire; use a line_condition without irregularity and wear, such as 'new'."
             )
-        if any(condition.wind for condition in runs.conditions):
+        if any(condition.wind or condition.side_wind for condition in runs.conditions):
             raise InputError(f"No wind blows on a rig; leave it out, or use another line than '{data.name}'.")
         if getattr(data.line, "overlaps", ()):
             raise InputError(
