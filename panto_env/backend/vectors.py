@@ -212,9 +212,8 @@ def _gather_plain(rows: Any, places: Any, i: int) -> Any:
     return rows.reshape(-1)[places[i]]
 
 
-def _scatter_plain(first: Any, second: Any, places: Any, i: int, vector: Any) -> None:
-    for rows in (first, second):
-        np.add.at(rows.reshape(-1), places[i], vector)
+def _scatter_plain(rows: Any, places: Any, i: int, vector: Any) -> None:
+    np.add.at(rows.reshape(-1), places[i], vector)
 
 
 def _are_places(array: Any) -> bool:
@@ -255,22 +254,18 @@ def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
 
 
 @in_python(_scatter_plain)
-def scatter_add(typing: Any, first: Any, second: Any, places: Any, i: Any, vector: Any) -> Any:
-    """``scatter_add(first, second, places, i, vector)``: add a vector to the numbers of two tables that
-    ``gather`` reads at these places.
+def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any:
+    """``scatter_add(rows, places, i, vector)``: add a vector to the numbers of a table that ``gather`` reads
+    at these places.
     """
-    tables = _is_table(first, (2, 3)) and _is_table(second, (2, 3)) and _are_places(places)
-    if not (tables and isinstance(i, types.Integer)):
+    if not (_is_table(rows, (2, 3)) and _are_places(places) and isinstance(i, types.Integer)):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        both = [make_array(sig.args[k])(context, builder, values[k]).data for k in (0, 1)]
-        for k, offset in enumerate(_offsets(context, builder, sig.args[2], *values[2:4])):
-            item = builder.extract_element(values[4], _number(k))
-            addresses = [builder.gep(data, [offset]) for data in both]
-            sums = [builder.fadd(builder.load(address), item, flags=FLAGS) for address in addresses]
-            for total, address in zip(sums, addresses, strict=True):
-                builder.store(total, address)
+        data = make_array(sig.args[0])(context, builder, values[0]).data
+        for k, offset in enumerate(_offsets(context, builder, sig.args[1], *values[1:3])):
+            item, address = builder.extract_element(values[3], _number(k)), builder.gep(data, [offset])
+            builder.store(builder.fadd(builder.load(address), item, flags=FLAGS), address)
         return context.get_dummy_value()
 
-    return types.void(first, second, places, types.intp, VectorType(first.dtype)), build
+    return types.void(rows, places, types.intp, VectorType(rows.dtype)), build

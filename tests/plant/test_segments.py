@@ -18,6 +18,7 @@ from panto_env.plant.catenary.flexible.segments import (
     shift_nodes,
     window_nodes,
 )
+from panto_env.plant.catenary.flexible.wires import find_increments, leapfrog
 
 pytestmark = pytest.mark.plain
 ROWS = 7
@@ -27,6 +28,16 @@ NODES = window_nodes(ROWS)
 @kernel
 def _share(x, rows):
     share_ends(x, rows)
+
+
+@kernel
+def _leapfrog(u, d, inertia, stencil):
+    leapfrog(u, d, inertia, stencil)
+
+
+@kernel
+def _find(u, d, inertia, deficit, stencil):
+    find_increments(u, d, inertia, deficit, stencil)
 
 
 @kernel
@@ -144,3 +155,28 @@ def test_any_window_that_has_not_travelled_gives_the_same_run(window):
     reference = simulate(window=8, **given)
     run = simulate(window=window, **given)
     assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_lines_of_unlike_spans_have_the_leapfrog_of_uniform_ones(loaded):
+    """Where stitch wires take tension from the wire, less the difference of tension times slope."""
+    values, u = random_wire()
+    steps, d = random_wire()
+    steps, d = 0.3 * steps[::-1], lay_out(0.3 * steps[::-1], ROWS, float)
+    random, lag = np.random.default_rng(1), 0.2
+    stencil = np.array([0.4, -0.02, 0.99, lag, 1e-25])
+    taken, masses = random.uniform(0, 0.1, len(NODES)), random.uniform(0.5, 1, len(NODES))
+    inertia = lay_out(masses, ROWS, float)[PAD : -PAD if loaded else PAD]
+    deficit = lay_out(taken, ROWS, float)
+    moved, uniform, apart, without = u.copy(), d.copy(), d.copy(), d.copy()
+    _leapfrog(moved, uniform, inertia, stencil)
+    before = u.copy()
+    _find(u, without, inertia, deficit[:0], stencil)
+    _find(u, apart, inertia, deficit, stencil)
+    np.testing.assert_array_equal(u, before)
+    inner = slice(PAD, -PAD)
+    np.testing.assert_allclose(without, uniform, rtol=1e-13)
+    np.testing.assert_allclose((u + without)[inner], moved[inner], rtol=1e-13)
+    pull = taken[1:] * np.diff(values + lag * steps)  # on each node from the one before
+    missing = (pull[:-1] - pull[1:]) * (masses[1:-1] if loaded else 1.0)
+    np.testing.assert_allclose(along(apart - uniform)[inner], missing[PAD - 1 : 1 - PAD], atol=1e-14)

@@ -123,7 +123,10 @@ def find_gusts(line, gusts, lane, steps):
 
 @inlined
 def blow(line, gusts, lane, u, d, inertia):
-    """Move all wires by the wind of one step; their own damping by air is implicit in it."""
+    """Change all wires' increments by the wind of one step; their damping by air is implicit in it.
+
+    u: displacements that follow at once, or none of the wires', (0, ...).
+    """
     if gusts.table.shape[1] > 0:
         air, past, coming = line.air, gusts.past[lane], gusts.coming[lane]
         since = gusts.step[lane] % air.every
@@ -133,10 +136,10 @@ def blow(line, gusts, lane, u, d, inertia):
             find_gusts(line, gusts, lane, gusts.step[lane] + air.every)
         part = (since + 0.5) / air.every
         gusts.step[lane] += 1
-        for w in range(u.shape[0]):
+        for w in range(d.shape[0]):
             held = air.drag[w] * gusts.table[lane, 0]
             share = held / (1.0 + held)
-            its_u, its_d, its_inertia = u[w], d[w], inertia[w]
+            its_d, its_inertia = d[w], inertia[w]
             for q in range(past.shape[0] - 1):
                 begin = load_row(past, q) + part * (load_row(coming, q) - load_row(past, q))
                 end = load_row(past, q + 1) + part * (load_row(coming, q + 1) - load_row(past, q + 1))
@@ -147,4 +150,5 @@ def blow(line, gusts, lane, u, d, inertia):
                     if its_inertia.shape[0] > 0:
                         step = load_row(its_inertia, i) * step
                     store_row(its_d, i + PAD, load_row(its_d, i + PAD) + step)
-                    store_row(its_u, i + PAD, load_row(its_u, i + PAD) + step)
+                    if u.shape[0] > 0:
+                        store_row(u[w], i + PAD, load_row(u[w], i + PAD) + step)

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
 from ...state import own_row
-from .arrays import LOWER, MESSENGER, UPPER
-from .scattered import move_nodes, stretch_at
-from .scattered_arrays import LINK
+from .arrays import LOWER, UPPER
 from .segments import move, read
-from .stitched import move_hung, stretch_of_hung
 
 
 @inlined
@@ -41,17 +38,6 @@ def measure_extensions(line, wire, lane):
         apart = difference(lower, upper, line.link_row[s], line.link_weight[s], line.rows)
         store_row(past, s, load_row(now, s))
         store_row(now, s, apart - load_row(gap, s))
-    links, first = wire.scattered.links, line.link_row.size
-    for s in range(links.node.shape[1]):
-        apart = stretch_at(u, links.node[lane, s], links.constants[lane, s])
-        store_row(past, first + s, load_row(now, first + s))
-        store_row(now, first + s, apart - load_row(gap, first + s))
-    hung, first = wire.scattered.hung, first + links.node.shape[1]
-    for s in range(hung.node.shape[1]):
-        node, table = hung.node[lane, s], hung.constants[lane, s]
-        apart = stretch_of_hung(u, wire.scattered.displacement[lane], node, table)
-        store_row(past, first + s, load_row(now, first + s))
-        store_row(now, first + s, apart - load_row(gap, first + s))
 
 
 @inlined
@@ -108,23 +94,6 @@ def pull_links(line, wire, lane):
         for k in range(4):
             move(u[lower], d[lower], row + k, rows, load_row(move_by, k) * pull)
             move(u[upper], d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))
-    links, first = wire.scattered.links, line.link_row.size
-    for s in range(links.node.shape[1]):
-        node, table, number = links.node[lane, s], links.constants[lane, s], first + s
-        step = stretch_at(d, node, table)
-        stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
-        pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
-        store_row(change, number, pull)
-        move_nodes(u, d, node, table, LINK.MOVE, pull)
-        move_nodes(u[MESSENGER:], d[MESSENGER:], node, table, LINK.MOVE + 4, -pull)
-    held, first = wire.scattered, first + links.node.shape[1]
-    for s in range(held.hung.node.shape[1]):
-        node, table, number = held.hung.node[lane, s], held.hung.constants[lane, s], first + s
-        step = stretch_of_hung(d, held.increment[lane], node, table)
-        stiffness, yielding = load_row(table, LINK.STIFFNESS), load_row(table, LINK.YIELD)
-        pull = pull_of(number, past, now, static, step, table, LINK.EARLY, stiffness, yielding)
-        store_row(change, number, pull)
-        move_hung(u, d, held, lane, node, table, pull)
 
 
 @inlined

@@ -160,10 +160,9 @@ class Sets:
 def in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str, Any]:
     """Fields of ``FlexibleLine`` for springs and links in sets of equal rows.
 
-    differ: whether spans do. All but hard spots is scattered then; these are on nodes, of a whole line.
+    differ: whether spans do. All is scattered then.
     """
-    masts = grid.springs.masts
-    its, those = (slice(2 * masts, None), slice(0, 0)) if differ else (slice(None), slice(None))
+    its = those = slice(0, 0) if differ else slice(None)
     springs, links, yielding = grid.springs, grid.links, grid.spring_yield
     held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
     joined = Sets(links.wires[those], grid.at_links.first[those], rows)

@@ -39,43 +39,43 @@ def stretch_at(x, node, constants):
 
 
 @inlined
-def move_nodes(u, d, node, constants, row, force):
+def move_nodes(d, node, constants, row, force):
     """Apply forces (N) to the four nodes of each thing in a set, whose mobility begins in ``row``."""
     for k in range(4):
-        scatter_add(u, d, node, k, load_row(constants, row + k) * force)
+        scatter_add(d, node, k, load_row(constants, row + k) * force)
 
 
 @inlined
-def keep_past_of_masts(scattered, masts, lane, d, past, first):
-    """Save the increments at the masts, from set ``first`` of ``past`` on, which the leapfrog overwrites."""
+def keep_past_of_masts(scattered, masts, lane, d, past):
+    """Save the increments at the masts, which the step overwrites: at steady arms, then at supports."""
     sets = masts.node.shape[1]
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            store_row(past, first + s, displacement_at(d, node, table))
-        store_row(past, first + sets + s, displacement_at(d[MESSENGER:], node, table))
+            store_row(past, s, displacement_at(d, node, table))
+        store_row(past, sets + s, displacement_at(d[MESSENGER:], node, table))
 
 
 @inlined
-def apply_masts(scattered, masts, lane, u, d, past, first):
+def apply_masts(scattered, masts, lane, u, d, past):
     """Steady arms and supports, each implicit at its place."""
     sets = masts.node.shape[1]
     for s in range(sets):
         node, table = masts.node[lane, s], masts.constants[lane, s]
         if scattered.stiff_arms:
-            _apply_spring(u, d, node, table, MAST.ARM, load_row(past, first + s))
+            _apply_spring(u, d, node, table, MAST.ARM, load_row(past, s))
         above, its_d = u[MESSENGER:], d[MESSENGER:]
-        _apply_spring(above, its_d, node, table, MAST.SUPPORT, load_row(past, first + sets + s))
+        _apply_spring(above, its_d, node, table, MAST.SUPPORT, load_row(past, sets + s))
 
 
 @inlined
 def _apply_spring(u, d, node, table, row, past):
-    new = displacement_at(u, node, table)
-    now = new - displacement_at(d, node, table)
+    now = displacement_at(u, node, table)
+    new = now + displacement_at(d, node, table)
     pull = row + SPRING.PULL
     force = load_row(table, pull) * new + load_row(table, pull + 1) * now
     force += load_row(table, pull + 2) * (now - past)
-    move_nodes(u, d, node, table, row + SPRING.MOVE, -force)
+    move_nodes(d, node, table, row + SPRING.MOVE, -force)
 
 
 @inlined
@@ -95,11 +95,9 @@ def record_scattered(line, wire, lane, uplift, tension):
                 if number >= 0:
                     uplift[number & NOT_NEGATIVE] = past[s, j]
     if tension.size > 0:
-        first = line.link_row.size
-        _record_links(line.scattered.links, links, wire, lane, first, tension)
-        _record_links(
-            line.scattered.hung, wire.scattered.hung, wire, lane, first + links.node.shape[1], tension
-        )
+        hung, first = wire.scattered.hung, links.node.shape[1]
+        _record_links(line.scattered.links, links, wire, lane, 0, tension)
+        _record_links(line.scattered.hung, hung, wire, lane, first, tension)
 
 
 @inlined
@@ -139,10 +137,10 @@ def take_window(line, wire, lane):
             _enter(scattered.masts, held.masts, lane, n, start, line.rows)
             n += 1
         _leave(scattered.links, held.links, lane, start, at_start)
-        n, first = held.links.begin[lane] & NOT_NEGATIVE, line.link_row.size
+        n = held.links.begin[lane] & NOT_NEGATIVE
         while n < scattered.links.number.size and (at_end or scattered.links.enters[n] < end):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
-                _rest(line, wire, lane, scattered.links, held.links, n, first)
+                _rest(line, wire, lane, scattered.links, held.links, n, 0)
             n += 1
         if scattered.deficit.size > 0:
             _take_stitches(line, wire, lane, start, end, at_start, at_end)
@@ -171,7 +169,7 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
                 held.increment[lane, row, slot // sets] = 0.0
         n += 1
     _leave(scattered.hung, held.hung, lane, start, at_start)
-    n, first = held.hung.begin[lane] & NOT_NEGATIVE, line.link_row.size + held.links.node.shape[1]
+    n, first = held.hung.begin[lane] & NOT_NEGATIVE, held.links.node.shape[1]
     while n < scattered.hung.number.size and (at_end or scattered.hung.enters[n] < end):
         if _enter(scattered.hung, held.hung, lane, n, start, line.rows):
             _rest(line, wire, lane, scattered.hung, held.hung, n, first)

@@ -100,7 +100,7 @@ class Scattered(NamedTuple):
     upper: Index  # (hung,): node of the stitch wire before the upper end
     carrying: Index  # (hung,): number of the stitch wire
     deficit: Array  # (pairs, nodes): weight in a node's step of a messenger's slope from the node before, by
-    # the tension that stitch wires take from it (-); none without them
+    # the tension that stitch wires take from it (-); no nodes without them
     stiff_arms: bool  # whether any steady arm is a spring
 
 
@@ -111,9 +111,8 @@ class ScatteredWindow(NamedTuple):
     links: InWindow
     hung: InWindow
     stitches: InWindow
-    # Of messengers, as ``Scattered`` has it, and a node's step by it; no pairs without stitch wires.
-    deficit: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH)
-    missing: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH): scratch (m)
+    deficit: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH): of messengers, as ``Scattered`` has it; no
+    # rows without stitch wires
     # Nodes of stitch wires, from clamp to clamp, those of set after set.
     displacement: Array  # (lanes, sets times nodes, WIDTH): m
     increment: Array  # (lanes, sets times nodes, WIDTH): m

@@ -47,7 +47,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             stitches=without[0],
             upper=none,
             carrying=none,
-            deficit=np.zeros((0, 0), real),
+            deficit=bare[:1].astype(real),
             stiff_arms=False,
         )
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
@@ -61,15 +61,17 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         ],
         axis=1,
     )
-    # Springs come in pairs: at each mast the steady arm, then the support.
-    pairs = slice(2 * grid.springs.masts)
+    # Springs come in pairs, at each mast the steady arm, then the support; a hard spot is an arm alone.
+    springs, levels = grid.springs, grid.springs.levels
     first, weights, _ = grid.at_springs
-    first, weights, four = first[pairs], weights[pairs], grid.at_springs.four[pairs]
-    levels, yielding = grid.springs.levels[pairs], grid.spring_yield[pairs]
-    mobility = grid.mobility[grid.springs.wire[pairs, None], four]
-    pull = levels / (1 + levels[:, :1] * yielding)
-    of_springs = np.concatenate([mobility * weights, pull], axis=1)
-    of_masts = np.concatenate([weights[::2], of_springs[::2], of_springs[1::2]], axis=1)
+    mobility = grid.mobility[springs.wire[:, None], grid.at_springs.four]
+    pull = levels / (1 + levels[:, :1] * grid.spring_yield)
+    of_springs, spots = np.concatenate([mobility * weights, pull], axis=1), first[2 * springs.masts :]
+    arms = np.append(2 * np.arange(springs.masts), 2 * springs.masts + np.arange(len(spots)))
+    supports = np.zeros((len(arms), of_springs.shape[1]))
+    supports[: springs.masts] = of_springs[1 : 2 * springs.masts : 2]
+    of_masts = np.concatenate([weights[arms], of_springs[arms], supports], axis=1)
+    in_order = np.argsort(first[arms], kind="stable")
     ropes, hung = grid.ropes, np.flatnonzero(grid.links.stitch >= 0)
     on_messenger = np.flatnonzero(grid.links.stitch < 0)
     hung, on_messenger = (
@@ -83,7 +85,13 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
         mobility=grid.mobility,
-        masts=_along(first[::2, None], of_masts, masts, grid.springs.wire[pairs][::2], grid.springs.number),
+        masts=_along(
+            first[arms][in_order, None],
+            of_masts[in_order],
+            masts,
+            springs.wire[arms][in_order],
+            np.append(springs.number, np.full(len(spots), -1))[in_order],
+        ),
         links=_along(
             at_links.first[on_messenger, None],
             of_links[on_messenger],
@@ -105,7 +113,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         upper=ropes.node[hung],
         carrying=carrying,
         deficit=_deficit(grid, real),
-        stiff_arms=bool(levels[::2].any()),
+        stiff_arms=bool(levels[arms].any()),
     )
 
 
@@ -156,7 +164,7 @@ def _stitches(grid: OnGrid, real: Any) -> AlongLine:
 def _deficit(grid: OnGrid, real: Any) -> Array:
     """Weights of slopes for the tension that stitch wires take from the messenger."""
     missing = grid.ropes.deficit * grid.slope_mobility[MESSENGER::2]
-    return np.asarray(missing if grid.ropes.intervals else missing[:0], dtype=real)
+    return np.asarray(missing if grid.ropes.intervals else missing[:, :0], dtype=real)
 
 
 def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
@@ -165,14 +173,13 @@ def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:
     stitches = _room(line, along.stitches, lanes, 2 * NODES)
     sets = stitches.node.shape[1]
     nodes = sets * (along.stitches.empty.size - STITCH.INERTIA)
-    pairs, rows = len(along.deficit), line.rows + 2 * PAD
+    rows = line.rows + 2 * PAD if along.deficit.size else 0
     return ScatteredWindow(
         masts=_room(line, along.masts, lanes),
         links=_room(line, along.links, lanes),
         hung=_room(line, along.hung, lanes, HUNG_NODES),
         stitches=stitches,
-        deficit=np.zeros((lanes, pairs, rows, WIDTH), real),
-        missing=np.zeros((lanes, pairs, rows, WIDTH), real),
+        deficit=np.zeros((lanes, line.pairs, rows, WIDTH), real),
         displacement=np.zeros((lanes, nodes, WIDTH), real),
         increment=np.zeros((lanes, nodes, WIDTH), real),
         clamp_force=np.zeros((lanes, 2 * sets, WIDTH), real),

@@ -24,21 +24,20 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
+from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
 from .blown import blow
 from .links import difference, follow_links, measure_extensions, pull_links
 from .scattered import (
-    apply_masts,
     at_line_end,
     displacement_at,
-    keep_past_of_masts,
     record_scattered,
     stretch_at,
     take_window,
 )
 from .scattered_arrays import LINK
 from .segments import shift_nodes
-from .stitched import advance_stitches, pull_messenger, stretch_of_hung
+from .stitched import stretch_of_hung
+from .uneven import advance_uneven
 from .wires import (
     apply_springs,
     deflection,
@@ -122,20 +121,19 @@ def _place(line, wire, lane, contact, x):
 
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
-    u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
-    held, masts, springs = wire.scattered, wire.scattered.masts, line.spring_row.size
-    keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
-    keep_past_of_masts(line.scattered, masts, lane, d, spring_past, springs)
-    measure_extensions(line, wire, lane)
-    stencil, inertia = line.stencil[own_row(line.stencil, lane)], wire.inertia[own_row(wire.inertia, lane)]
-    advance_stitches(held, lane, u, d, stencil[MESSENGER])
-    for w in range(u.shape[0]):
-        leapfrog(u[w], d[w], inertia[w], stencil[w])
-    blow(line, wire.gusts, lane, u, d, inertia)
-    pull_messenger(held, lane, u, d, inertia)
-    apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
-    apply_masts(line.scattered, masts, lane, u, d, spring_past, springs)
-    pull_links(line, wire, lane)
+    if line.scattered.mobility.shape[1] > 0:
+        advance_uneven(line, wire, lane)
+    else:
+        u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
+        keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
+        measure_extensions(line, wire, lane)
+        stencil = line.stencil[own_row(line.stencil, lane)]
+        inertia = wire.inertia[own_row(wire.inertia, lane)]
+        for w in range(u.shape[0]):
+            leapfrog(u[w], d[w], inertia[w], stencil[w])
+        blow(line, wire.gusts, lane, u, d, inertia)
+        apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
+        pull_links(line, wire, lane)
 
 
 @implements(rise_at_contact, FlexibleLine)

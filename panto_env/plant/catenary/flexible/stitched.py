@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....backend import gather, inlined, load_row, scatter_add, store_row
-from .arrays import MESSENGER, PAD
+from .arrays import MESSENGER
 from .scattered import displacement_at, move_nodes
 from .scattered_arrays import HUNG, STITCH
 
@@ -19,13 +19,10 @@ def _at_clamp(x, node, constants, clamp):
 
 @inlined
 def advance_stitches(held, lane, u, d, stencil):
-    """One step of the stitch wires, and the forces on the messenger, which is still as it was.
+    """Increments of the stitch wires, and forces on the messenger, which is still as it was (N).
 
     stencil: of the messenger, whose damping is the same.
     """
-    for pair in range(held.deficit.shape[1]):
-        above = 2 * pair + MESSENGER
-        _find_missing_tension(held, lane, pair, u[above], d[above], stencil[3])
     stitches = held.stitches
     sets = stitches.node.shape[1]
     intervals = stitches.constants.shape[2] - STITCH.INERTIA - 1
@@ -47,39 +44,14 @@ def advance_stitches(held, lane, u, d, stencil):
                 after = beyond
             slope_ahead = after - here
             force = load_row(table, STITCH.INERTIA + k) * (near * (slope_ahead - slope))
-            step = (keep * load_row(its_d, i) - quiet) + force
-            store_row(its_d, i, step)
-            store_row(its_u, i, load_row(its_u, i) + step)
+            store_row(its_d, i, (keep * load_row(its_d, i) - quiet) + force)
             here, slope = after, slope_ahead
         store_row(forces, 2 * s + 1, -(pull * slope))
 
 
 @inlined
-def _find_missing_tension(held, lane, pair, u, d, lag):
-    """Step of a messenger's nodes by the tension that stitch wires take from it."""
-    deficit, missing = held.deficit[lane, pair], held.missing[lane, pair]
-    before = load_row(u, PAD - 1) + lag * load_row(d, PAD - 1)
-    here = load_row(u, PAD) + lag * load_row(d, PAD)
-    pull = load_row(deficit, PAD) * (here - before)
-    for i in range(PAD, deficit.shape[0] - PAD):
-        after = load_row(u, i + 1) + lag * load_row(d, i + 1)
-        ahead = load_row(deficit, i + 1) * (after - here)
-        store_row(missing, i, pull - ahead)
-        here, pull = after, ahead
-
-
-@inlined
-def pull_messenger(held, lane, u, d, inertia):
-    """Apply the forces of stitch wires to the messenger: at their clamps, and between them."""
-    for pair in range(held.missing.shape[1]):
-        missing, above = held.missing[lane, pair], 2 * pair + MESSENGER
-        its_u, its_d, its_inertia = u[above], d[above], inertia[above]
-        for i in range(PAD, missing.shape[0] - PAD):
-            step = load_row(missing, i)
-            if its_inertia.shape[0] > 0:
-                step = load_row(its_inertia, i - PAD) * step
-            store_row(its_d, i, load_row(its_d, i) + step)
-            store_row(its_u, i, load_row(its_u, i) + step)
+def pull_clamps(held, lane, d):
+    """Apply the forces of stitch wires at their clamps to the messenger."""
     stitches, forces = held.stitches, held.clamp_force[lane]
     for s in range(stitches.node.shape[1]):
         node, table = stitches.node[lane, s], stitches.constants[lane, s]
@@ -87,7 +59,7 @@ def pull_messenger(held, lane, u, d, inertia):
             force = load_row(forces, 2 * s + clamp)
             for k in range(4):
                 move = load_row(table, STITCH.MOVE + 4 * clamp + k) * force
-                scatter_add(u[MESSENGER:], d[MESSENGER:], node, 4 * clamp + k, move)
+                scatter_add(d[MESSENGER:], node, 4 * clamp + k, move)
 
 
 @inlined
@@ -99,10 +71,9 @@ def stretch_of_hung(x, upper, node, constants):
 
 
 @inlined
-def move_hung(u, d, held, lane, node, constants, force):
+def move_hung(d, upper, node, constants, force):
     """Apply the tension of links of a set (N): up on the contact wire, down on the stitch wire."""
-    move_nodes(u, d, node, constants, HUNG.MOVE, force)
-    upper, its_d = held.displacement[lane], held.increment[lane]
+    move_nodes(d, node, constants, HUNG.MOVE, force)
     for k in range(2):
         move = load_row(constants, HUNG.MOVE_UPPER + k) * -force
-        scatter_add(upper, its_d, node, 4 + k, move)
+        scatter_add(upper, node, 4 + k, move)

@@ -109,6 +109,39 @@ def leapfrog(u, d, inertia, stencil):
 
 
 @inlined
+def find_increments(u, d, inertia, deficit, stencil):
+    """Increments of one bare wire, as ``leapfrog`` finds them; its displacements stay as they were.
+
+    deficit: as ``ScatteredWindow`` has it; no rows without stitch wires. A branch for it in ``leapfrog``
+    would change how multiply and add are fused there, and so the bits of lines with equal spans.
+    """
+    near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
+    quiet, middle = stencil[4], near + far + far
+    before = load_row(u, 1) + lag * load_row(d, 1)
+    here = load_row(u, 2) + lag * load_row(d, 2)
+    after = load_row(u, 3) + lag * load_row(d, 3)
+    slope = after - here
+    bend_before = (here - before) - (before - (load_row(u, 0) + lag * load_row(d, 0)))
+    bend = slope - (here - before)
+    missing = 0.0 * slope
+    if deficit.shape[0] > 0:
+        missing = load_row(deficit, PAD) * (here - before)
+    for i in range(PAD, u.shape[0] - PAD):
+        ahead = load_row(u, i + 2) + lag * load_row(d, i + 2)
+        slope_ahead = ahead - after
+        bend_after = slope_ahead - slope
+        force = middle * bend + far * (bend_before + bend_after)
+        if deficit.shape[0] > 0:
+            missing_ahead = load_row(deficit, i + 1) * slope
+            force += missing - missing_ahead
+            missing = missing_ahead
+        if inertia.shape[0] > 0:
+            force = load_row(inertia, i - PAD) * force
+        store_row(d, i, (keep * load_row(d, i) - quiet) + force)
+        after, slope, bend_before, bend = ahead, slope_ahead, bend, bend_after
+
+
+@inlined
 def keep_spring_past(wire, row, d, past):
     """Save the increments of nodes with springs, which the leapfrog overwrites."""
     for s in range(row.size):
