@@ -41,7 +41,8 @@ class Numerics(Settings):
         None,
         description="spans of the flexible catenary computed about the train, with an even number one more "
         f"ahead than behind; by default {WINDOW['full']}, or 24 about trains below 40 % of the "
-        f'faster wire\'s wave speed; with accuracy="fast" {WINDOW["fast"]}; 0: the whole line',
+        f'faster wire\'s wave speed; with accuracy="fast" {WINDOW["fast"]}; several pantographs get as many '
+        "more as the train is long; 0: the whole line",
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'
@@ -62,6 +63,7 @@ class Runs(NamedTuple):
     control_interval: float = 0.01  # s, a multiple of the time step unless that is given
     conditions: Sequence[LineCondition] = (LineCondition(),)
     hard_contact: bool = False  # whether a contact is stiffer or more damped than a collector strip's
+    train_length: float = 0.0  # from the first collector to the last one (m)
 
     def whole_part(self, longest: float) -> float:
         """The longest time step (s), up to ``longest``, that divides the control interval."""

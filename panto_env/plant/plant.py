@@ -11,13 +11,13 @@ from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
 from ..base.shown import beside
-from .catenary import CATENARIES, CatenaryData, CatenaryModel
+from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
 from .drift import DRIFT_ROWS, ahead, gain
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
-from .pantograph.build import check_compression, pantographs, rest_state
+from .pantograph.build import NONE_REFLECTED, check_compression, pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples
@@ -47,14 +47,17 @@ class Plant:
         runs: the speeds and line conditions for which the plant is built. bilateral: let the contact pull, as
         paper 3's equations do. varied: each lane may have a pantograph with other values. drifting: each
         lane's speed may drift. Raises InputError where grid and step are not usable, or a defect is given at
-        a dropper, support or place that the line does not have.
+        a dropper, support or place that the line does not have; and for several collectors on a line along
+        which no waves run from one to the other.
         """
+        check_collectors(catenary, len(train.collectors))
         self.catenary, self.train, self.lanes = catenary, train, lanes
         self.spans = check_span_count(catenary.spans if spans is None else spans)
         self.alignment = catenary.alignment(self.spans)
         self.runs = runs
         winds = [condition.weather for condition in runs.conditions if condition.wind]
-        check_wind(winds, runs.speeds[0], self.pantograph)
+        for own in train.collectors:
+            check_wind(winds, runs.speeds[0], own.pantograph)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
             lanes=lanes,
@@ -71,16 +74,17 @@ class Plant:
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         count, actuator = len(train.collectors), train.first.actuator
-        size = 2 * len(self.pantograph.masses)
-        self.pantographs = pantographs(size, count, lanes if varied else 1)
-        self._reflected = actuator.reflected_masses
+        sizes = tuple(2 * len(own.pantograph.masses) for own in train.collectors)
+        self.pantographs = pantographs(sizes, lanes if varied else 1)
         every = np.arange(self.pantographs.table.shape[1])
-        self.pantographs.set_lanes(0, every, self.pantograph, self.model, self._reflected)
+        for number, own in enumerate(train.collectors):
+            self._set_pantograph(number, every, own.pantograph)
         self.actuators = actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
         self.run = Run(
-            table=aligned_zeros((count, lanes, Row.STATE + 2 * size)),
-            distance=tuple(collector.distance for collector in train.collectors),
+            table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),
+            distance=tuple(float(collector.distance) for collector in train.collectors),
+            driven=tuple(int(collector.driven) for collector in train.collectors),
             aerodynamic=tuple(
                 collector.pantograph.aerodynamic_uplift(1 / self.time_step) for collector in train.collectors
             ),
@@ -133,53 +137,79 @@ class Plant:
         """Raise InputError unless a train can run at this speed (m/s) on this line."""
         check_speeds(self.catenary.name, self.model.wave_speed, [speed])
 
+    def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
+        """Set a collector's pantograph, with the moving mass of its actuator if it has one."""
+        own = self.train.collectors[collector]
+        reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
+        self.pantographs.set_lanes(collector, lanes, pantograph, self.model, reflected)
+
     def start(
         self,
         lanes: Lanes,
         speeds: Any,
         drawn: Sequence[DrawnLine] = (),
-        pantographs: Sequence[PantographData] = (),
+        pantographs: Sequence[Sequence[PantographData]] = (),
         static_forces: Array | None = None,
         drift: Array | None = None,
     ) -> None:
         """Put lanes at the start of the line, at rest under the nominal force at their present speed.
 
-        lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of the
-        wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition gives
-        them. pantographs: the lanes' own, where they are varied. static_forces: instead of the pantograph's,
-        (n,) (N). drift: of their speeds, (n, DRIFT_ROWS), by default none. Raises InputError for a bad speed,
-        and for springs of a pantograph that give way.
+        Every collector starts at the line's first anchor; those behind the first wait there until their turn
+        to go. lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of
+        the wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition
+        gives them. pantographs: of the collectors, for each lane, where they are varied. static_forces:
+        instead of the pantographs', (collectors, n) (N). drift: of their speeds, (n, DRIFT_ROWS), by default
+        none. Raises InputError for a bad speed, and for springs of a pantograph that give way.
         """
         lanes, run = np.atleast_1d(lanes), self.run
         speeds = np.full(len(lanes), speeds, dtype=float)
         check_speeds(self.catenary.name, self.model.wave_speed, (speeds.min(), speeds.max()))
         self.speed[lanes] = speeds
         drawn = drawn or [DrawnLine(self.runs.conditions[0])] * len(lanes)
-        for lane, own in zip(lanes, pantographs, strict=False):
-            self.pantographs.set_lanes(0, lane, own, self.model, self._reflected)
         waves = np.zeros((len(lanes), run.waves.shape[1]))
         for own_waves, line in zip(waves, drawn, strict=True) if waves.size else ():
             own_waves[: line.waves.size] = line.waves.ravel()
         run.waves[lanes] = waves
         run.drift[lanes] = 0.0 if drift is None else drift
-        wind = self._blow(lanes, drawn)
-        height, wire, spring = self.model.start_point
-        heights = height + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
-        strip = float(self.pantographs.table[0, 0, Part.STRIP_COMPLIANCE])  # all have the same strips
+        self._blow(lanes, drawn)
+        heights = self.model.start_point.height
+        heights = heights + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
+        for collector in range(len(self.train.collectors)):
+            static = None if static_forces is None else static_forces[collector]
+            varied = [own[collector] for own in pantographs]
+            run.table[collector, lanes] = self._at_rest(collector, lanes, heights, varied, static)
+        if not self.model.massless:
+            forces = run.table[0, lanes, Row.CONTACT_FORCE].tolist()
+            for lane, line, force in zip(lanes.tolist(), drawn, forces, strict=True):
+                self.model.settle(lane, line, force)
+        self.actuators.table[:, lanes] = 0.0
+
+    def _at_rest(
+        self,
+        collector: int,
+        lanes: Lanes,
+        heights: Array,
+        pantographs: Sequence[PantographData],
+        static_forces: Array | None,
+    ) -> Array:
+        """Rows of a collector in lanes, (n, rows), at rest at the starting point; heights: of the wire (m)."""
+        own, run, (_, wire, spring) = self.train.collectors[collector], self.run, self.model.start_point
+        for lane, pantograph in zip(lanes, pantographs, strict=False):
+            self._set_pantograph(collector, lane, pantograph)
+        strip = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
         compliance = strip + wire + spring
-        nominal_forces = self.pantograph.nominal_force(speeds)
+        speeds = self.speed[lanes]
+        nominal_forces = own.pantograph.nominal_force(speeds)
         if static_forces is not None:
-            nominal_forces = nominal_forces + (static_forces - self.pantograph.static_force)
+            nominal_forces = nominal_forces + (static_forces - own.pantograph.static_force)
         strides = speeds * self.time_step
         now = strides + gain(run.drift[lanes], 0.0)
-        lifts = nominal_forces + run.aerodynamic[0] * (now**2 - strides**2)
-        by_wind = run.aerodynamic[0] * wind * (2 * now + wind)
-        state = rest_state(pantographs or self.pantograph, lifts + by_wind, heights, compliance)
-        check_compression(self.pantograph.name, state)
+        lifts = nominal_forces + run.aerodynamic[collector] * (now**2 - strides**2)
+        wind = winds_at(run.wind[lanes], -own.distance, 0.0) if run.wind.shape[1] else 0.0
+        by_wind = run.aerodynamic[collector] * wind * (2 * now + wind)
+        state = rest_state(pantographs or own.pantograph, lifts + by_wind, heights, compliance)
+        check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
-        if not self.model.massless:
-            for lane, line, force in zip(lanes.tolist(), drawn, forces.tolist(), strict=True):
-                self.model.settle(lane, line, force)
         table = np.zeros((len(lanes), run.table.shape[2]))
         table[:, Row.STRIDE] = strides
         table[:, Row.NOMINAL_FORCE] = nominal_forces
@@ -190,19 +220,14 @@ class Plant:
         table[:, Row.HEAD_HEIGHT] = state[:, 0]
         table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
-        run.table[:, lanes] = table
-        self.actuators.table[:, lanes] = 0.0
+        return table
 
-    def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> Array:
-        """Let the wind of the drawn lines blow in lanes, (n,); its speed against a train at the start, (n,)
-        (m per step).
-        """
-        if not self.run.wind.shape[1]:
-            return np.zeros(len(lanes))
-        mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
-        rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
-        self.run.wind[lanes] = rows
-        return winds_at(np.array(rows), 0.0, 0.0)
+    def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> None:
+        """Let the wind of the drawn lines blow in lanes, (n,)."""
+        if self.run.wind.shape[1]:
+            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
+            rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
+            self.run.wind[lanes] = rows
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""

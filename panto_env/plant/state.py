@@ -43,6 +43,7 @@ class Row(IntEnum):
     SECOND_MIDDLE = 18
     SECOND_FORCE = 19  # contact force on the second wire, part of CONTACT_FORCE (N)
     WIND = 20  # what wind adds to LIFT (N), which no sensor sees
+    FIRST_FORCE = 21  # contact force on the first wire, the rest of CONTACT_FORCE (N)
     # An even number, for processors compute states in pairs.
     STATE = 22  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
     # same at the step's end, without the contact force
@@ -58,6 +59,7 @@ class Run(NamedTuple):
 
     table: Array  # (collectors, lanes, STATE + 4n): the rows above
     distance: tuple[float, ...]  # of each collector behind the first (m); kernels know a tuple's length
+    driven: tuple[int, ...]  # 1 for each collector with an actuator, 0 without
     aerodynamic: tuple[float, ...]  # uplift of each collector per squared distance covered in a step (N/m^2)
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant

@@ -17,7 +17,7 @@ from .catenary.protocol import (
 from .contact import contact_force, shared_forces
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
-from .train import lift, lift_by_wind, mean_stride, position
+from .train import lift, lift_by_wind, mean_stride, place_on_line
 from .trigonometry import cosine_of_turns
 
 
@@ -38,9 +38,10 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
         own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
     if run.wind.shape[1] > 0:
         own[ROW.WIND] = lift_by_wind(run, contact, lane, own[ROW.STEP] + 0.5)
-    drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
+    if run.driven[contact] > 0:
+        drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
     move_freely(pantographs, contact, own, lane)
-    x = position(run, contact, lane, own[ROW.STEP] + 0.5)
+    x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
     own[ROW.IRREGULARITY] = irregularity(run, x, lane)
     before, middle = place_contact(line, wire, lane, contact, x)
     own[ROW.WIRE_BEFORE] = before
@@ -54,21 +55,26 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
 @inlined
 def rise_along(line, wire, run, contact, point, own, lane):
     """Rise of the wire at a contact point along the distance of the step (m), for the contact's damper."""
-    x0 = position(run, contact, lane, own[ROW.STEP])
-    x1 = position(run, contact, lane, own[ROW.STEP] + 1.0)
+    x0 = place_on_line(run, contact, lane, own[ROW.STEP])
+    x1 = place_on_line(run, contact, lane, own[ROW.STEP] + 1.0)
     way = mean_stride(run, contact, lane, 1.0)
+    if len(run.distance) > 1:
+        way = min(way, x1 - x0)  # none before it comes onto the line
     uneven = irregularity(run, x1, lane) - irregularity(run, x0, lane)
     return uneven + rise_at_contact(line, wire, lane, point, x0, x0 + way)
 
 
 @inlined
 def meet(line, wire, pantographs, run, contact, lane):
-    """Compute the contact force over the step, from head and wire as they would move without it."""
+    """Compute the contact force over the step, from head and wire as they would move without it.
+
+    It is not applied yet: the forces of all collectors are taken from one state of the wire.
+    """
     own = run.table[contact, lane]
     parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
-    free_head = own[ROW.STATE + pantographs.size]
+    free_head = own[ROW.STATE + pantographs.sizes[contact]]
     contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
-    x = position(run, contact, lane, own[ROW.STEP] + 0.5)
+    x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, contact, own, lane)
@@ -99,8 +105,8 @@ def meet(line, wire, pantographs, run, contact, lane):
         force = meet_second_wire(line, wire, parts, run, contact, lane, free_head, law, middle, middle_yield)
         total = force + own[ROW.SECOND_FORCE]
     own[ROW.CONTACT_FORCE] = total
+    own[ROW.FIRST_FORCE] = force
     own[ROW.HEAD_HEIGHT] = 0.5 * (head + free_head + contact_input * total)
-    apply_force(line, wire, lane, contact, x, force)
 
 
 @inlined
@@ -116,13 +122,13 @@ def contact_law(parts, gap, change, middle_yield, wire_yield):
 
 @inlined
 def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, middle, middle_yield):
-    """Share the contact force between two wires, apply that on the second, and return that on the first (N).
+    """Share the contact force between two wires, and return that on the first (N).
 
     first: law of the first wire. middle: its height at mid-step without this force (m); middle_yield: how
     much it rises there per newton (m/N).
     """
     own, point = run.table[contact, lane], len(run.distance) + contact
-    x, share = position(run, contact, lane, own[ROW.STEP] + 0.5), parts[PART.IMPLICIT_SHARE]
+    x, share = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5), parts[PART.IMPLICIT_SHARE]
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, point, own, lane)
@@ -144,16 +150,29 @@ def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, mi
     lower = its_height < height if force + other == 0.0 else other > force
     own[ROW.WIRE_HEIGHT] = irregular + (its_height if lower else height)
     own[ROW.SECOND_FORCE] = other
-    apply_force(line, wire, lane, point, x, other)
     return force
+
+
+@inlined
+def press(line, wire, run, contact, lane):
+    """Apply the contact force of one collector to the wires that it touches."""
+    own = run.table[contact, lane]
+    x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
+    apply_force(line, wire, lane, contact, x, own[ROW.FIRST_FORCE])
+    if has_second_wire(line):
+        apply_force(line, wire, lane, len(run.distance) + contact, x, own[ROW.SECOND_FORCE])
 
 
 @inlined
 def finish(pantographs, run, contact, lane):
     """End the step of one collector, and complete its sample of means over the step."""
     own = run.table[contact, lane]
-    frame, head_speed = ROW.STATE + pantographs.size // 2 - 1, ROW.STATE + pantographs.size // 2
-    frame_speed = ROW.STATE + pantographs.size - 1
+    size = pantographs.sizes[contact]
+    frame, head_speed, frame_speed = (
+        ROW.STATE + size // 2 - 1,
+        ROW.STATE + size // 2,
+        ROW.STATE + size - 1,
+    )
     frame_before, head_speed_before, frame_speed_before = own[frame], own[head_speed], own[frame_speed]
     add_contact_force(pantographs, contact, own, lane)
     own[ROW.FRAME_HEIGHT] = 0.5 * (frame_before + own[frame])
@@ -170,6 +189,8 @@ def step_lane(line, wire, pantographs, actuators, run, lane):
     advance_wire(line, wire, lane)
     for c in range(len(run.distance)):
         meet(line, wire, pantographs, run, c, lane)
+    for c in range(len(run.distance)):
+        press(line, wire, run, c, lane)
     end_step(line, wire, lane)
     for c in range(len(run.distance)):
         finish(pantographs, run, c, lane)

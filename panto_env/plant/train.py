@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,6 +16,9 @@ from .state import ROW
 from .wind import wind_at
 
 
+MOST_COLLECTORS = 4
+
+
 @dataclass(frozen=True)
 class Collector:
     """A pantograph of a train, with its actuator and sensors."""
@@ -23,6 +27,7 @@ class Collector:
     actuator: ActuatorSettings
     sensors: SensorSettings
     distance: float = 0.0  # behind the first collector (m)
+    driven: bool = True  # whether its actuator acts; without one the pantograph is passive
 
 
 @dataclass(frozen=True)
@@ -32,28 +37,47 @@ class Train:
     collectors: tuple[Collector, ...]
 
     def __post_init__(self) -> None:
-        """Raise InputError unless there is one collector: waves between several are not computed yet."""
-        if len(self.collectors) != 1:
-            raise InputError(
-                f"A train must have one collector, not {len(self.collectors)}: several pantographs on one "
-                "line cannot be computed yet."
-            )
+        """Raise InputError for too many collectors, and for actuators or sensors that differ."""
+        count = len(self.collectors)
+        if not 1 <= count <= MOST_COLLECTORS:
+            raise InputError(f"A train must have 1 to {MOST_COLLECTORS} pantographs, not {count}.")
+        equipment = {(own.actuator, own.sensors) for own in self.collectors}
+        if len(equipment) > 1:
+            raise InputError("All pantographs of a train must have the same actuator and sensors.")
 
     @classmethod
     def of(
         cls,
-        pantograph: PantographData,
+        *pantographs: PantographData,
         actuator: ActuatorSettings | None = None,
         sensors: SensorSettings | None = None,
+        distances: Sequence[float] = (),
+        driven: Sequence[int] = (0,),
     ) -> Self:
-        """A train with one collector; actuator and sensors: ideal ones by default."""
+        """A train of pantographs, the first in front; actuator and sensors: ideal ones by default.
+
+        distances: of the others behind the first (m). driven: numbers of the pantographs, from 0 up, whose
+        actuators act.
+        """
         actuator, sensors = actuator or actuator_settings("ideal"), sensors or sensor_settings("ideal")
-        return cls((Collector(pantograph, actuator, sensors),))
+        return cls(
+            tuple(
+                Collector(pantograph, actuator, sensors, distance, number in driven)
+                for number, (pantograph, distance) in enumerate(
+                    zip(pantographs, (0.0, *distances), strict=True)
+                )
+            )
+        )
 
     @property
     def first(self) -> Collector:
         """The collector in front."""
         return self.collectors[0]
+
+    @property
+    def length(self) -> float:
+        """Distance from the first collector to the last one (m)."""
+        return self.collectors[-1].distance
 
 
 @inlined
@@ -63,6 +87,18 @@ def position(run, collector, lane, steps):
     if run.drift.shape[1] > 0:
         x = drifted_way(run.drift[lane], x, steps)
     return x - run.distance[collector]
+
+
+@inlined
+def place_on_line(run, collector, lane, steps):
+    """Where a lane's collector touches the line (m) after a number of steps.
+
+    One that has not come onto the line yet waits at its first anchor, which does not yield.
+    """
+    x = position(run, collector, lane, steps)
+    if len(run.distance) > 1:
+        x = max(x, 0.0)
+    return x
 
 
 @inlined

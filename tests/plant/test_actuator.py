@@ -17,7 +17,7 @@ STEP = 1e-3
 
 def response(actuator, command, steps=200, step=STEP):
     line, pantograph = load_catenary("periodic-stiffness"), load_pantograph("three-mass")
-    plant = Plant(line, Train.of(pantograph, actuator), numerics=Numerics(time_step=step))
+    plant = Plant(line, Train.of(pantograph, actuator=actuator), numerics=Numerics(time_step=step))
     samples = plant.samples(steps + 1)
     plant.start(0, 50.0)
     plant.advance(np.array([[[command, 0.0]]]), steps, samples)

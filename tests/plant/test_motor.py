@@ -58,7 +58,7 @@ class Bench:
         conditions = (LineCondition(wear_depth=1e-3, wear_wavelength=100.0),)  # room for one wave
         self.plant = Plant(
             line,
-            Train.of(pantograph, motor),
+            Train.of(pantograph, actuator=motor),
             numerics=Numerics(time_step=step),
             runs=Runs(conditions=conditions),
             bilateral=True,

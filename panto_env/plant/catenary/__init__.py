@@ -8,10 +8,19 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from ...base.errors import InputError
 from .protocol import CatenaryKind, CatenaryModel
 from .schema import CatenaryData
 
-__all__ = ["CATENARIES", "KINDS", "CatenaryData", "CatenaryKind", "CatenaryModel", "check_line"]
+__all__ = [
+    "CATENARIES",
+    "KINDS",
+    "CatenaryData",
+    "CatenaryKind",
+    "CatenaryModel",
+    "check_collectors",
+    "check_line",
+]
 
 KINDS = [
     "flexible",
@@ -27,3 +36,12 @@ CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__)
 def check_line(line: CatenaryData) -> None:
     """Raise InputError where a line with these values cannot exist, for example with droppers that push."""
     CATENARIES[line.kind].check(line)
+
+
+def check_collectors(line: CatenaryData, count: int) -> None:
+    """Raise InputError where a line cannot carry waves between this many collectors."""
+    if count > 1 and not CATENARIES[line.kind].several_collectors:
+        raise InputError(
+            f"Several pantographs need a flexible catenary, whose waves run from one to the other, and line "
+            f"'{line.name}' is not one; give one pantograph, or another line."
+        )

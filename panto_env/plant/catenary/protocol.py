@@ -111,6 +111,7 @@ class CatenaryKind(NamedTuple):
     clear_spans: Callable[[Any, Numerics, Runs, int], int] = usual_clear_spans
     # Warns where a given window costs more than 1 % of the figures.
     warn_if_short: Callable[[Any, Numerics, Runs], None] = say_nothing
+    several_collectors: bool = False  # whether its wire carries waves from one collector to another
 
 
 def check_speeds(line: str, wave_speed: float, speeds: Sequence[float]) -> None:

@@ -39,7 +39,7 @@ class Pantographs(NamedTuple):
     With n masses the state is n displacements, then n velocities.
     """
 
-    size: int  # 2n: entries of the state
+    sizes: tuple[int, ...]  # 2n: entries of each collector's state; kernels know a tuple's length
     table: Array  # (collectors, lanes, rows of ``Part``); one row for all lanes where they are alike
 
     def set_lanes(
@@ -51,7 +51,8 @@ class Pantographs(NamedTuple):
         reflected: ReflectedMasses = NONE_REFLECTED,
     ) -> None:
         """Set the pantograph of a collector in some lanes."""
-        self.table[collector, lanes] = parts(pantograph, catenary, reflected)
+        own = parts(pantograph, catenary, reflected)
+        self.table[collector, lanes, : len(own)] = own
 
 
 def parts(
@@ -70,9 +71,11 @@ def parts(
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 
-def pantographs(size: int, collectors: int, lanes: int) -> Pantographs:
-    """Arrays for the pantographs of ``lanes`` lanes, with ``size`` state entries each, all zero."""
-    return Pantographs(size, aligned_zeros((collectors, lanes, Part.CONTACT_INPUT + 3 * size + size**2)))
+def pantographs(sizes: tuple[int, ...], lanes: int) -> Pantographs:
+    """Arrays for the pantographs of ``lanes`` lanes, all zero; sizes: entries of each collector's state."""
+    largest = max(sizes)
+    rows = Part.CONTACT_INPUT + 3 * largest + largest**2
+    return Pantographs(sizes, aligned_zeros((len(sizes), lanes, rows)))
 
 
 def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:

@@ -36,9 +36,9 @@ def rub(frame_input, friction, free_state, size):
 
 
 @inlined
-def free_value(pantographs, own, parts, r, on_frame, on_head):
-    """Entry ``r`` of a lane's state after a step with the contact force of the previous step."""
-    size, state = pantographs.size, own[ROW.STATE :]
+def free_value(size, own, parts, r, on_frame, on_head):
+    """Entry ``r`` of a collector's state after a step with the contact force of the previous step."""
+    state = own[ROW.STATE :]
     row = parts[PART.CONTACT_INPUT + 3 * size + r * size :]
     total = parts[PART.CONTACT_INPUT + r] * own[ROW.CONTACT_FORCE]
     total += parts[PART.CONTACT_INPUT + size + r] * on_frame
@@ -56,7 +56,8 @@ def move_apart(pantographs, collector, own, place, first, lane):
     start; the value at its end, with the contact force of the previous step; and the change at the end by
     1 N of the actuator, held over the step.
     """
-    size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
+    size = pantographs.sizes[collector]
+    parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     on_frame, on_head = own[ROW.LIFT] + own[ROW.WIND], 0.0
     upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
@@ -64,11 +65,11 @@ def move_apart(pantographs, collector, own, place, first, lane):
         on_head += own[ROW.HEAD_FORCE]
     else:
         on_frame += own[ROW.FRAME_FORCE]
-    now, free = own[ROW.STATE + upper], free_value(pantographs, own, parts, upper, on_frame, on_head)
+    now, free = own[ROW.STATE + upper], free_value(size, own, parts, upper, on_frame, on_head)
     gain = parts[inputs + upper]
     if place == PLACE.HEAD and size > 2:
         now = now - own[ROW.STATE + upper + 1]
-        free = free - free_value(pantographs, own, parts, upper + 1, on_frame, on_head)
+        free = free - free_value(size, own, parts, upper + 1, on_frame, on_head)
         gain = gain - parts[inputs + upper + 1]
     return now, free, gain
 
@@ -76,7 +77,8 @@ def move_apart(pantographs, collector, own, place, first, lane):
 @inlined
 def move_freely(pantographs, collector, own, lane):
     """Write the state of a lane's pantograph after a step without contact force behind its present state."""
-    size, parts = pantographs.size, pantographs.table[collector, own_row(pantographs.table[collector], lane)]
+    size = pantographs.sizes[collector]
+    parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
@@ -101,6 +103,7 @@ def add_contact_force(pantographs, collector, own, lane):
     """End the step: add the effect of the contact force to the free motion."""
     parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
     state, force = own[ROW.STATE :], own[ROW.CONTACT_FORCE]
-    contact_input, free_state = parts[PART.CONTACT_INPUT :], own[ROW.STATE + pantographs.size :]
-    for r in range(pantographs.size):
+    size, contact_input = pantographs.sizes[collector], parts[PART.CONTACT_INPUT :]
+    free_state = own[ROW.STATE + size :]
+    for r in range(size):
         state[r] = free_state[r] + contact_input[r] * force

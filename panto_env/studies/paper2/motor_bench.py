@@ -130,7 +130,7 @@ def _bench(record: Trajectory, target: float, driven: bool) -> tuple[Plant, Arra
     motor = actuator_settings(f"{MOTOR}:motors=1,force_limit=50" if driven else "ideal:place=head")
     plant = Plant(
         point,
-        Train.of(collector, motor),
+        Train.of(collector, actuator=motor),
         numerics=Numerics(time_step=TIME_STEP),
         runs=Runs(conditions=(room,)),
     )

@@ -49,7 +49,7 @@ def book(motors, rows, end, mean, square, speed):
 @inlined
 def force_of_fixed_rotors(motors, pantographs, collector, own, rows, requested, place, lane):
     """Mean force over a step (N) of motors whose rotors turn with the arms."""
-    now, free, gain = move_apart(pantographs, collector, own, place, pantographs.size // 2, lane)
+    now, free, gain = move_apart(pantographs, collector, own, place, pantographs.sizes[collector] // 2, lane)
     target = reference(motors, rows, requested, free, gain)
     end, mean, square = follow(motors, rows[MOTOR_ROW.FORCE], target, 0.5 * (now + free), 0.5 * gain)
     moved = free + gain * mean  # speed at the end without friction

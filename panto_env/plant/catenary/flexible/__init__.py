@@ -20,4 +20,6 @@ from .static import hang
 
 __all__ = ["KIND", "FlexibleCatenary", "FlexibleCatenaryData"]
 
-KIND = CatenaryKind(FlexibleCatenaryData, FlexibleCatenary, hang, clear_spans, warn_if_short)
+KIND = CatenaryKind(
+    FlexibleCatenaryData, FlexibleCatenary, hang, clear_spans, warn_if_short, several_collectors=True
+)

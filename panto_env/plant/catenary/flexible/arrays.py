@@ -53,6 +53,7 @@ class FlexibleLine(NamedTuple):
     stride: float  # by which the window moves (m): a span, or their mean length where spans differ
     starts: Array  # (strides + 1,): positions at which a window may begin (m), and the line's end
     window: int  # strides that the grid covers
+    lead: float  # of the first collector over the train's middle (m)
     rows: int  # of the grid, without those beyond its segments' ends
     shape: Array  # (rows, n): static height of the contact wire, at even distances (m)
     shape_length: float  # that ``shape`` covers (m): a span that repeats, or the whole line

@@ -92,6 +92,7 @@ def constants(
         stride=data.stride,
         starts=data.stride * np.arange(strides + 1),
         window=window,
+        lead=0.0,
         rows=rows,
         shape=tensioned.shape[None],
         shape_length=data.period,

@@ -73,7 +73,9 @@ class FlexibleCatenary:
         tightest = with_tension_left(designed, condition, ((1 + error) * contact, (1 + error) * messenger))
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
-        self.line = constants(data, shape, spans, numerics, chosen, own)
+        self.line = constants(data, shape, spans, numerics, chosen, own)._replace(
+            lead=0.5 * runs.train_length
+        )
         self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
         self.wires_per_collector = self.line.pairs
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)

@@ -227,7 +227,8 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
 
 
 def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    return window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data))
+    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data))
+    return window and window + math.ceil(runs.train_length / data.stride)
 
 
 def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:

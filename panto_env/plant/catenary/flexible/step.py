@@ -60,8 +60,10 @@ def window_start(line, wire, lane):
 
 @inlined
 def follow(line, wire, lane, x):
-    """Move the window by a stride once the contact point at x (m) is past its middle."""
-    ahead = int(x / line.stride) - wire.travelled[lane]
+    """Move the window by a stride once the middle of a train whose first contact point is at x (m) is past its
+    middle.
+    """
+    ahead = int((x - line.lead) / line.stride) - wire.travelled[lane]
     if 2 * ahead > line.window - 1 and not at_line_end(line, wire, lane):
         wire.travelled[lane] += 1
         per_stride = line.rows * WIDTH // line.window
