@@ -51,7 +51,7 @@ def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
         name: value for name, value in settings.items() if name not in ("time_step", "spacing", "window")
     }
     task = Task(run_settings(without), keep_samples=False)
-    found = identity(task.settings, task.plant, task.length.distance)
+    found = identity(task.settings, task.plant, task.length.own_distance)
     return without if found == run.settings else settings
 
 

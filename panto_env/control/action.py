@@ -26,10 +26,10 @@ def checked(action: Any, shape: tuple[int, ...]) -> Array:
     return force
 
 
-def not_finite(action: Array, lane: int, several: bool) -> InputError:
-    """The error for actions, (lanes, actions), of which that of a lane is not finite; several: lanes."""
-    whose = f" of lane {lane}" if several else ""
-    return InputError(f"The action{whose} must be finite, not {action[lane]}; check the policy.")
+def not_finite(action: Array, row: int, several: bool) -> InputError:
+    """The error for actions, (rows, actions), of which that of a row is not finite; several: rows."""
+    whose = f" of lane {row}" if several else ""
+    return InputError(f"The action{whose} must be finite, not {action[row]}; check the policy.")
 
 
 def numbers(action: Any) -> Array | None:

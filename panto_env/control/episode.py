@@ -24,13 +24,17 @@ Flags = NDArray[np.bool_]
 
 
 class Episode(NamedTuple):
-    """State and constants of the episodes, one per lane."""
+    """State and constants of the episodes.
 
-    action: Array  # (lanes, actions): requested in this control step
+    Each lane has a row for each of its controlled collectors; these follow each other.
+    """
+
+    controlled: tuple[int, ...]  # collectors with a row, the same in all lanes; kernels know a tuple's length
+    action: Array  # (rows, actions): requested in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
-    table: Array  # (lanes, ACTION + actions + history): rows of ``TaskRow``
-    now: Array  # (lanes, rows of ``Now``): of the present control step
+    table: Array  # (rows, ACTION + actions + history): rows of ``TaskRow``
+    now: Array  # (rows, rows of ``Now``): of the present control step
     weights: Array  # (terms,): of the reward
     cost_weights: Array  # (terms,): of the cost
     idle: Flags  # (lanes,): lanes that the next call skips
@@ -56,14 +60,15 @@ def new_episode(
     settings: RunSettings, plant: Plant, layout: Layout, control_steps: int, odometer: OdometerArrays
 ) -> Episode:
     """Arrays for the episodes of all lanes of a plant; control_steps: plant steps in a control step."""
-    lanes, actuator = plant.lanes, settings.actuator
-    actions = len(actuator.places)
+    lanes, actuator, controlled = plant.lanes, settings.actuator, plant.train.driven
+    actions, rows = len(actuator.places), lanes * len(controlled)
     return Episode(
-        action=np.zeros((lanes, actions)),
+        controlled=controlled,
+        action=np.zeros((rows, actions)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,
-        table=aligned_zeros((lanes, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
-        now=aligned_zeros((lanes, NOW_ROWS)),
+        table=aligned_zeros((rows, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
+        now=aligned_zeros((rows, NOW_ROWS)),
         weights=settings.reward.weights,
         cost_weights=settings.cost.weights,
         idle=np.zeros(lanes, dtype=np.bool_),
@@ -92,25 +97,28 @@ def _share(interval: float, time_constant: float) -> float:
 
 
 class Results(NamedTuple):
-    """Results of a control step, or of the start of an episode, for all lanes."""
+    """Results of a control step, or of the start of an episode, for the rows of all lanes.
 
-    observation: NDArray[np.float32]  # (lanes, entries)
-    values: Array  # (lanes, RESULT_ROWS): rows of ``Result``
-    flags: Flags  # (lanes, flags): rows of ``Flag``
+    Where one collector is controlled, a row is a lane.
+    """
+
+    observation: NDArray[np.float32]  # (rows, entries)
+    values: Array  # (rows, RESULT_ROWS): rows of ``Result``
+    flags: Flags  # (rows, flags): rows of ``Flag``
 
     @property
     def terminated(self) -> Flags:
-        """(lanes,): whether the plant has left its valid range, a view."""
+        """(rows,): whether the plant has left its valid range, a view."""
         return self.flags[:, Flag.TERMINATED]
 
     @property
     def truncated(self) -> Flags:
-        """(lanes,): whether the end of the run is reached within the valid range, a view."""
+        """(rows,): whether the end of the run is reached within the valid range, a view."""
         return self.flags[:, Flag.TRUNCATED]
 
     @property
     def reward_and_terms(self) -> Array:
-        """(1 + terms, lanes): the reward and its unweighted terms, a view."""
+        """(1 + terms, rows): the reward and its unweighted terms, a view."""
         return self.values[:, Result.REWARD : Result.CONTACT_FORCE].T
 
     def copy(self) -> Results:
@@ -118,10 +126,10 @@ class Results(NamedTuple):
         return Results(self.observation.copy(), self.values.copy(), self.flags.copy())
 
 
-def new_results(lanes: int, entries: int) -> Results:
-    """Empty arrays for the results of all lanes."""
+def new_results(rows: int, entries: int) -> Results:
+    """Empty arrays for the results of all rows."""
     return Results(
-        np.empty((lanes, entries), dtype=np.float32),
-        np.empty((lanes, RESULT_ROWS)),
-        np.empty((lanes, len(Flag)), dtype=np.bool_),
+        np.empty((rows, entries), dtype=np.float32),
+        np.empty((rows, RESULT_ROWS)),
+        np.empty((rows, len(Flag)), dtype=np.bool_),
     )

@@ -21,7 +21,7 @@ def spans(settings: RunSettings) -> int | None:
         more = 0 if line.ends else math.ceil(settings.settle)
         return line.spans + more if settings.spans is None and more else settings.spans
     before = settings.run_in + settings.settle
-    last: int = math.ceil(line.alignment().in_spans(settings.distance) + before)
+    last: int = math.ceil(line.alignment().in_spans(settings.distance + settings.train.length) + before)
     most, clear = (line.spans, 0) if line.ends else (MOST_SPANS, 1)  # a train may run up to a line's end
     if not line.ends and last >= line.spans:
         clear = CATENARIES[line.kind].clear_spans(line, settings.numerics, settings.runs, last)

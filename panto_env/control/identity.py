@@ -15,6 +15,8 @@ from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
 
+OF_TRAINS = ("pantographs", "distances", "controlled")
+"""Settings that say nothing of a train with one pantograph."""
 NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "cost", "settle")
 """Settings that only concern policies; the distance of a run includes what settles."""
 
@@ -24,7 +26,11 @@ def plain(settings: RunSettings) -> dict[str, Any]:
     values = {
         name: getattr(settings, name) for name in type(settings).model_fields if name not in NOT_OF_A_RUN
     }
-    names = {name: values[name].name for name in ("catenary", "pantograph")}
+    names: dict[str, Any] = {name: values[name].name for name in ("catenary", "pantograph")}
+    if settings.pantographs:
+        names["pantographs"] = [own.name for own in settings.pantographs]
+    else:  # one pantograph: there is nothing to say
+        values = {name: value for name, value in values.items() if name not in OF_TRAINS}
     table: dict[str, Any] = finite({name: _data(value) for name, value in (values | names).items()})
     return table
 
@@ -50,6 +56,9 @@ def settings_of(identity: Mapping[str, Any], design: Mapping[str, Any]) -> dict[
     }
     values["catenary"] = CATENARIES[line["kind"]].schema.model_validate(line)
     values["pantograph"] = PantographData.model_validate(design["pantograph"])
+    if "pantographs" in design:
+        values["pantographs"] = [PantographData.model_validate(own) for own in design["pantographs"]]
+        values["pantograph"] = values["pantographs"][0]
     if "known_pantograph" in values:
         values["known_pantograph"] = PantographData.model_validate(values["known_pantograph"])
     return values

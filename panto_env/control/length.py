@@ -25,12 +25,21 @@ class EpisodeLength:
         self._drift, self._plant = settings.drift, plant
         self.settling = plant.alignment.support(settings.settle)  # m
         given = settings.distance
-        self.distance = plant.model.usual_end if given is None else float(given) + self.settling
+        train = plant.train.length
+        if train >= plant.model.usual_end:
+            raise InputError(
+                f"The train's last pantograph is {train:g} m behind the first, and line "
+                f"'{plant.catenary.name}' with {plant.spans} spans has {plant.model.usual_end:g} m for it; "
+                "set more spans, or smaller distances."
+            )
+        # Of the first collector; the last one is to run as far as is given.
+        self.distance = plant.model.usual_end if given is None else float(given) + self.settling + train
         if self.distance > plant.model.length:
             raise InputError(
-                f"distance must be at most {plant.model.length:g} m on {plant.spans} spans, "
-                f"not {beside(self.distance, plant.model.length, '.6g')} m; set more spans."
+                f"distance must be at most {plant.model.length - train:g} m on {plant.spans} spans, "
+                f"not {beside(self.distance - train, plant.model.length - train, '.6g')} m; set more spans."
             )
+        self.own_distance = self.distance - train if train else self.distance  # of the last collector
         self.control_interval = settings.control_interval
         self.control_steps = whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)

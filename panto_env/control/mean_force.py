@@ -7,7 +7,7 @@ hash of the sources and of the run's settings.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,6 +16,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
+from ..plant.pantograph.schema import PantographData
 from .by_speed import BySpeed
 from .identity import NOT_OF_A_RUN
 from .kept import kept
@@ -30,26 +31,28 @@ interpolated, and the mean is within about 0.3 N of its target."""
 NO_MATTER = {*NOT_OF_A_RUN, "actuator", "sensors", "washout", "mean_force"}
 """Settings on which the mean force of a passive run does not depend."""
 
-PassiveMean = Callable[[float], float]
-"""Function from the static force (N) to the mean force (N) of a passive run."""
+Forces = tuple[float, ...]
+"""A force of each pantograph (N)."""
+PassiveMean = Callable[[Forces], Forces]
+"""Function from static forces to the mean forces of a passive run."""
 MakePassiveMean = Callable[[RunSettings, int, SpanChoice], PassiveMean]
 """Creates that function for a run with these settings and seed, with the mean over the spans."""
 
 
 @dataclass(frozen=True)
 class Trim:
-    """Static force that gives the required mean force, by speed."""
+    """Static forces that give the required mean forces, by speed."""
 
     speeds: tuple[float, ...]  # m/s, rising
-    static_forces: tuple[float, ...]  # N
+    static_forces: tuple[Forces, ...]  # at each speed
 
-    def static_force(self, speed: float) -> float:
-        """Static force (N) at a speed (m/s)."""
-        return float(np.interp(speed, self.speeds, self.static_forces))
+    def static_force(self, speed: float, collector: int = 0) -> float:
+        """Static force of a collector (N) at a speed (m/s)."""
+        return float(np.interp(speed, self.speeds, [forces[collector] for forces in self.static_forces]))
 
 
-def target_mean(settings: RunSettings, speed: float) -> float | None:
-    """Required mean force (N) at a speed (m/s); None where the pantograph's force is applied as it is.
+def target_mean(settings: RunSettings, speed: float, collector: int = 0) -> float | None:
+    """Required mean force (N) of a collector at a speed (m/s); None where its own force is applied as it is.
 
     That of EN 50367 is also a limit, so the target lies as far below it as a trim may miss.
     """
@@ -58,13 +61,19 @@ def target_mean(settings: RunSettings, speed: float) -> float | None:
         return largest_mean(speed, settings.line.system) - TOLERANCE
     if required is not None:
         return float(required)
-    return settings.pantograph.nominal_force(speed) if settings.pantograph.force == "mean" else None
+    pantograph = settings.riding[collector]
+    return pantograph.nominal_force(speed) if pantograph.force == "mean" else None
+
+
+def trimmed(settings: RunSettings, speed: float) -> bool:
+    """Whether any pantograph must meet a mean force at a speed (m/s)."""
+    return any(target_mean(settings, speed, number) is not None for number in range(len(settings.riding)))
 
 
 def trim_of_pass(
     settings: RunSettings, seed: int, spans: SpanChoice, passive_mean: MakePassiveMean
 ) -> Trim | None:
-    """Trim of one pass on its own line: without a policy its mean over the spans is the required one.
+    """Trim of one pass on its own line: without a policy its means over the spans are the required ones.
 
     It is trimmed in still air, as a pantograph is set: wind is not trimmed away. None where no mean is
     required, or the speed is yet to be drawn. Raises InputError if it cannot be met.
@@ -72,18 +81,18 @@ def trim_of_pass(
     still = tuple(condition.in_still_air for condition in settings.line_condition)
     settings = settings.model_copy(update={"line_condition": still})
     low, high = settings.speeds
-    if low != high or target_mean(settings, low) is None:
+    if low != high or not trimmed(settings, low):
         return None
     inputs = {
         # As any: all values of a line, not only those that every kind has.
         "settings": settings.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True),
-        "target": target_mean(settings, low),
+        "targets": [target_mean(settings, low, number) for number in range(len(settings.riding))],
         "seed": seed,
         "spans": spans,
     }
     line = settings.line.name
-    force = kept("mean_force", line, inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
-    return Trim((low,), (force,))
+    forces = kept("mean_force", line, inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
+    return Trim((low,), (tuple(forces),))
 
 
 class TrimAsDesigned:
@@ -96,39 +105,83 @@ class TrimAsDesigned:
         self._forces = BySpeed(speeds, KNOT_DISTANCE, partial(_as_designed, settings, passive_mean))
         self.speeds = self._forces.speeds  # (speeds,): that are trimmed, rising (m/s)
 
-    def static_force(self, speed: float) -> float:
-        """Static force (N) at a speed (m/s). Raises InputError where the mean cannot be met."""
-        return float(self._forces.at(speed, 0))
+    def static_force(self, speed: float, collector: int = 0) -> float:
+        """Static force of a collector (N) at a speed (m/s). InputError where its mean cannot be met."""
+        return float(self._forces.at(speed, collector))
 
 
-def _as_designed(settings: RunSettings, passive_mean: MakePassiveMean, speed: float) -> tuple[float, ...]:
+def _as_designed(settings: RunSettings, passive_mean: MakePassiveMean, speed: float) -> Forces:
     trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
     assert trim is not None  # a mean force is required at every speed or at none
-    return trim.static_forces
+    return trim.static_forces[0]
 
 
-def _solve(settings: RunSettings, mean: PassiveMean) -> float:
-    speed = settings.speeds[0]
-    target = target_mean(settings, speed)
-    assert target is not None  # else there is nothing to trim
-    aerodynamic = settings.pantograph.nominal_force(speed) - settings.pantograph.static_force
-    force = float(target - aerodynamic)
-    before: tuple[float, float] | None = None
+def _solve(settings: RunSettings, means: PassiveMean) -> Forces:
+    """Static forces for which every mean is within its tolerance: a secant search in each of them.
+
+    Other pantographs change a mean by less than their own change, so the searches converge side by side.
+    """
+    speed, riding = settings.speeds[0], settings.riding
+    targets = [target_mean(settings, speed, number) for number in range(len(riding))]
+    searches = [
+        None if target is None else _Search(settings, own, target)
+        for own, target in zip(riding, targets, strict=True)
+    ]
     for _ in range(MOST_RUNS):
-        if force < 0:
+        forces = tuple(
+            own.static_force if search is None else search.force
+            for own, search in zip(riding, searches, strict=True)
+        )
+        found = [
+            search is None or search.meets(mean) for search, mean in zip(searches, means(forces), strict=True)
+        ]
+        if all(found):
+            return forces
+        for search, met in zip(searches, found, strict=True):
+            if search is not None and not met:
+                search.go_on()
+    raise InputError(
+        f"No static force of {named(riding)} was found that gives a mean force of "
+        f"{' and '.join(f'{target:.1f}' for target in targets if target is not None)} N on "
+        f"'{settings.line.name}' at {settings.speed_kmh[0]:g} km/h; set the static force itself."
+    )
+
+
+class _Search:
+    """Secant search of the static force of one pantograph."""
+
+    def __init__(self, settings: RunSettings, pantograph: PantographData, target: float) -> None:
+        speed = settings.speeds[0]
+        self._aerodynamic = pantograph.nominal_force(speed) - pantograph.static_force
+        self._name, self._speed_kmh, self._target = pantograph.name, settings.speed_kmh[0], target
+        self._before: tuple[float, float] | None = None
+        self._missing = 0.0
+        self.force = float(target - self._aerodynamic)
+        self._check()
+
+    def _check(self) -> None:
+        if self.force < 0:
             raise InputError(
-                f"A mean force of {target:.1f} N cannot be met by '{settings.pantograph.name}' at "
-                f"{settings.speed_kmh[0]:g} km/h: its aerodynamic uplift alone is {aerodynamic:.1f} N; set "
+                f"A mean force of {self._target:.1f} N cannot be met by '{self._name}' at "
+                f"{self._speed_kmh:g} km/h: its aerodynamic uplift alone is {self._aerodynamic:.1f} N; set "
                 "a larger mean_force, or use another pantograph."
             )
-        missing = target - mean(force)
-        if abs(missing) <= TOLERANCE:
-            return force
-        slope = 1.0 if before is None else (before[1] - missing) / (force - before[0])
-        before = force, missing
-        force += missing / (slope if slope > 0 else 1.0)
-    raise InputError(
-        f"No static force of '{settings.pantograph.name}' was found that gives a mean force of "
-        f"{target:.1f} N on '{settings.line.name}' at {settings.speed_kmh[0]:g} km/h; set the static "
-        "force itself."
-    )
+
+    def meets(self, mean: float) -> bool:
+        """Whether the force gives the mean (N), which a run with it had."""
+        self._missing = self._target - mean
+        return abs(self._missing) <= TOLERANCE
+
+    def go_on(self) -> None:
+        """Try another force."""
+        slope, missing = 1.0, self._missing
+        if self._before is not None:
+            slope = (self._before[1] - missing) / (self.force - self._before[0])
+        self._before = self.force, missing
+        self.force += missing / (slope if slope > 0 else 1.0)
+        self._check()
+
+
+def named(riding: Sequence[PantographData]) -> str:
+    """Names of pantographs, as in an error."""
+    return " and ".join(f"'{own.name}'" for own in riding)

@@ -16,9 +16,9 @@ from ..base.names import suggest
 from ..plant.alignment import in_spans
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
-from ..plant.train import position, stride
+from ..plant.train import place_on_line, stride
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, EntryOptions, earlier, entries_of
-from .state import CONTROLLED, NOW, TASK_ROW
+from .state import NOW, TASK_ROW
 
 READINGS = len(Reading)
 BOUND = 10.0
@@ -118,26 +118,30 @@ _write = _branches(WRITERS)
 
 
 @inlined
-def add_noise(sensors, readings, lane):
-    """Add the next noise to a lane's readings."""
-    noise = sensors.noise[lane, CONTROLLED, sensors.noise_used[lane] & NOT_NEGATIVE]
+def add_noise(sensors, readings, collector, lane):
+    """Add the next noise to the readings of a lane's collector."""
+    noise = sensors.noise[lane, collector, sensors.noise_used[lane] & NOT_NEGATIVE]
     for k in range(READINGS):
         readings[k] += noise[k]
-    sensors.noise_used[lane] += 1
 
 
 @inlined
-def prepare_entries(episode, sensors, run, own, now, lane):
-    """Prepare the values that entries of a lane's observation read: readings with noise, position, speed."""
+def use_noise(sensors, lane):
+    """Go on to a lane's next noise."""
     if sensors.noise.shape[2] > 0:
-        add_noise(sensors, now[NOW.READING :], lane)
-    now[NOW.SPANS] = in_spans(episode.alignment, position(run, CONTROLLED, lane, own[ROW.STEP]))
-    now[NOW.STRIDE] = stride(run, CONTROLLED, lane, own[ROW.STEP])
+        sensors.noise_used[lane] += 1
+
+
+@inlined
+def prepare_entries(episode, sensors, run, own, now, collector, lane, row):
+    """Prepare the values that entries of an observation read: readings with noise, position, speed."""
+    if sensors.noise.shape[2] > 0:
+        add_noise(sensors, now[NOW.READING :], collector, lane)
+    now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))
+    now[NOW.STRIDE] = stride(run, collector, lane, own[ROW.STEP])
     now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)
     if episode.odometer.table.shape[1] > 0:
-        spans, speed = read_odometer(
-            episode.odometer, episode.alignment, now[NOW.SPANS], now[NOW.SPEED], lane
-        )
+        spans, speed = read_odometer(episode.odometer, episode.alignment, now[NOW.SPANS], now[NOW.SPEED], row)
         now[NOW.SPANS] = spans
         now[NOW.SPEED] = speed
 

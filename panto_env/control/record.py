@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,24 +15,26 @@ from ..base.units import to_kmh
 from ..catalog.values import by_value
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from ..plant.state import Row
 from ..plant.valid_range import LARGEST_HEIGHT, Ending, reason
 from .identity import identity
-from .state import CONTROLLED, TaskRow
+from .mean_force import named
+from .state import TaskRow
 from .task_state import TaskState
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force (N), ten times any real one: beyond it a computation has diverged."""
 
 
-def diverged(task: TaskState, lanes: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
-    """Whether lanes, (n,), have diverged, as their ending or an impossible value shows.
+def diverged(task: TaskState, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
+    """Whether rows, (n,), have diverged, as their ending or an impossible value shows.
 
     deviation: mean, from the nominal force (N). height: of the wire (m).
     """
     possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
-    endings = task.episode.table[lanes, TaskRow.ENDING]
+    endings = task.episode.table[rows, TaskRow.ENDING]
     return np.asarray(~possible | (endings == Ending.DIVERGED))
 
 
@@ -38,7 +42,7 @@ def divergence(task: TaskState, lane: int) -> str:
     """Message that a lane's computation diverged, and what to do."""
     plant = task.plant
     return (
-        f"The computation of '{plant.pantograph.name}' on '{plant.catenary.name}' at "
+        f"The computation of {named(task.settings.riding)} on '{plant.catenary.name}' at "
         f"{to_kmh(task.speed[lane]):g} km/h diverged, so it has no result; {_way_out(plant)}."
     )
 
@@ -56,22 +60,38 @@ def _way_out(plant: Plant) -> str:
 def trajectory(
     task: TaskState, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
 ) -> Trajectory:
-    """Record of a lane's run so far. Raises InputError where its computation diverged.
+    """Record of a lane's run so far, of the first collector with those of the others as its followers.
 
-    last: the task does not run any more, so large arrays need no copy.
+    last: the task does not run any more, so large arrays need no copy. Raises InputError where its
+    computation diverged.
     """
-    plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE)
-    steps = int(plant.of(lane, Row.STEP))
-    rows = task.samples.rows[lane, 1 : steps + 1, CONTROLLED]
-    if steps:
+    collectors = range(len(task.plant.train.collectors))
+    first, *followers = (_of_collector(task, lane, number, policy, seed, last) for number in collectors)
+    return replace(first, followers=tuple(followers)) if followers else first
+
+
+def _of_collector(
+    task: TaskState, lane: int, collector: int, policy: str, seed: int, last: bool
+) -> Trajectory:
+    """Record of one collector, from where it comes onto the line."""
+    plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE, collector)
+    steps, pantograph = int(plant.of(lane, Row.STEP)), task.settings.riding[collector]
+    position = plant.position(lane, np.arange(steps) + 0.5, collector)
+    on_line = slice(int(np.searchsorted(position, 0.0)), steps)
+    rows = task.samples.rows[lane, 1 : steps + 1, collector][on_line]
+    if len(rows):
         deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - nominal_force))
         highest = np.max(np.abs(rows[:, Row.WIRE_HEIGHT]))
-        if diverged(task, np.array([lane]), deviation[None], highest[None])[0]:
+        row = np.array([lane * task.agents])
+        if diverged(task, row, deviation[None], highest[None])[0]:
             raise InputError(divergence(task, lane))
-    uplift, tension = (each[lane, 1 : steps + 1] for each in (task.samples.uplift, task.samples.tension))
+    uplift, tension = (
+        each[lane, 1 : steps + 1][on_line] for each in (task.samples.uplift, task.samples.tension)
+    )
+    controlled = collector in task.episode.controlled
     return Trajectory(
-        time=(np.arange(steps) + 0.5) * plant.time_step,
-        position=plant.position(lane, np.arange(steps) + 0.5),
+        time=(np.arange(steps) + 0.5)[on_line] * plant.time_step,
+        position=position[on_line],
         contact_force=rows[:, Row.CONTACT_FORCE].copy(),
         head=rows[:, Row.HEAD_HEIGHT].copy(),
         frame=rows[:, Row.FRAME_HEIGHT].copy(),
@@ -85,23 +105,28 @@ def trajectory(
         dropper_force=tension if last else tension.copy(),
         dropper_position=plant.model.droppers if task.record_droppers else np.zeros(0),
         catenary=plant.catenary.name,
-        pantograph=plant.pantograph.name,
+        pantograph=pantograph.name,
         speed=float(task.speed[lane]),
         alignment=plant.alignment,
         time_step=plant.time_step,
         nominal_force=nominal_force,
-        target_mean=task.target_mean(lane),
-        settings=identity(task.settings, plant, task.length.distance),
-        policy=policy,
+        target_mean=task.target_mean(lane, collector),
+        settings=identity(task.settings, plant, task.length.own_distance),
+        policy=policy if controlled else "passive",
         seed=seed,
         terminated=_ending(task, lane) is not Ending.NONE,
         ending=ending(task, lane),
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
-        design={
-            "catenary": by_value(plant.catenary),
-            "pantograph": by_value(task.settings.pantograph),
-        },
+        design=_design(task, pantograph),
+        reached=float(plant.position(lane, steps, collector)[0]) if collector else math.nan,
     )
+
+
+def _design(task: TaskState, pantograph: PantographData) -> dict[str, Any]:
+    """Line and pantographs by value, with which a run can be repeated; pantograph: the collector's own."""
+    design = {"catenary": by_value(task.plant.catenary), "pantograph": by_value(pantograph)}
+    several = task.settings.pantographs
+    return design | ({"pantographs": [by_value(own) for own in several]} if several else {})
 
 
 def ending(task: TaskState, lane: int) -> str:
@@ -119,4 +144,4 @@ def ending(task: TaskState, lane: int) -> str:
 
 
 def _ending(task: TaskState, lane: int) -> Ending:
-    return Ending(int(task.episode.table[lane, TaskRow.ENDING]))
+    return Ending(int(task.episode.table[lane * task.agents, TaskRow.ENDING]))

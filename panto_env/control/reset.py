@@ -17,7 +17,7 @@ from .record import ending
 from .running_figures import no_figures
 from .safety import limits
 from .start import LaneGenerators, draw_starts
-from .state import CONTROLLED, Result, TaskRow
+from .state import Result, TaskRow
 from .task_state import TaskState
 
 
@@ -46,13 +46,20 @@ def reset(
         plant.alignment,
     )
     forces = static_forces(drawn.speed)
-    plant.start(lanes, drawn.speed, drawn.line, drawn.pantograph, forces, drawn.drift)
+    plant.start(lanes, drawn.speed, drawn.line, drawn.pantographs, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
     end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
+    # A collector behind the first comes onto the line later: its episode begins there.
+    distances = [plant.train.collectors[number].distance for number in task.episode.controlled]
+    if distances[0] > 0:
+        steps = task.length.plant_steps(drawn.speed, run_in, drawn.drift, distances[0])
+        run_in = steps // task.length.control_steps
     run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
-    counted_from = np.zeros(len(lanes))
-    if task.length.settling:
-        counted_from = task.length.plant_steps(drawn.speed, run_in, drawn.drift, task.length.settling)
+    counted_from = np.zeros((len(distances), len(lanes)))
+    for agent, distance in enumerate(distances):
+        uncounted = distance - distances[0] + task.length.settling
+        if uncounted:
+            counted_from[agent] = task.length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
     _begin(task, lanes, end, counted_from)
     plant.clear(task.samples, lanes)
     samples = plant.run.table[:, lanes, :SAMPLE_ROWS]
@@ -60,8 +67,9 @@ def reset(
     if task.keep_samples:
         task.samples.rows[lanes, 0] = samples.swapaxes(0, 1)
     if task.odometers.drawn:
-        for lane in lanes.tolist():
-            task.odometers.start(task.episode.odometer, lane, of_lane(lane), task.noise is not None)
+        for row in _rows(task, lanes).ravel().tolist():
+            own = of_lane(row // task.agents)
+            task.odometers.start(task.episode.odometer, row, own, task.noise is not None)
     if task.noise is not None:
         for lane in lanes.tolist():
             task.noise.start(task.sensors, lane, of_lane(lane))
@@ -70,40 +78,52 @@ def reset(
         _run_in(task, lanes[run_in > 0], run_in[run_in > 0], results)
 
 
-def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None:
-    """Begin episodes in lanes at their present positions.
+def _rows(task: TaskState, lanes: Any) -> Any:
+    """Rows of lanes, (agents, n)."""
+    return task.agents * lanes + np.arange(task.agents)[:, None]
 
-    end, counted_from: plant steps from the line's start at which they end, and after which they count.
-    Raises InputError where nothing of an episode would count.
+
+def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None:
+    """Begin episodes in lanes, (n,), at their present positions.
+
+    end, counted_from: plant steps from the line's start at which they end, (n,), and after which they count,
+    (agents, n). Raises InputError where nothing of an episode would count.
     """
-    start, table = task.plant.run.table[CONTROLLED, lanes], task.episode.table
-    rows = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
-    rows[:, TaskRow.END] = end
+    for agent, rows in enumerate(_rows(task, lanes)):
+        _begin_agent(task, agent, lanes, rows, end, counted_from[agent])
+
+
+def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array, counted_from: Array) -> None:
+    """As ``_begin``, for one of the controlled collectors; rows: its own, (n,)."""
+    collector, table = task.episode.controlled[agent], task.episode.table
+    start, pantograph = task.plant.run.table[collector, lanes], task.settings.riding[collector]
+    values = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
+    values[:, TaskRow.END] = end
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
     if not nominal[low] > 0:  # the reward is relative to it
         raise InputError(
-            f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{task.plant.pantograph.name}' "
+            f"At {to_kmh(task.speed[lanes[low]]):g} km/h nothing presses '{pantograph.name}' "
             f"against the wire: its lift is {nominal[low]:g} N; give it a static_force or an "
             "aerodynamic_coefficient, or set a mean_force."
         )
-    target, spread = task.targets(task.speed[lanes], nominal)
-    rows[:, TaskRow.TARGET_SHIFT] = rows[:, TaskRow.MEAN_DEVIATION] = target - nominal
-    rows[:, TaskRow.PER_SPREAD] = 1 / spread
+    target, spread = task.targets(agent, task.speed[lanes], nominal)
+    values[:, TaskRow.TARGET_SHIFT] = values[:, TaskRow.MEAN_DEVIATION] = target - nominal
+    values[:, TaskRow.PER_SPREAD] = 1 / spread
     uplift, force = limits(task.settings.line, task.speed[lanes])
-    rows[:, TaskRow.UPLIFT_LIMIT], rows[:, TaskRow.FORCE_LIMIT] = uplift, force
+    values[:, TaskRow.UPLIFT_LIMIT], values[:, TaskRow.FORCE_LIMIT] = uplift, force
     counted_from = np.maximum(counted_from, start[:, Row.STEP])
     if (counted_from >= end).any():
         raise InputError(
             f"After the {task.settings.settle:g} spans of settle nothing of the episode is left to count; "
             "set a distance, more spans, or a smaller settle."
         )
-    rows[:, TaskRow.COUNTED_FROM] = counted_from
+    values[:, TaskRow.COUNTED_FROM] = counted_from
     shifted = task.plant.ahead(lanes, np.stack([counted_from, end], axis=1))
     steady = (end - counted_from) * start[:, Row.STRIDE]
-    rows[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
-    table[lanes] = rows
-    task.running.peak[lanes] = -np.inf
+    values[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
+    table[rows] = values
+    task.running.peak[rows] = -np.inf
 
 
 def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
@@ -111,24 +131,26 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
-    rows = task.episode.table[lanes]
-    for lane in lanes[rows[:, TaskRow.ENDING] != Ending.NONE].tolist():
+    rows = _rows(task, lanes)
+    before = task.episode.table[rows]
+    for lane in lanes[before[0, :, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(ending(task, lane))
-    _begin(task, lanes, rows[:, TaskRow.END], rows[:, TaskRow.COUNTED_FROM])
+    _begin(task, lanes, before[0, :, TaskRow.END], before[..., TaskRow.COUNTED_FROM])
     # What the run-in would have earned and cost does not count.
-    results.values[lanes, : Result.CONTACT_FORCE] = results.values[lanes, Result.COST] = 0.0
+    results.values[rows, : Result.CONTACT_FORCE] = results.values[rows, Result.COST] = 0.0
     if task.layout.history:
-        _forget(task, lanes, rows, results)
+        for own, values in zip(rows, before, strict=True):
+            _forget(task, own, values, results)
 
 
-def _forget(task: TaskState, lanes: Any, rows: Array, results: Results) -> None:
-    """Fill the history of lanes after a run-in with their last readings.
+def _forget(task: TaskState, rows: Any, values: Array, results: Results) -> None:
+    """Fill the history of rows, (n,), after a run-in with their last readings.
 
-    rows: of ``TaskRow``, (lanes, rows), from before their episodes began.
+    values: of ``TaskRow``, (n, rows of the table), from before their episodes began.
     """
     first = TaskRow.ACTION + len(task.actuator.places)
-    history = rows[:, first:]
+    history = values[:, first:]
     latest = history[:, : history.shape[1] // task.layout.history]
-    task.episode.table[lanes, first:] = np.tile(latest, task.layout.history)
+    task.episode.table[rows, first:] = np.tile(latest, task.layout.history)
     past, now = task.layout.earlier
-    results.observation[np.ix_(lanes, past)] = results.observation[np.ix_(lanes, now)]
+    results.observation[np.ix_(rows, past)] = results.observation[np.ix_(rows, now)]

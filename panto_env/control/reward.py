@@ -85,9 +85,10 @@ def begin_terms(task, now):
 
 
 @inlined
-def add_sample_to_terms(own, task, now, force_before):
-    """Add a plant step to the sums of its control step; force_before: previous contact force (N)."""
-    force, nominal_force = own[ROW.CONTACT_FORCE], own[ROW.LIFT]  # nominal at the present speed
+def add_sample_to_terms(own, task, now):
+    """Add a plant step to the sums of its control step."""
+    force_before, force = now[NOW.FORCE_BEFORE], own[ROW.CONTACT_FORCE]
+    nominal_force = own[ROW.LIFT]  # at the present speed
     # An interval lies between two samples: before the first one there is none.
     between = 1.0 if own[ROW.STEP] > 1.5 else 0.0
     now[NOW.COST] += between * (abs(force_before - nominal_force) + abs(force - nominal_force))

@@ -43,21 +43,24 @@ def figures_so_far(
     supports: Array,
     time_step: float,
     ahead: Callable[[Array], Array],
+    behind: Array,
 ) -> dict[str, Array]:
-    """The ``Figures`` of runs so far, by name, (lanes,) each.
+    """The ``Figures`` of runs so far, by name, (runs,) each.
 
-    table: (lanes, rows of TaskRow). peak: (lanes, supports). run: (lanes, rows of Row). supports: their
-    positions (m). time_step: s. ahead: from numbers of steps, (lanes, n), to the lead of the trains over
-    steady ones (m), (lanes, n).
+    table: (runs, rows of TaskRow). peak: (runs, supports). run: (runs, rows of Row). supports: their
+    positions (m). time_step: s. ahead: from numbers of steps, (runs, n), to the lead of the trains over
+    steady ones (m), (runs, n). behind: distance of the collectors behind the first ones (m), (runs,).
     """
     stride, steps = run[:, Row.STRIDE], run[:, Row.STEP]
     samples = table[:, TaskRow.SAMPLES]
     shift = table[:, TaskRow.DEVIATION] / samples
     mean = run[:, Row.NOMINAL_FORCE] + shift
     std = np.sqrt(np.maximum(table[:, TaskRow.SQUARED_DEVIATION] / samples - shift**2, 0.0))
-    begin, shifted = steps - samples, ahead(np.stack([steps - samples, steps], axis=1)).T
+    begin = steps - samples
+    shifted = ahead(np.stack([begin, steps], axis=1)).T
     # Positions of the first and last sample: half a step before each end.
-    first, last = (begin - 0.5) * stride + shifted[0], (steps - 0.5) * stride + shifted[1]
+    first = (begin - 0.5) * stride + shifted[0] - behind
+    last = (steps - 0.5) * stride + shifted[1] - behind
     passed = (supports > first[:, None] - 1e-6) & (supports < last[:, None] + 1e-6)
     largest = np.max(np.where(passed, peak, -np.inf), axis=1, initial=-np.inf)
     changes = np.maximum(samples - 1, 1.0)
@@ -97,8 +100,8 @@ def low_pass(running, task, force):
 
 
 @inlined
-def add_sample_to_figures(running, samples, own, task, now, frame_before, head_before, lane):
-    """Add a plant step; frame_before, head_before: forces of the actuators in the previous step (N).
+def add_sample_to_figures(running, samples, own, task, now, lane, own_peak):
+    """Add a plant step; own_peak: row of the collector in ``RunningFigures.peak``.
 
     Before what counts only the filter and the uplift go on.
     """
@@ -106,7 +109,7 @@ def add_sample_to_figures(running, samples, own, task, now, frame_before, head_b
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
     if running.peak.shape[1] > 0:
         row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
-        peak, uplift = running.peak[lane], samples.uplift[lane, row]
+        peak, uplift = running.peak[own_peak], samples.uplift[lane, row]
         for s in range(peak.size):
             peak[s] = max(peak[s], uplift[s])
             highest = max(highest, uplift[s])
@@ -115,7 +118,7 @@ def add_sample_to_figures(running, samples, own, task, now, frame_before, head_b
         return
     between = 0.0 if task[TASK_ROW.SAMPLES] == 0.0 else 1.0  # a change lies between two samples
     frame, head = own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
-    frame_change, head_change = frame - frame_before, head - head_before
+    frame_change, head_change = frame - now[NOW.FRAME_BEFORE], head - now[NOW.HEAD_BEFORE]
     task[TASK_ROW.SQUARED_CHANGE] += between * (frame_change * frame_change + head_change * head_change)
     task[TASK_ROW.SQUARED_EFFORT] += frame * frame + head * head
     task[TASK_ROW.SAMPLES] += 1.0

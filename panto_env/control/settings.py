@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from itertools import pairwise
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from ..base.errors import InputError
@@ -32,7 +33,7 @@ from ..plant.line_condition import LINE_CONDITIONS, LineCondition
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
-from ..plant.train import Train
+from ..plant.train import MOST_COLLECTORS, Train
 from .observation import OBSERVATIONS
 from .reward import REWARDS, Reward
 from .safety import CostWeights
@@ -76,6 +77,37 @@ def _estimator(value: Any) -> EstimatorSettings:
 
 def _known_pantograph(value: Any) -> PantographData | None:
     return None if value is None else load_pantograph(value)
+
+
+def _pantographs(value: Any) -> tuple[PantographData, ...]:
+    several = value if isinstance(value, list | tuple) else [value]
+    return tuple(load_pantograph(each) for each in several)
+
+
+def _distances(value: Any) -> tuple[float, ...]:
+    several = value if isinstance(value, list | tuple | np.ndarray) else [value]
+    numbers = [each for each in several if isinstance(each, int | float) and not isinstance(each, bool)]
+    if len(numbers) < len(several) or not all(0 < each <= FARTHEST for each in numbers):
+        raise InputError(
+            "distances must be positive numbers (m), one for each pantograph behind the first, not "
+            f"{shown(value)}."
+        )
+    if any(after <= before for before, after in pairwise(numbers)):
+        raise InputError(
+            f"distances count from the first pantograph, so they must increase, as {shown(value)} do not."
+        )
+    return tuple(float(each) for each in numbers)
+
+
+def _controlled(value: Any) -> tuple[int, ...]:
+    several = value if isinstance(value, list | tuple) else [value]
+    numbers = [each for each in several if isinstance(each, int) and not isinstance(each, bool)]
+    if not numbers or len(set(numbers)) < len(several) or min(numbers) < 1:
+        raise InputError(
+            "controlled must name different pantographs by their numbers, 1 for the first, not "
+            f"{shown(value)}."
+        )
+    return tuple(sorted(numbers))
 
 
 def _spans(value: Any) -> int | None:
@@ -139,6 +171,20 @@ class RunSettings(Numerics):
         "en50318-2002",
         validate_default=True,
         description="pantograph: a name of the catalogue or a TOML file",
+    )
+    pantographs: Annotated[tuple[PantographData, ...], BeforeValidator(_pantographs)] = Field(
+        (),
+        description="pantographs of a train, the first in front, instead of pantograph: up to four names of "
+        "the catalogue or TOML files",
+    )
+    distances: Annotated[tuple[float, ...], BeforeValidator(_distances)] = Field(
+        (), description="distance of each further pantograph behind the first (m)"
+    )
+    controlled: Annotated[tuple[int, ...], BeforeValidator(_controlled)] = Field(
+        1,
+        validate_default=True,
+        description="numbers of the pantographs that have an actuator and are controlled, 1 for the first; "
+        "the others are passive",
     )
     speed_kmh: Annotated[tuple[_Speed, _Speed], BeforeValidator(speed_range)] = Field(
         300.0,
@@ -239,14 +285,45 @@ class RunSettings(Numerics):
     )
     distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
         None,
-        description="distance to run (m); by default to the end of the line, and outside an environment at "
-        f"least to the end of span {LAST_USUAL}; a short line gets more spans",
+        description="distance that the last pantograph is to run (m); by default to the end of the line, "
+        f"and outside an environment at least to the end of span {LAST_USUAL}; a short line gets more spans",
     )
     spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
     )
     control_interval: ControlInterval = Field(0.01, description="time between two actions (s)")
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_of_several(cls, values: Any) -> Any:
+        """The pantograph is the first of several, unless another one is given."""
+        several = values.get("pantographs") if isinstance(values, dict) else None
+        usual = cls.model_fields["pantograph"].default
+        if several and isinstance(several, list | tuple) and values.get("pantograph", usual) == usual:
+            return {**values, "pantograph": several[0]}
+        return values
+
+    @model_validator(mode="after")
+    def _fit_together(self) -> Self:
+        count = max(len(self.pantographs), 1)
+        if self.pantographs and self.pantographs[0] != self.pantograph:
+            raise InputError(
+                f"pantograph is the first of pantographs, '{self.pantographs[0].name}', not "
+                f"'{self.pantograph.name}'; give only one of the two."
+            )
+        if count > MOST_COLLECTORS:
+            raise InputError(f"A train has up to {MOST_COLLECTORS} pantographs, not {count}.")
+        if len(self.distances) != count - 1:
+            raise InputError(
+                f"distances must give {count - 1} numbers, one for each of the pantographs behind the first, "
+                f"not {len(self.distances)}."
+            )
+        if self.controlled[-1] > count:
+            raise InputError(
+                f"controlled names pantograph {self.controlled[-1]}, but the train has only {count}."
+            )
+        return self
 
     @property
     def line(self) -> CatenaryData:
@@ -258,9 +335,26 @@ class RunSettings(Numerics):
         return self.catenary
 
     @property
+    def riding(self) -> tuple[PantographData, ...]:
+        """The pantographs of the train, the first in front."""
+        return self.pantographs or (self.pantograph,)
+
+    def with_pantograph(self, collector: int, pantograph: PantographData) -> Self:
+        """These settings with another pantograph of a collector, counted from 0."""
+        riding = [*self.riding[:collector], pantograph, *self.riding[collector + 1 :]]
+        several = tuple(riding) if self.pantographs else ()
+        return self.model_copy(update={"pantograph": riding[0], "pantographs": several})
+
+    @property
     def train(self) -> Train:
-        """The train: one collector."""
-        return Train.of(self.pantograph, self.actuator, self.sensors)
+        """The train."""
+        return Train.of(
+            *self.riding,
+            actuator=self.actuator,
+            sensors=self.sensors,
+            distances=self.distances,
+            driven=[number - 1 for number in self.controlled],
+        )
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -278,8 +372,10 @@ class RunSettings(Numerics):
         """The runs for which the plant is built."""
         slow, quick = self.speeds
         drift = largest_drift(self.drift)
-        pantograph, interval = self.pantograph, self.control_interval
-        return Runs((slow - drift, quick + drift), interval, self.line_condition, pantograph.hard_contact)
+        train = self.train
+        hard = any(collector.pantograph.hard_contact for collector in train.collectors)
+        speeds, conditions = (slow - drift, quick + drift), self.line_condition
+        return Runs(speeds, self.control_interval, conditions, hard, train.length)
 
     @property
     def numerics(self) -> Numerics:
@@ -298,8 +394,10 @@ def far_enough(settings: RunSettings) -> RunSettings:
     if given or line.ends:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
-    spans = last + CATENARIES[line.kind].clear_spans(line, settings.numerics, settings.runs, last)
-    return settings.model_copy(update={"distance": line.alignment(last).length, "spans": spans})
+    distance = line.alignment(last).length
+    of_first = last + math.ceil(line.alignment().in_spans(settings.train.length))
+    spans = of_first + CATENARIES[line.kind].clear_spans(line, settings.numerics, settings.runs, of_first)
+    return settings.model_copy(update={"distance": distance, "spans": spans})
 
 
 def as_designed(settings: RunSettings, speed: float) -> RunSettings:

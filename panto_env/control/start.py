@@ -30,7 +30,7 @@ class Starts(NamedTuple):
 
     speed: Array  # (lanes,): m/s
     line: Sequence[DrawnLine]  # of each lane
-    pantograph: Sequence[PantographData]  # of each lane; empty where all are alike
+    pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
     drift: Array | None  # (lanes, DRIFT_ROWS): of the speeds; None where these are constant
 
@@ -58,14 +58,15 @@ def draw_starts(
         return Starts(speed, [draw(conditions, _UNUSED, droppers, supports)] * len(lanes), [], way, None)
     windy = any(condition.wind for condition in conditions)
     windy_across = any(condition.side_wind for condition in conditions)
-    line, pantograph, drift = [], [], []
+    line, pantographs, drift = [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
         if low < high:
             speed[k] = own.uniform(low, high)
         line.append(draw(conditions, own, droppers, supports))
         if scatter:
-            pantograph.append(with_scatter(settings.pantograph, scatter, own))
+            riding = settings.riding
+            pantographs.append([with_scatter(designed, scatter, own) for designed in riding])
         if run_in > 0:
             way[k] = alignment.support(own.uniform(0, run_in))
         if rms > 0:
@@ -76,4 +77,4 @@ def draw_starts(
         if windy_across:
             side_wind = draw_side_wind(line[k].condition.across, time_step, own)
             line[k] = replace(line[k], side_wind=side_wind)
-    return Starts(speed, line, pantograph, way, np.array(drift) if drift else None)
+    return Starts(speed, line, pantographs, way, np.array(drift) if drift else None)

@@ -69,7 +69,10 @@ class Now(IntEnum):
     TARGET_COST = 10  # as COST, of deviations from the reward's target (N)
     UPLIFT_STEPS = 11  # plant steps with an uplift above its limit
     FORCE_STEPS = 12  # plant steps with a low-passed contact force above its limit
-    READING = 13  # what the sensors read, one row per ``Reading``
+    FORCE_BEFORE = 13  # contact force in the previous plant step (N)
+    FRAME_BEFORE = 14  # forces of the actuators in it (N)
+    HEAD_BEFORE = 15
+    READING = 16  # what the sensors read, one row per ``Reading``
 
 
 class Result(IntEnum):
@@ -93,8 +96,6 @@ class Flag(IntEnum):
     TRUNCATED = 1  # whether the end of the run is reached, within it
 
 
-CONTROLLED = 0
-"""The collector that is controlled and observed, and whose contact force is evaluated."""
 TASK_ROW, TERM, NOW = constants(TaskRow), constants(Term), constants(Now)
 RESULT, FLAG = constants(Result), constants(Flag)
 NOW_ROWS = int(Now.READING) + len(Reading)

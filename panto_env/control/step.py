@@ -10,9 +10,9 @@ from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import PLACE, ROW
 from ..plant.step import record_lane, step_lane
-from ..plant.train import mean_stride, position
+from ..plant.train import mean_stride, place_on_line, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
-from .observation import begin_history, entry_of, prepare_entries, remember
+from .observation import begin_history, entry_of, prepare_entries, remember, use_noise
 from .reward import (
     add_sample_to_terms,
     begin_terms,
@@ -23,27 +23,28 @@ from .reward import (
 )
 from .running_figures import add_control_step_to_figures, add_sample_to_figures
 from .safety import compute_cost
-from .state import CONTROLLED, FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
+from .state import FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 
 @inlined
-def take_action(run, episode, own, task, now, lane):
-    """Clip a lane's action, and set the requested forces and the reward's terms for the action.
+def take_action(episode, own, task, now, row):
+    """Clip an action, and set the requested forces and the reward's terms for the action.
 
     With a washout the slow average of the actuator's force is subtracted first, so that the action can't move
     the mean contact force.
     """
-    for c in range(len(run.distance)):
-        for place in (PLACE.FRAME, PLACE.HEAD):
-            run.table[c, lane, ROW.COMMAND + place] = 0.0
+    for place in (PLACE.FRAME, PLACE.HEAD):
+        own[ROW.COMMAND + place] = 0.0
     now[NOW.EFFORT] = 0.0
     now[NOW.RATE] = 0.0
     for a in range(episode.places.size):
-        action, acted = min(1.0, max(-1.0, episode.action[lane, a])), episode.places[a]
+        action, acted = min(1.0, max(-1.0, episode.action[row, a])), episode.places[a]
         if episode.washout_share > 0.0:
-            row = TASK_ROW.WASHED_OUT + acted
-            task[row] += episode.washout_share * own[ROW.FRAME_FORCE + acted] * (1.0 / episode.force_limit)
-            action = min(1.0, max(-1.0, action - task[row]))
+            washed_out = TASK_ROW.WASHED_OUT + acted
+            task[washed_out] += (
+                episode.washout_share * own[ROW.FRAME_FORCE + acted] * (1.0 / episode.force_limit)
+            )
+            action = min(1.0, max(-1.0, action - task[washed_out]))
         change = 0.5 * (action - task[TASK_ROW.ACTION + a])
         now[NOW.EFFORT] += action * action
         now[NOW.RATE] += change * change
@@ -52,19 +53,35 @@ def take_action(run, episode, own, task, now, lane):
 
 
 @inlined
-def end_episode(line, wire, run, episode, own, task, values, flags, lane):
-    """Whether a lane's episode ends here; an early end is charged to reward and cost."""
-    ending = ending_by_wire(line, wire, lane)
-    if task[TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit:
-        ending = ENDING.LOSS
+def ending_of_head(run, episode, collector, lane, ending):
+    """Why a run ends because of a collector's head; ``ending`` unless it does."""
+    own = run.table[collector, lane]
     height = own[ROW.STATE]
     if episode.levels.size > 0:
-        x = position(run, CONTROLLED, lane, own[ROW.STEP])
+        x = place_on_line(run, collector, lane, own[ROW.STEP])
         height -= between_supports(episode.alignment, episode.levels, x)
     if not abs(height) <= episode.head_range:
         ending = ENDING.HEAD
     if not abs(own[ROW.STATE]) <= LARGEST_HEIGHT:  # nor is NaN
         ending = ENDING.DIVERGED
+    return ending
+
+
+@inlined
+def ending_of(line, wire, run, episode, lane):
+    """Why a lane's run ends here; ``ENDING.NONE`` unless it does early."""
+    agents, ending = len(episode.controlled), ending_by_wire(line, wire, lane)
+    for a in range(agents):
+        if episode.table[lane * agents + a, TASK_ROW.LOSS_STEPS_IN_A_ROW] >= episode.loss_limit:
+            ending = ENDING.LOSS
+    for c in range(len(run.distance)):
+        ending = ending_of_head(run, episode, c, lane, ending)
+    return ending
+
+
+@inlined
+def end_episode(run, episode, own, task, values, flags, ending):
+    """Whether a controlled collector's episode ends here; an early end is charged to reward and cost."""
     early, at_end = ending > 0, own[ROW.STEP] >= task[TASK_ROW.END]
     if ending == ENDING.DIVERGED:
         forget_reward(values)
@@ -78,64 +95,90 @@ def end_episode(line, wire, run, episode, own, task, values, flags, lane):
 
 
 @inlined
-def write_sample(run, own, values, lane):
-    """Write a lane's last sample into its results."""
+def write_sample(run, collector, own, values, lane):
+    """Write a collector's last sample into its results."""
     values[RESULT.CONTACT_FORCE] = own[ROW.CONTACT_FORCE]
     values[RESULT.HEAD_HEIGHT] = own[ROW.HEAD_HEIGHT]
     values[RESULT.WIRE_HEIGHT] = own[ROW.WIRE_HEIGHT]
     values[RESULT.FRAME_FORCE] = own[ROW.FRAME_FORCE]
     values[RESULT.HEAD_FORCE] = own[ROW.HEAD_FORCE]
-    values[RESULT.POSITION] = position(run, CONTROLLED, lane, own[ROW.STEP])
+    values[RESULT.POSITION] = position(run, collector, lane, own[ROW.STEP])
+
+
+@inlined
+def plant_steps(line, wire, pantographs, actuators, run, sensors, samples, episode, running, lane):
+    """Make the plant steps of a control step in one lane, and add up what its collectors do."""
+    agents = len(episode.controlled)
+    for step in range(1, episode.control_steps + 1):
+        for a in range(agents):
+            own, now = run.table[episode.controlled[a], lane], episode.now[lane * agents + a]
+            now[NOW.FORCE_BEFORE] = own[ROW.CONTACT_FORCE]
+            now[NOW.FRAME_BEFORE] = own[ROW.FRAME_FORCE]
+            now[NOW.HEAD_BEFORE] = own[ROW.HEAD_FORCE]
+        step_lane(line, wire, pantographs, actuators, run, lane)
+        record_lane(line, wire, run, samples, lane)
+        for a in range(agents):
+            c, row = episode.controlled[a], lane * agents + a
+            own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
+            add_sample_to_terms(own, task, now)
+            add_sample_to_figures(running, samples, own, task, now, lane, row)
+            take_readings(sensors, c, step, own, now[NOW.READING :], lane)
 
 
 @inlined
 def control_lane(packed, entries, values, flags, lane):
-    """Make control steps in one lane, none beyond the end of its episode, and write its results, each (n,).
+    """Make control steps in one lane, none beyond the end of its episode, and write its results.
 
-    Returns whether its episode has ended.
+    Each of its controlled collectors has a row of results. Returns whether its episode has ended.
     """
     line, wire, pantographs, actuators, run, sensors, samples, episode, running = open_packed(packed)
-    own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
-    take_action(run, episode, own, task, now, lane)
-    ended = False
+    agents, ended = len(episode.controlled), False
+    for a in range(agents):
+        row = lane * agents + a
+        take_action(
+            episode, run.table[episode.controlled[a], lane], episode.table[row], episode.now[row], row
+        )
     for _ in range(episode.steps[lane]):
-        if own[ROW.STEP] >= task[TASK_ROW.END]:
+        if run.table[0, lane, ROW.STEP] >= episode.table[lane * agents, TASK_ROW.END]:
             break  # beyond the end there are neither line nor rows of samples
-        counts = own[ROW.STEP] >= task[TASK_ROW.COUNTED_FROM]
-        begin_terms(task, now)
-        now[NOW.STRIDE] = mean_stride(run, CONTROLLED, lane, float(episode.control_steps))
-        for step in range(1, episode.control_steps + 1):
-            force, frame, head = own[ROW.CONTACT_FORCE], own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
-            step_lane(line, wire, pantographs, actuators, run, lane)
-            record_lane(line, wire, run, samples, lane)
-            add_sample_to_terms(own, task, now, force)
-            add_sample_to_figures(running, samples, own, task, now, frame, head, lane)
-            take_readings(sensors, CONTROLLED, step, own, now[NOW.READING :], lane)
-        compute_reward(episode, own, task, now, values)
-        compute_cost(episode, now, values)
-        if counts:
-            add_control_step_to_figures(task, now)
-        else:
-            forget_reward(values)
-        ended = end_episode(line, wire, run, episode, own, task, values, flags, lane)
+        for a in range(agents):
+            now = episode.now[lane * agents + a]
+            begin_terms(episode.table[lane * agents + a], now)
+            now[NOW.STRIDE] = mean_stride(run, episode.controlled[a], lane, float(episode.control_steps))
+        plant_steps(line, wire, pantographs, actuators, run, sensors, samples, episode, running, lane)
+        ending = ending_of(line, wire, run, episode, lane)
+        for a in range(agents):
+            row = lane * agents + a
+            own, task, now = run.table[episode.controlled[a], lane], episode.table[row], episode.now[row]
+            compute_reward(episode, own, task, now, values[row])
+            compute_cost(episode, now, values[row])
+            if own[ROW.STEP] > task[TASK_ROW.COUNTED_FROM]:
+                add_control_step_to_figures(task, now)
+            else:
+                forget_reward(values[row])
+            ended = end_episode(run, episode, own, task, values[row], flags[row], ending)
         if ended:
             break
-    prepare_entries(episode, sensors, run, own, now, lane)
-    diverged = task[TASK_ROW.ENDING] == ENDING.DIVERGED
-    for k in range(entries.size):
-        entry = entry_of(episode, own, task, now, k)
-        entries[k] = 0.0 if diverged else entry
-    remember(episode, task, now)
-    write_sample(run, own, values, lane)
+    for a in range(agents):
+        c, row = episode.controlled[a], lane * agents + a
+        own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
+        prepare_entries(episode, sensors, run, own, now, c, lane, row)
+        diverged = task[TASK_ROW.ENDING] == ENDING.DIVERGED
+        for k in range(entries.shape[1]):
+            entry = entry_of(episode, own, task, now, k)
+            entries[row, k] = 0.0 if diverged else entry
+        remember(episode, task, now)
+        write_sample(run, c, own, values[row], lane)
+    use_noise(sensors, lane)
     return ended
 
 
 @inlined
 def all_finite(action):
-    """Whether all actions, (lanes, actions), are finite."""
-    for lane in range(action.shape[0]):
+    """Whether all actions, (rows, actions), are finite."""
+    for row in range(action.shape[0]):
         for a in range(action.shape[1]):
-            if not math.isfinite(action[lane, a]):
+            if not math.isfinite(action[row, a]):
                 return False
     return True
 
@@ -153,7 +196,7 @@ def control_steps(packed, entries, values, flags, first, last):
         return -1
     answer = 0
     for lane in range(first, last):
-        if not episode.idle[lane] and control_lane(packed, entries[lane], values[lane], flags[lane], lane):
+        if not episode.idle[lane] and control_lane(packed, entries, values, flags, lane):
             answer = 1
     return answer
 
@@ -162,16 +205,20 @@ def control_steps(packed, entries, values, flags, first, last):
 def observe_start(packed, entries, values, flags, first, last):
     """Write the results of lanes at their start, except idle ones; arguments as in ``control_steps``."""
     _, _, _, _, run, sensors, _, episode, _ = open_packed(packed)
+    agents = len(episode.controlled)
     for lane in range(first, last):
         if not episode.idle[lane]:
-            own, task, now = run.table[CONTROLLED, lane], episode.table[lane], episode.now[lane]
-            take_first_readings(sensors, CONTROLLED, own, now[NOW.READING :], lane)
-            prepare_entries(episode, sensors, run, own, now, lane)
-            begin_history(episode, task, now)
-            for k in range(entries.shape[1]):
-                entries[lane, k] = entry_of(episode, own, task, now, k)
-            for k in range(RESULT_ROWS):
-                values[lane, k] = 0.0
-            write_sample(run, own, values[lane], lane)
-            for k in range(flags.shape[1]):
-                flags[lane, k] = False
+            for a in range(agents):
+                c, row = episode.controlled[a], lane * agents + a
+                own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
+                take_first_readings(sensors, c, own, now[NOW.READING :], lane)
+                prepare_entries(episode, sensors, run, own, now, c, lane, row)
+                begin_history(episode, task, now)
+                for k in range(entries.shape[1]):
+                    entries[row, k] = entry_of(episode, own, task, now, k)
+                for k in range(RESULT_ROWS):
+                    values[row, k] = 0.0
+                write_sample(run, c, own, values[row], lane)
+                for k in range(flags.shape[1]):
+                    flags[row, k] = False
+            use_noise(sensors, lane)

@@ -46,6 +46,7 @@ class Stepping:
         plant. entries: number of entries of an observation. threads: as ``LaneThreads`` takes them.
         """
         self.plant, self.lanes, self.noise, self.odometers = plant, lanes, noise, odometers
+        self.agents = len(episode.controlled)  # rows of results for each lane
         self.sensors, self.samples, self.episode, self.running = sensors, samples, episode, running
         self._entries, self._most_threads = entries, threads
         self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
@@ -79,7 +80,7 @@ class Stepping:
 
     def new_results(self) -> Results:
         """Empty arrays for the results of a step."""
-        return new_results(self.lanes, self._entries)
+        return new_results(self.lanes * self.agents, self._entries)
 
     def begin(self, lanes: Any) -> None:
         """Mark that episodes begin in lanes, (n,)."""
@@ -100,7 +101,7 @@ class Stepping:
         skip: Flags | None = None,
         results: Results | None = None,
     ) -> bool:
-        """Make one control step in all lanes, except those to skip, under actions, (lanes, actions).
+        """Make one control step in all lanes, except those to skip, under actions, (rows, actions).
 
         Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
         default the task's own. Skipped lanes do not change. Raises InputError, and changes nothing, for an
@@ -134,14 +135,19 @@ class Stepping:
     def _evaluate(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
         """Whether an episode has ended, from a kernel's answer. Raises InputError for an invalid action."""
         if answer > 0:
-            ended = results.terminated | results.truncated
+            ended = self._ended(results)
             self._over |= ended if skip is None else ended & ~skip
             self._any_over = bool(self._over.any())
         if answer < 0:
             action = self.episode.action
             lane = int(np.flatnonzero(~np.isfinite(action).all(axis=1))[0])
-            raise not_finite(action, lane, several=self.lanes > 1)
+            raise not_finite(action, lane, several=len(action) > 1)
         return answer > 0
+
+    def _ended(self, results: Results) -> Flags:
+        """Whether the episodes of lanes have ended, (lanes,): those of a lane's rows end together."""
+        ended: Flags = (results.terminated | results.truncated)[:: self.agents]
+        return ended
 
     def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
         """Run all lanes, just reset, to their ends without actuators.
@@ -151,7 +157,7 @@ class Stepping:
         ended = np.zeros(self.lanes, dtype=np.bool_)
         while not ended.all():
             self.coast(np.where(ended, 0, COASTED), self.results)
-            ended = self.results.terminated | self.results.truncated
+            ended = self._ended(self.results)
             if watch is not None:
                 watch(self)
 

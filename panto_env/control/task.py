@@ -22,7 +22,7 @@ from .entries import ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
-from .mean_force import PassiveMean, Trim, TrimAsDesigned, target_mean
+from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed
 from .normalise import normalised
 from .observation import layout
 from .passive_run import ADVICE, PassiveRun
@@ -31,7 +31,7 @@ from .reset import reset
 from .running_figures import figures_so_far, running_figures
 from .settings import RunSettings
 from .start import LaneGenerators
-from .state import CONTROLLED, TaskRow
+from .state import TaskRow
 from .task_state import TaskState
 
 
@@ -65,17 +65,19 @@ class Task(TaskState):
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
         self.layout = layout(settings.observation, _entry_options(settings))
-        self.known_pantograph = settings.known_pantograph or settings.pantograph
+        self.known_pantograph = settings.known_pantograph or settings.riding[settings.controlled[0] - 1]
         if settings.normalise is not None:
-            known = settings.model_copy(update={"pantograph": self.known_pantograph})
+            known = settings.with_pantograph(settings.controlled[0] - 1, self.known_pantograph)
             speeds = self._speeds_of_passive_runs(settings.normalise)
             run = PassiveRun(known, speeds, passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
-        self.passive = None
+        self.passive = ()
         if settings.reward.target == "passive":
-            self.passive = PassiveRun(settings, length.speed_range, passive_pass)
+            each = [settings.model_copy(update={"controlled": (number,)}) for number in settings.controlled]
+            self.passive = tuple(PassiveRun(own, length.speed_range, passive_pass) for own in each)
         self.speed = plant.speed
-        odometers = Odometers(settings.sensors.odometer, lanes, plant.alignment)
+        agents = len(plant.train.driven)
+        odometers = Odometers(settings.sensors.odometer, lanes * agents, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
         super().__init__(
@@ -84,7 +86,7 @@ class Task(TaskState):
             episode=new_episode(settings, plant, self.layout, length.control_steps, odometers.arrays()),
             sensors=sensors,
             samples=plant.samples(rows, tension=record_droppers),
-            running=running_figures(lanes, len(plant.model.supports), plant.time_step),
+            running=running_figures(lanes * agents, len(plant.model.supports), plant.time_step),
             noise=None if rms is None else Noise(rms, lanes),
             odometers=odometers,
             entries=len(self.layout.entries),
@@ -139,18 +141,23 @@ class Task(TaskState):
 
     def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is required, else None."""
-        if target_mean(self.settings, float(speeds[0])) is None:
+        if not trimmed(self.settings, float(speeds[0])):
             return None
         if self.trim is None:
             self.trim = TrimAsDesigned(self.settings, self.length.speed_range, passive_mean)
-        return np.array([self.trim.static_force(speed) for speed in speeds.tolist()])
+        collectors = range(len(self.plant.train.collectors))
+        return np.array(
+            [[self.trim.static_force(speed, number) for speed in speeds.tolist()] for number in collectors]
+        )
 
     def end(self, lane: int) -> int:
         """Number of plant steps of a lane's episode."""
-        return int(self.episode.table[lane, TaskRow.END])
+        return int(self.episode.table[lane * self.agents, TaskRow.END])
 
-    def context(self, lane: int) -> Context:
-        """Information about a lane's episode that a policy may use."""
+    def context(self, row: int) -> Context:
+        """Information about an episode that a policy may use; row: of results, that of a collector."""
+        lane, agent = divmod(row, self.agents)
+        collector = self.episode.controlled[agent]
         return Context(
             layout=self.layout,
             actions=len(self.actuator.places),
@@ -160,36 +167,39 @@ class Task(TaskState):
             washout=self.settings.washout,
             speed=float(self.speed[lane]),
             alignment=self.plant.alignment,
-            nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE),
+            nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE, collector),
             catenary=self.plant.catenary,
-            pantograph=self.known_pantograph,
+            pantograph=self.settings.known_pantograph or self.settings.riding[collector],
         )
 
-    def figures(self, lane: int) -> Figures:
-        """Figures of a lane's control steps so far that count, as its trajectory's summary gives them.
+    def figures(self, row: int) -> Figures:
+        """Figures of a row's control steps so far that count, as its trajectory's summary gives them.
 
         Raises InputError where the computation diverged.
         """
-        values, without = self.figures_of(np.array([lane]))
+        values, without = self.figures_of(np.array([row]))
         if without.any():
-            raise InputError(divergence(self, lane))
+            raise InputError(divergence(self, row // self.agents))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
-    def figures_of(self, lanes: Any) -> tuple[dict[str, Array], Flags]:
-        """Figures of several lanes, (n,), by name, and which lanes have none, because they diverged."""
-        run, supports = self.plant.run.table[CONTROLLED, lanes], self.plant.model.supports
+    def figures_of(self, rows: Any) -> tuple[dict[str, Array], Flags]:
+        """Figures of several rows, (n,), by name, and which of them have none, because they diverged."""
+        lanes, agents = np.divmod(np.arange(self.lanes * self.agents)[rows], self.agents)
+        collectors = np.array(self.episode.controlled)[agents]
+        run, supports = self.plant.run.table[collectors, lanes], self.plant.model.supports
         with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
             figures = figures_so_far(
-                self.episode.table[lanes],
-                self.running.peak[lanes],
+                self.episode.table[rows],
+                self.running.peak[rows],
                 run,
                 supports,
                 self.plant.time_step,
                 partial(self.plant.ahead, lanes),
+                np.array([own.distance for own in self.plant.train.collectors])[collectors],
             )
         distance = figures["distance"]
         deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
-        return figures, diverged(self, lanes, deviation, run[:, Row.WIRE_HEIGHT])
+        return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
 
     def divergence(self, lane: int) -> str:
         """Message that a lane's computation diverged, and what to do."""
@@ -215,42 +225,46 @@ def _entry_options(settings: RunSettings) -> EntryOptions:
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:
-    """Record of a pass without a policy, under seed 0."""
+    """Record of the first controlled pantograph in a pass without a policy, under seed 0."""
     task = Task(settings)
     task.reset(0, np.random.default_rng(0))
     task.run_passively()
-    return task.trajectory(0, last=True)
+    return task.trajectory(0, last=True).train[settings.controlled[0] - 1]
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
-    """Mean force of a pass without a policy, over the spans, as a function of the static force.
+    """Mean forces of a pass without a policy, over the spans, as a function of the static forces.
 
     Where the speed drifts, what the required mean is higher over these spans than at the mean speed is taken
     off: the required mean follows the speed, and the static force has no part in that.
     """
     task = Task(settings)
 
-    def mean(force: float) -> float:
-        task.trim = Trim((0.0,), (force,))
+    def means(forces: Forces) -> Forces:
+        task.trim = Trim((0.0,), (forces,))
         task.reset(0, np.random.default_rng(seed))
         task.run_passively()
         run = task.trajectory(0)
         if run.terminated:
+            targets = " and ".join(f"{each.target_mean:.1f}" for each in run.train)
             raise InputError(
-                f"A mean force of {run.target_mean:.1f} N cannot be met by '{run.pantograph}' on "
-                f"'{run.catenary}' at {run.speed_kmh:g} km/h. With {force:.1f} N of static force: "
-                f"{run.ending}"
+                f"A mean force of {targets} N cannot be met by {named(settings.riding)} on "
+                f"'{run.catenary}' at {run.speed_kmh:g} km/h. With "
+                f"{' and '.join(f'{force:.1f}' for force in forces)} N of static force: {run.ending}"
             )
-        return run.summary(spans).mean - _required_more(settings, run, spans)
+        return tuple(
+            each.summary(spans).mean - _required_more(settings, each, spans, number)
+            for number, each in enumerate(run.train)
+        )
 
-    return mean
+    return means
 
 
-def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice) -> float:
+def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice, collector: int = 0) -> float:
     """By how much the mean force required over the spans exceeds that at the run's mean speed (N)."""
-    required = target_mean(settings, run.speed)
+    required = target_mean(settings, run.speed, collector)
     if required is None or not run.drifts:
         return 0.0
     speeds = run.speeds[run.inside(spans)].tolist()
-    at_each = np.array([target_mean(settings, speed) for speed in speeds], dtype=float)
+    at_each = np.array([target_mean(settings, speed, collector) for speed in speeds], dtype=float)
     return float(np.mean(at_each - required))  # exactly 0 where the required mean is a number

@@ -23,22 +23,24 @@ class TaskState(Stepping):
     actuator: ActuatorSettings
     length: EpisodeLength
     layout: Layout
-    passive: PassiveRun | None  # that the reward counts from
+    passive: tuple[PassiveRun, ...]  # that each agent's reward counts from, or none
     speed: Array  # of each lane (m/s)
     keep_samples: bool  # of whole episodes
     record_droppers: bool
 
-    def targets(self, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+    def targets(self, agent: int, speeds: Array, nominal: Array) -> tuple[Array, Array]:
         """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
 
-        Of lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        Of a controlled collector in lanes, (n,), with these speeds (m/s) and nominal forces (N).
         """
-        if self.passive is None:
-            required = [target_mean(self.settings, speed) for speed in speeds.tolist()]
+        if not self.passive:
+            collector = self.episode.controlled[agent]
+            required = [target_mean(self.settings, speed, collector) for speed in speeds.tolist()]
             return nominal if None in required else np.array(required, dtype=float), nominal
-        return self.passive.mean(LOW_PASSED, speeds), self.passive.spread(LOW_PASSED, speeds)
+        own = self.passive[agent]
+        return own.mean(LOW_PASSED, speeds), own.spread(LOW_PASSED, speeds)
 
-    def target_mean(self, lane: int) -> float:
-        """Mean force (N) that a lane's static force is trimmed for; nan where it is applied as it is."""
-        target = target_mean(self.settings, float(self.speed[lane]))
+    def target_mean(self, lane: int, collector: int = 0) -> float:
+        """Mean force (N) that a lane's collector is trimmed for; nan where its own force is applied."""
+        target = target_mean(self.settings, float(self.speed[lane]), collector)
         return math.nan if target is None else target

@@ -29,6 +29,15 @@ from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
 
 FORMAT = 3
+OF_FOLLOWERS = (
+    "pantograph",
+    "nominal_force",
+    "target_mean",
+    "policy",
+    "design",
+    "reached",
+)
+"""Facts that a collector behind the first has of its own; the others are those of the first."""
 FEWEST = 3
 """Samples that a speed is found from, by differences of second order."""
 KEY = b"panto_env"
@@ -96,7 +105,15 @@ class Trajectory:
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
     ending: str = ""  # where and why it ended early, as a sentence
     line: LineFacts = field(default_factory=LineFacts)
-    design: Mapping[str, Any] = field(default_factory=dict)  # line and pantograph by value, plain data
+    design: Mapping[str, Any] = field(default_factory=dict)  # line and pantographs by value, plain data
+    # Of a collector behind the first: where it came to (m). The first came as far as its samples show.
+    reached: float = math.nan
+    followers: tuple[Trajectory, ...] = ()  # records of the collectors behind this one, from the front
+
+    @property
+    def train(self) -> tuple[Trajectory, ...]:
+        """Records of all collectors, this one in front."""
+        return self, *self.followers
 
     @property
     def spans_differ(self) -> bool:
@@ -209,13 +226,14 @@ class Trajectory:
 
     @property
     def distance(self) -> float:
-        """Distance from the start to the end of the last step (m)."""
-        return float(self.position[-1] + self.position[0])
+        """Distance from the line's start to the end of the last step (m)."""
+        return float(self.position[-1] + self.position[0]) if math.isnan(self.reached) else self.reached
 
     def time_at(self, position: float) -> float:
         """Time (s) since the start at which the train reaches a position (m), drift included."""
         places = np.array([0.0, *self.position, self.distance])
-        return float(np.interp(position, places, [0.0, *self.time, self.time[-1] + 0.5 * self.time_step]))
+        begin = 0.0 if math.isnan(self.reached) else self.time[0] - self.position[0] / self.speed
+        return float(np.interp(position, places, [begin, *self.time, self.time[-1] + 0.5 * self.time_step]))
 
     def spans(self, choice: SpanChoice = None) -> Spans | None:
         """First and last span of a choice, by default those after the start; None for the whole run.
@@ -264,6 +282,8 @@ class Trajectory:
         import pyarrow.parquet as pq
 
         columns = {name: getattr(self, name) for name in SERIES}
+        for number, follower in enumerate(self.followers, start=2):
+            columns |= follower_columns(follower, number, len(self.time))
         for name in ("uplift", "dropper_force"):
             for k, column in enumerate(getattr(self, name).T):
                 columns[f"{name}_{k}"] = np.ascontiguousarray(column)
@@ -273,6 +293,9 @@ class Trajectory:
         }
         facts["line"] = vars(self.line)
         facts["alignment"] = self.alignment.supports, self.alignment.pitch
+        facts["followers"] = [
+            {name: getattr(follower, name) for name in OF_FOLLOWERS} for follower in self.followers
+        ]
         table = pa.table(columns, metadata={KEY: json.dumps(with_checksum(facts, columns))})
         with write_whole(path) as temporary:
             pq.write_table(table, temporary, write_page_checksum=True)
@@ -310,13 +333,35 @@ class Trajectory:
                 series[name] = np.array(own).T if own else np.zeros((table.num_rows, 0))
                 if count and count != len(facts[places]):
                     raise ValueError(f"columns of {name} are missing")
-            return cls(**series, **facts)
+            followers = facts.pop("followers")
+            first = cls(**series, **facts)
+            own = [follower_of(first, columns, *each) for each in enumerate(followers, start=2)]
+            return dataclasses.replace(first, followers=tuple(own))
         except (pa.ArrowException, *DAMAGED) as error:
             reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
             raise InputError(
                 f"{path} is not a whole trajectory file ({reason}); write it again with "
                 "Trajectory.save or `panto simulate --output`."
             ) from error
+
+
+def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
+    """Series of a collector behind the first, by name, (rows,); nan before it came onto the line.
+
+    number: of the collector, counted from 1.
+    """
+    before = np.full(rows - len(follower.time), math.nan)
+    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in SERIES}
+
+
+def follower_of(
+    first: Trajectory, columns: Mapping[str, Array], number: int, facts: Mapping[str, Any]
+) -> Trajectory:
+    """The record of a collector behind the first, from a file's columns; the inverse of the above."""
+    on_line = ~np.isnan(columns[f"{SERIES[0]}@{number}"])
+    series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
+    shared = {name: getattr(first, name)[on_line] for name in ("uplift", "dropper_force")}
+    return dataclasses.replace(first, **series, **shared, **facts)
 
 
 def _check_size(metadata: Any) -> None:
@@ -331,5 +376,5 @@ def _check_size(metadata: Any) -> None:
 
 
 def _facts() -> tuple[str, ...]:
-    arrays = {*SERIES, "uplift", "dropper_force"}
+    arrays = {*SERIES, "uplift", "dropper_force", "followers"}
     return tuple(f.name for f in dataclasses.fields(Trajectory) if f.name not in arrays)

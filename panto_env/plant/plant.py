@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..backend import aligned_zeros, bind, copy_whole, pack
-from ..base.arrays import Array, Lanes
+from ..base.arrays import Array, Index, Lanes
 from ..base.errors import InputError
 from ..base.shown import beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
@@ -113,9 +113,9 @@ class Plant:
         """A row of the first collector in all lanes, (lanes,), a copy."""
         return self.run.table[0, :, row].copy()
 
-    def of(self, lane: int, row: Row) -> float:
-        """A row of the first collector in one lane."""
-        return float(self.run.table[0, lane, row])
+    def of(self, lane: int, row: Row, collector: int = 0) -> float:
+        """A row of a collector in one lane."""
+        return float(self.run.table[collector, lane, row])
 
     def ahead(self, lanes: Any, steps: Array) -> Array:
         """Lead of the trains in lanes, (n,), over steady ones (m), (n, m), after numbers of steps, (n, m)."""
@@ -187,12 +187,12 @@ class Plant:
     def _at_rest(
         self,
         collector: int,
-        lanes: Lanes,
+        lanes: Index,
         heights: Array,
         pantographs: Sequence[PantographData],
         static_forces: Array | None,
     ) -> Array:
-        """Rows of a collector in lanes, (n, rows), at rest at the starting point; heights: of the wire (m)."""
+        """Rows of a collector in lanes, (n, rows), at rest at the start; heights: of the wire there (m)."""
         own, run, (_, wire, spring) = self.train.collectors[collector], self.run, self.model.start_point
         for lane, pantograph in zip(lanes, pantographs, strict=False):
             self._set_pantograph(collector, lane, pantograph)

@@ -15,7 +15,6 @@ from .sensors import SensorSettings, sensor_settings
 from .state import ROW
 from .wind import wind_at
 
-
 MOST_COLLECTORS = 4
 
 
@@ -73,6 +72,11 @@ class Train:
     def first(self) -> Collector:
         """The collector in front."""
         return self.collectors[0]
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Numbers of the collectors that have an actuator, from 0 up."""
+        return tuple(number for number, own in enumerate(self.collectors) if own.driven)
 
     @property
     def length(self) -> float:

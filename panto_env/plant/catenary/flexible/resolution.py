@@ -228,7 +228,12 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
 
 def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
     window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data))
-    return window and window + math.ceil(runs.train_length / data.stride)
+    return window and window + spans_of_train(data, runs)
+
+
+def spans_of_train(data: FlexibleCatenaryData, runs: Runs) -> int:
+    """Spans by which the window is longer than one pantograph needs."""
+    return math.ceil(runs.train_length / data.stride)
 
 
 def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:
