@@ -361,7 +361,8 @@ def follower_of(
     on_line = ~np.isnan(columns[f"{SERIES[0]}@{number}"])
     series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
     shared = {name: getattr(first, name)[on_line] for name in ("uplift", "dropper_force")}
-    return dataclasses.replace(first, **series, **shared, **facts)
+    own: dict[str, Any] = {**series, **shared, **facts}
+    return dataclasses.replace(first, **own)
 
 
 def _check_size(metadata: Any) -> None:

@@ -12,6 +12,7 @@ from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ...side_wind import draw_side_wind
 from ..protocol import StartPoint, check_speeds
+from ..schema import FEWEST_SPANS
 from ..view import LineView
 from .attached import dropper_positions
 from .blown import air_about, start_wind
@@ -22,7 +23,7 @@ from .fixed_wires import tensions_of_fixed
 from .grid import contact_gain
 from .loaded import check_loaded
 from .overlaps import tension_lengths
-from .resolution import resolution
+from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
 from .tension import shape_left, with_tension_left
@@ -73,13 +74,14 @@ class FlexibleCatenary:
         tightest = with_tension_left(designed, condition, ((1 + error) * contact, (1 + error) * messenger))
         chosen = resolution(tightest, numerics, runs)
         self.time_step = chosen.time_step
-        self.line = constants(data, shape, spans, numerics, chosen, own)._replace(
-            lead=0.5 * runs.train_length
-        )
+        lead = 0.5 * runs.train_length
+        self.line = constants(data, shape, spans, numerics, chosen, own)._replace(lead=lead)
         self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
         self.wires_per_collector = self.line.pairs
         self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
-        self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": self.line.window}
+        about_one = self.line.window - spans_of_train(data, runs)
+        window = about_one if about_one >= FEWEST_SPANS else 0
+        self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": window}
         self.alignment = alignment = data.alignment(spans)
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves

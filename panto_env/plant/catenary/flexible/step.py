@@ -60,7 +60,7 @@ def window_start(line, wire, lane):
 
 @inlined
 def follow(line, wire, lane, x):
-    """Move the window by a stride once the train's middle is past its middle; x: of the first collector (m)."""
+    """Move the window by a stride once the train is past its middle; x: of the first collector (m)."""
     ahead = int((x - line.lead) / line.stride) - wire.travelled[lane]
     if 2 * ahead > line.window - 1 and not at_line_end(line, wire, lane):
         wire.travelled[lane] += 1
