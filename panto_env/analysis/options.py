@@ -24,6 +24,8 @@ RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""
 OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 """Options in another unit than the setting: the setting's unit, the option's unit, and the factor."""
+SEVERAL: dict[str, type] = {"pantograph": str, "distances": float, "controlled": int}
+"""Options that may be given several times, and the type of each value."""
 SIMPLE = (bool, int, float, str)
 LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS = (
     "Line",
@@ -36,7 +38,18 @@ LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS = (
 LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS
 PANEL_OF = {
     **dict.fromkeys(("catenary", "line_condition", "spans"), LINE),
-    **dict.fromkeys(("pantograph", "mean_force", "pantograph_scatter", "actuator", "sensors"), PANTOGRAPH),
+    **dict.fromkeys(
+        (
+            "pantograph",
+            "distances",
+            "controlled",
+            "mean_force",
+            "pantograph_scatter",
+            "actuator",
+            "sensors",
+        ),
+        PANTOGRAPH,
+    ),
     **dict.fromkeys(
         (
             "control_interval",
@@ -106,7 +119,7 @@ def with_settings(
             settings = {
                 name: _to_setting(name, value) for name, value in options.items() if value is not None
             }
-            command(settings, **given)
+            command(_riding(settings), **given)
 
         hints = get_type_hints(command, include_extras=True)
         own = [
@@ -140,8 +153,20 @@ def _names() -> list[str]:
     return [name for name in fields() if _type(name) is not None]
 
 
+def _riding(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings in which a pantograph that is named once is the only one, and several are a train."""
+    named = settings.pop("pantograph", None) or []
+    if len(named) > 1:
+        settings["pantographs"] = named
+    elif named:
+        settings["pantograph"] = named[0]
+    return {name: value for name, value in settings.items() if not (name in SEVERAL and value == [])}
+
+
 def _type(name: str) -> type | None:
     """Type of an option: that of the default, or the setting's first simple type besides None."""
+    if name in SEVERAL:
+        return SEVERAL[name]
     field = fields()[name]
     if type(field.default) in SIMPLE:
         return type(field.default)
@@ -158,7 +183,9 @@ def _option(name: str, defaults: bool) -> inspect.Parameter:
         unit, shown, _ = OTHER_UNITS[name]
         text = text.replace(f"({unit})", f"({shown})", 1)
     text = f"{text[:1].upper()}{text[1:]}."
-    if defaults and field.default is not None and kind is not bool:
+    if name in SEVERAL:
+        text += " May be given several times."
+    if defaults and field.default not in (None, ()) and kind is not bool:
         text += f" Default: {field.default}."
     option = RENAMED.get(name, name)
     flag = [f"--{option.replace('_', '-')}"] if kind is bool else []
@@ -167,7 +194,7 @@ def _option(name: str, defaults: bool) -> inspect.Parameter:
         option,
         inspect.Parameter.KEYWORD_ONLY,
         default=None,
-        annotation=Annotated[kind | None, info],  # type: ignore[operator]
+        annotation=Annotated[list[kind] | None if name in SEVERAL else kind | None, info],  # type: ignore
     )
 
 

@@ -87,25 +87,51 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
         else:
             alert(trajectory.ending, "It has no figures.")
         raise typer.Exit(1)
-    figures, covered = trajectory.summary(chosen), trajectory.spans(chosen)
-    criteria = trajectory.compliance(chosen)
+    train = trajectory.train
+    covered = train[-1].spans(chosen)  # the last one comes onto the line last: all are compared over these
+    chosen = covered or chosen
     if json:
-        results = {"spans": covered, "figures": figures.as_dict()}
-        print_json(_facts(trajectory) | results | {"compliance": [each.as_dict() for each in criteria]})
+        results = [
+            {
+                "figures": own.summary(chosen).as_dict(),
+                "compliance": [each.as_dict() for each in own.compliance(chosen)],
+            }
+            for own in train
+        ]
+        others = [_own_facts(own) | result for own, result in zip(train[1:], results[1:], strict=True)]
+        behind = {"followers": others} if others else {}
+        print_json(_facts(trajectory) | {"spans": covered} | results[0] | behind)
         return
-    table = Table("figure", "value", "unit")
+    names = [own.pantograph for own in train]
+    table = Table("figure", *(["value"] if len(train) == 1 else _numbered(names)), "unit")
+    every = [own.summary(chosen) for own in train]
     for key, label in LABELS.items():
-        table.add_row(label.name, number(label.scale * getattr(figures, key), 2), label.unit)
-    title = f"{trajectory.pantograph} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
-    console.print(f"{title}, policy {trajectory.policy}, spans {in_words(covered)}")
-    if not math.isnan(trajectory.target_mean):
-        at = ", both at the mean speed" if trajectory.drifts else ""
-        console.print(
-            f"Applied force {trajectory.nominal_force:.1f} N, trimmed for a passive mean of "
-            f"{trajectory.target_mean:.1f} N{at}."
-        )
+        table.add_row(label.name, *(number(label.scale * getattr(own, key), 2) for own in every), label.unit)
+    title = f"{' and '.join(names)} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
+    console.print(f"{title}, policy {' and '.join(_policies(trajectory))}, spans {in_words(covered)}")
+    for place, own in enumerate(train, start=1):
+        if not math.isnan(own.target_mean):
+            at = ", both at the mean speed" if own.drifts else ""
+            whose = f"Pantograph {place}: applied" if len(train) > 1 else "Applied"
+            console.print(
+                f"{whose} force {own.nominal_force:.1f} N, trimmed for a passive mean of "
+                f"{own.target_mean:.1f} N{at}."
+            )
     console.print(table)
-    print_criteria(criteria, f"Requirements at {trajectory.speed_kmh:g} km/h, {trajectory.line.system}")
+    for place, own in enumerate(train, start=1):
+        title = f"Requirements at {own.speed_kmh:g} km/h, {own.line.system}"
+        title += f", pantograph {place}" if len(train) > 1 else ""
+        print_criteria(own.compliance(chosen), title)
+
+
+def _numbered(names: list[str]) -> list[str]:
+    return [f"{place} {name}" for place, name in enumerate(names, start=1)]
+
+
+def _policies(run: Trajectory) -> list[str]:
+    """Policies of a train's pantographs; one name where all have the same."""
+    names = [own.policy for own in run.train]
+    return names[:1] if len(set(names)) == 1 else names
 
 
 @contextmanager
@@ -125,6 +151,11 @@ def _shown(
     with bars() as progress:
         bar = progress.add_task("simulating", total=1.0)
         yield lambda share: progress.update(bar, completed=share), None
+
+
+def _own_facts(run: Trajectory) -> dict[str, Any]:
+    """What a pantograph behind the first has of its own."""
+    return {name: getattr(run, name) for name in ("pantograph", "policy", "nominal_force", "target_mean")}
 
 
 def _facts(run: Trajectory) -> dict[str, Any]:

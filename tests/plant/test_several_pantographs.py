@@ -1,0 +1,149 @@
+"""Several pantographs on one wire: what must be the same whatever the waves between them do."""
+
+import numpy as np
+import pytest
+
+from panto_env import InputError
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.plant import Plant
+from panto_env.plant.state import Row
+from panto_env.plant.train import MOST_COLLECTORS, Train
+
+from ..finite_element.sections import sections
+
+LINE = load_catenary("en50318-2002")
+ONE, OTHER = load_pantograph("en50318-2002"), load_pantograph("dsa250")
+SPEED = 250 / 3.6
+
+
+def run(train, metres, *, line=LINE, spans=None, lanes=1, static_forces=None, train_length=None, **numerics):
+    """A plant after the first collector has run some metres, and the samples of all."""
+    length = train.length if train_length is None else train_length
+    runs = Runs((SPEED, SPEED), train_length=length)
+    plant = Plant(line, train, lanes=lanes, spans=spans, runs=runs, numerics=Numerics(**numerics))
+    plant.start(np.arange(lanes), SPEED, static_forces=static_forces)
+    steps = int(metres / (SPEED * plant.time_step))
+    samples = plant.samples(steps + 1)
+    plant.advance_passively(steps, samples)
+    return plant, samples.rows[:, 1:]
+
+
+def forces(rows, collector=0, lane=0):
+    return rows[lane, :, collector, Row.CONTACT_FORCE]
+
+
+def part(pantograph, share):
+    """A pantograph with a share of everything, its contact spring included."""
+    stiffness = 50e3 if pantograph.contact_stiffness == "rigid" else pantograph.contact_stiffness
+    shared = {
+        name: tuple(share * value for value in getattr(pantograph, name))
+        for name in ("masses", "stiffnesses", "dampings")
+    }
+    return pantograph.model_copy(
+        update={
+            **shared,
+            "contact_stiffness": share * stiffness,
+            "contact_damping": share * pantograph.contact_damping,
+            "static_force": share * pantograph.static_force,
+            "aerodynamic_coefficient": share * pantograph.aerodynamic_coefficient,
+        }
+    )
+
+
+@pytest.mark.parametrize("name", ["en50318-2002", "overlap-2002"])
+def test_parts_of_a_pantograph_at_one_place_are_the_pantograph(name):
+    line = sections()[name].line if name == "overlap-2002" else load_catenary(name)
+    metres, spans = min(600.0, line.alignment().length - 60), line.spans if line.sequence else 14
+    _, whole = run(Train.of(part(ONE, 1.0)), metres, line=line, spans=spans, precision="double")
+    shares = (0.3, 0.7)
+    parts = Train.of(*(part(ONE, share) for share in shares), distances=[0.0])
+    _, rows = run(parts, metres, line=line, spans=spans, precision="double")
+    assert forces(whole).std() > 10
+    for collector, share in enumerate(shares):
+        np.testing.assert_allclose(forces(rows, collector), share * forces(whole), atol=1e-6)
+
+
+def test_two_at_one_place_may_be_named_in_either_order():
+    train = [Train.of(*pair, distances=[0.0]) for pair in ((ONE, OTHER), (OTHER, ONE))]
+    rows = [run(each, 400.0, spans=12, precision="double")[1] for each in train]
+    assert np.abs(forces(rows[0], 0) - forces(rows[0], 1)).max() > 5
+    for collector in (0, 1):
+        np.testing.assert_allclose(forces(rows[0], collector), forces(rows[1], 1 - collector), atol=1e-6)
+
+
+@pytest.mark.parametrize("distance", [35.0, 150.0])
+def test_one_that_never_touches_changes_no_bit_of_the_other(distance):
+    alone = run(Train.of(ONE), 700.0, spans=14, train_length=distance)[1]
+    pressed, released = np.array([[ONE.static_force]]), np.array([[-50.0]])
+    train = Train.of(ONE, OTHER, distances=[distance])
+    both = run(train, 700.0, spans=14, static_forces=np.concatenate([pressed, released]))[1]
+    assert not forces(both, 1).any()
+    assert forces(alone).std() > 10
+    np.testing.assert_array_equal(forces(both, 0), forces(alone))
+
+
+def test_far_behind_on_a_line_that_damps_its_waves_it_is_the_only_one():
+    """With the line's real damping it is not: waves of the first one still raise its sigma 440 m behind."""
+    from panto_env.metrics.low_pass import low_pass
+
+    def difference(line):
+        plant, rows = run(Train.of(ONE), 900.0, line=line, spans=30, train_length=7 * 60)
+        stride = SPEED * plant.time_step
+        behind = round(7 * 60 / stride)
+        train = Train.of(ONE, ONE, distances=[behind * stride])
+        _, both = run(train, 900.0 + behind * stride, line=line, spans=30)
+        alone, second = (
+            forces(rows)[: len(forces(rows))],
+            forces(both, 1)[behind : behind + len(forces(rows))],
+        )
+        inside = slice(len(alone) // 3, None)
+        filtered = [low_pass(each, plant.time_step)[inside] for each in (alone, second)]
+        return np.abs(filtered[0] - filtered[1]).max()
+
+    damped = LINE.model_copy(update={"damping": LINE.damping.model_copy(update={"alpha": 2.0})})
+    assert difference(damped) < 0.2
+    assert difference(LINE) > 3
+
+
+def test_it_waits_at_rest_until_it_comes_onto_the_line():
+    distance = 120.0
+    plant, rows = run(Train.of(ONE, OTHER, distances=[distance]), 400.0, spans=12)
+    x = plant.position(0, np.arange(rows.shape[1]) + 0.5, 1)
+    own = rows[0, :, 1]
+    waiting = x < 0
+    assert 0 < waiting.sum() < len(x)
+    assert np.ptp(own[waiting, Row.CONTACT_FORCE]) < 1e-6
+    assert own[0, Row.CONTACT_FORCE] == pytest.approx(OTHER.nominal_force(SPEED))
+    assert np.ptp(own[~waiting, Row.CONTACT_FORCE]) > 20
+
+
+def test_lanes_of_trains_are_bit_for_bit_the_single_train():
+    train = Train.of(ONE, OTHER, ONE, distances=[50.0, 120.0])
+    alone, lanes = (run(train, 500.0, spans=14, lanes=count)[1] for count in (1, 3))
+    for lane in range(3):
+        np.testing.assert_array_equal(lanes[lane], alone[0])
+
+
+def test_pantographs_of_different_kinds_keep_their_own_equations():
+    """Far apart on a damped line, each is as if alone, whatever number of masses the other has."""
+    three = load_pantograph("three-mass")
+    assert len(three.masses) != len(ONE.masses)
+    line = LINE.model_copy(update={"damping": LINE.damping.model_copy(update={"alpha": 4.0})})
+    for first, second in ((ONE, three), (three, ONE)):
+        distance = 480.0
+        _, both = run(Train.of(first, second, distances=[distance]), 900.0, line=line, spans=24)
+        plant, alone = run(Train.of(second), 900.0 - distance, line=line, spans=24, train_length=distance)
+        own = forces(both, 1)[-len(forces(alone)) :]
+        behind = plant.position(0, len(forces(alone)))[0]
+        assert behind == pytest.approx(900.0 - distance, abs=0.2)
+        assert abs(own.mean() - forces(alone).mean()) < 0.5
+        assert abs(own.std() - forces(alone).std()) < 0.5
+
+
+def test_trains_that_cannot_be_are_refused_in_a_sentence():
+    with pytest.raises(InputError, match=f"1 to {MOST_COLLECTORS} pantographs, not 5"):
+        Train.of(*[ONE] * 5, distances=[10, 20, 30, 40])
+    massless = load_catenary("periodic-stiffness")
+    with pytest.raises(InputError, match="need a flexible catenary.*'periodic-stiffness' is not one"):
+        Plant(massless, Train.of(ONE, ONE, distances=[50.0]))
