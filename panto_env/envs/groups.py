@@ -28,7 +28,7 @@ class LaneGroups:
     def __init__(self, groups: Sequence[VectorLanes]) -> None:
         """groups: in the order of their lanes."""
         self._groups = groups
-        ends = np.cumsum([0, *(group.usual.lanes for group in groups)]).tolist()
+        ends = np.cumsum([0, *(group.count for group in groups)]).tolist()
         self._lanes = [slice(first, end) for first, end in pairwise(ends)]
         self._threads = LaneThreads(self._step_groups, len(groups))
 
@@ -106,9 +106,9 @@ def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | Lane
             "lines are drawn from a list, a family or a section: give one as catenary, or no lines."
         )
     if count == 1:
-        usual = Episodes(settings, lanes=settings.num_envs, keep_samples=keep_samples)
+        usual = Episodes(settings, lanes=settings.trains, keep_samples=keep_samples)
         return VectorLanes(usual, settings.episodes_per_line)
-    sizes = [len(lanes) for lanes in np.array_split(np.arange(settings.num_envs), count)]
+    sizes = [len(trains) for trains in np.array_split(np.arange(settings.trains), count)]
     threads = max(1, cores() // count)
     usual_of = {
         size: Episodes(settings, lanes=size, keep_samples=keep_samples, threads=threads)

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.units import to_kmh
 from ..control import Task
-from ..control.episode import Flags
+from ..control.episode import Flags, Results
 from ..control.state import Result
 from .lanes import Answer, ended_figures
 
@@ -22,13 +22,20 @@ FRAME_FORCE, HEAD_FORCE = int(Result.FRAME_FORCE), int(Result.HEAD_FORCE)
 POSITION, COST = int(Result.POSITION), int(Result.COST)
 
 
-def final_figures(task: Task) -> dict[str, float]:
+def final_figures(task: Task, row: int = 0) -> dict[str, float]:
     """Figures of the ended episode of a task's only lane, for infos, without those that it does not have.
 
-    Neither nan nor infinity stands for these: strict JSON refuses both, and nan makes two infos unequal.
+    row: of one of the controlled pantographs. Neither nan nor infinity stands for what is missing: strict
+    JSON refuses both, and nan makes two infos unequal.
     """
-    figures = {name: float(value[0]) for name, value in ended_figures(task, np.zeros(1, dtype=int)).items()}
+    figures = {name: float(value[0]) for name, value in ended_figures(task, np.array([row])).items()}
     return {name: value for name, value in figures.items() if math.isfinite(value)}
+
+
+def own_info(values: Array) -> dict[str, Any]:
+    """Info of one of several controlled pantographs; values: its rows of ``Result``."""
+    own = {"reward": REWARD, "cost": COST, "contact_force": CONTACT_FORCE, "position": POSITION}
+    return {name: float(values[row]) for name, row in own.items()}
 
 
 def lane_infos(answer: Answer) -> dict[str, Any]:
@@ -90,11 +97,12 @@ def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
 
 
 def first_info(task: Task) -> dict[str, Any]:
-    """Info of the only lane of a task at the start of its episode."""
+    """Info of the only lane of a task at the start of its episode, of its first controlled pantograph."""
 
     def of_lane(infos: dict[str, Any]) -> dict[str, Any]:
         plain = {key: value for key, value in infos.items() if not key.startswith("_")}
         return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
 
-    answer = Answer(task.results, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
+    first = Results(*(own[:1] for own in task.results))
+    answer = Answer(first, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
     return of_lane(lane_infos(answer))

@@ -1,4 +1,9 @@
-"""Lanes of a vector environment: each runs the usual task, or another one for an episode."""
+"""Lanes of a vector environment: each runs the usual task, or another one for an episode.
+
+A lane here is what one action controls: a pantograph. Where several pantographs of a train are controlled,
+they are as many lanes, one behind the other, that a task computes as one, and whose episodes begin and end
+together.
+"""
 
 from __future__ import annotations
 
@@ -45,11 +50,13 @@ class VectorLanes:
     def __init__(self, usual: Episodes, episodes_per_line: int = 1) -> None:
         """usual: episodes without options, with as many lanes; episodes_per_line: per lane, on average."""
         self.episodes, self.usual = usual, usual.task
-        self._per_line = episodes_per_line * self.usual.lanes
+        self.agents = self.usual.agents  # lanes of a train
+        self.count = self.usual.lanes * self.agents
+        self._per_line = episodes_per_line * self.count
         self._left = 0  # episodes that are still to begin on the present line
         self._results = self.usual.results  # of the last step, in arrays that are not written to after return
         self._others: list[tuple[Task, Flags]] = []  # of episodes with options or on old lines; their lanes
-        self._speed_kmh = np.zeros(self.usual.lanes)
+        self._speed_kmh = np.zeros(self.count)
 
     def episodes_with(self, options: Mapping[str, Any]) -> Episodes:
         """The episodes with options, for ``begin``. Raises InputError where these are not valid."""
@@ -75,7 +82,7 @@ class VectorLanes:
             if self._others:
                 idle = ~its if waiting is None else ~its | waiting
             own = results if task is self.usual else task.results
-            ended = task.step(action, idle, results=own) or ended
+            ended = task.step(action, self._trains(idle), results=own) or ended
             self._results = results
             self._take(own, its)
         if waiting is not None:
@@ -95,9 +102,14 @@ class VectorLanes:
             task = episodes.draw(of_first)
             own = task.results
             self._others.append((task, lanes.copy()))
-        task.reset(np.flatnonzero(lanes), random, own)
+        trains = np.flatnonzero(lanes[:: self.agents])
+        task.reset(trains, lambda train: random(train * self.agents), own)
         self._take(own, lanes)
-        self._speed_kmh[lanes] = to_kmh(task.speed[lanes])
+        self._speed_kmh[lanes] = np.repeat(to_kmh(task.speed[trains]), self.agents)
+
+    def _trains(self, lanes: Flags | None) -> Flags | None:
+        """Which trains have these lanes."""
+        return None if lanes is None else lanes[:: self.agents]
 
     def _next_line(self, lanes: Flags, random: Callable[[], np.random.Generator], anew: bool) -> None:
         """Draw the line on which lanes, and those after them, begin, if the present one has had enough."""
@@ -117,7 +129,7 @@ class VectorLanes:
 
     def answer(self) -> Answer:
         """Results of all lanes."""
-        return Answer(self._results, self._speed_kmh.copy(), np.ones(self.usual.lanes, dtype=np.bool_))
+        return Answer(self._results, self._speed_kmh.copy(), np.ones(self.count, dtype=np.bool_))
 
     def task_of(self, lane: int) -> tuple[Task, int]:
         """The task that a lane runs, and its number there."""
@@ -145,7 +157,7 @@ class VectorLanes:
     @property
     def _on_usual(self) -> Flags:
         """Which lanes run the usual task."""
-        usual = np.ones(self.usual.lanes, dtype=np.bool_)
+        usual = np.ones(self.count, dtype=np.bool_)
         for _, its in self._others:
             usual &= ~its
         return usual
@@ -159,5 +171,5 @@ def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:
     """
     figures, without = task.figures_of(lanes)
     for lane in lanes[without].tolist():
-        warnings.warn(task.divergence(lane), AccuracyWarning, stacklevel=2)
+        warnings.warn(task.divergence(lane // task.agents), AccuracyWarning, stacklevel=2)
     return {name: np.where(without, np.nan, value) for name, value in figures.items()}

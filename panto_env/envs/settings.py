@@ -43,7 +43,9 @@ class VectorSettings(RunSettings):
     """Arguments of ``PantographVectorEnv``."""
 
     num_envs: Annotated[int, Between(1, MOST_LANES)] = Field(
-        1, description="lanes: environments side by side"
+        1,
+        description="lanes: environments side by side; where several pantographs of a train are controlled, "
+        "each is a lane, those of a train side by side",
     )
     autoreset_mode: AutoresetMode = Field(
         AutoresetMode.NEXT_STEP,
@@ -92,12 +94,26 @@ class VectorSettings(RunSettings):
     @property
     def groups(self) -> int:
         """Number of groups of lanes that share a line."""
-        return 1 if not draws_line(self) else self.lines or self.num_envs
+        return 1 if not draws_line(self) else self.lines or self.trains
+
+    @property
+    def trains(self) -> int:
+        """Number of trains, with a lane for each of their controlled pantographs."""
+        return self.num_envs // len(self.controlled)
+
+    @model_validator(mode="after")
+    def _whole_trains(self) -> VectorSettings:
+        if self.num_envs % len(self.controlled):
+            raise InputError(
+                f"num_envs counts the controlled pantographs, {len(self.controlled)} in each train, so it "
+                f"must be a multiple of that, not {self.num_envs}."
+            )
+        return self
 
     @model_validator(mode="after")
     def _lanes_for_each_line(self) -> VectorSettings:
-        if self.lines is not None and self.lines > self.num_envs:
-            raise InputError(f"{self.num_envs} lanes are too few for {self.lines} lines; give fewer lines.")
+        if self.lines is not None and self.lines > self.trains:
+            raise InputError(f"{self.trains} lanes are too few for {self.lines} lines; give fewer lines.")
         return self
 
     @model_validator(mode="after")

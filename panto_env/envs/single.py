@@ -19,7 +19,7 @@ from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
 from .description import described
 from .episodes import Episodes, with_longest_episode
-from .infos import CONTACT_FORCE, final_figures, first_info
+from .infos import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
 from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
 from .reset_arguments import checked_options, checked_seed
 from .settings import EnvironmentSettings, render_metadata
@@ -51,8 +51,9 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     ## Action Space
     `Box(-1, 1, (1,), float32)`, or `(2,)` with `actuator={{"place": "both"}}`: share of the actuator's
     force limit (100 N by default), up on the frame or up on the head and down on the mass
-    below it. Held for one control interval (10 ms). Values outside are clipped; NaN, infinite or
-    wrongly shaped actions raise an error and do not change the environment. With `washout`, as in
+    below it; as many times as pantographs are `controlled`. Held for one control interval (10 ms). Values
+    outside are clipped; NaN, infinite or wrongly shaped actions raise an error and do not change the
+    environment. With `washout`, as in
     `Pantograph-v0`, the slow average of the actuator's force is subtracted from the action, so that no policy
     can gain by a larger or smaller mean contact force; `washout=None` for policies that command forces.
 
@@ -105,6 +106,14 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     where no support is passed, is left out. A `TimeLimit` ends episodes without the environment's knowledge:
     `trajectory.summary("all")` has the figures of all of it then, too.
 
+    ## Several Pantographs
+    `pantographs=["dsa380", "dsa380"], distances=[200]` is a train; `controlled=2` controls the second one,
+    whose episode begins where it comes onto the line, while the first is passive. With `controlled=[1, 2]`
+    observation and action hold those of the first, then those of the second, and the reward is the mean of
+    theirs; `info["pantographs"]` has each one's contact force, position, reward and cost, in the last info
+    with its figures. `trajectory.train` has the records of all. `panto_env.parallel_env` is the same task as
+    a PettingZoo environment, an agent for each controlled pantograph.
+
     ## Arguments
     {arguments}
 
@@ -134,8 +143,7 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
         self._usual = Episodes(settings)
         self._watch(self._usual.task)
         self._running = False
-        shape = self.task.results.observation[0].shape
-        self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
+        self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, self._observation.shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self._shape, np.float32)
 
     @property
@@ -179,14 +187,17 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
         self._reward_so_far = 0.0
         if self.render_mode == "human":
             self._show()
-        return self._observation.copy(), first_info(task)
+        info = first_info(task)
+        if task.agents > 1:
+            info["pantographs"] = [own_info(own) for own in task.results.values]
+        return self._observation.copy(), info
 
     def _watch(self, task: Task) -> None:
         """Set the task, and keep its only lane's arrays for ``step``."""
         self.task = task
-        self._shape = (len(task.actuator.places),)
+        self._shape = (task.agents * len(task.actuator.places),)
         results = task.results
-        self._observation, self._values = results.observation[0], results.values[0]
+        self._observation, self._values = results.observation.reshape(-1), results.values[0]
         self._flags = results.flags[0]
 
     def _state(self) -> dict[str, Any]:
@@ -213,7 +224,9 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if not self._running:
             raise InputError("The episode has not begun or has ended; call reset before step.")
-        self.task.step(checked(action, self._shape))
+        force = checked(action, self._shape)
+        several = self.task.agents > 1
+        self.task.step(force.reshape(self.task.agents, -1) if several else force)
         terminated, truncated = self._flags.tolist()
         values = self._values.tolist()
         reward, cost_function, contact_loss, effort, rate, mean_force, low_passed = values[:CONTACT_FORCE]
@@ -236,9 +249,14 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
                 "low_passed": low_passed,
             },
         }
+        if several:
+            reward = float(self.task.results.values[:, REWARD].mean())
+            info["pantographs"] = [own_info(own) for own in self.task.results.values]
         if terminated or truncated:
             self._running = False
             info["figures"] = final_figures(self.task)
+            for row, own in enumerate(info.get("pantographs", ())):
+                own["figures"] = final_figures(self.task, row)
         if self.render_mode is not None:
             self._reward_so_far += reward
             if self.render_mode == "human":

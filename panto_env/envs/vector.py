@@ -206,7 +206,8 @@ class PantographVectorEnv(
         for lane in self._drawn:
             task, place = self._lanes.task_of(lane)
             title = f"lane {lane}: {task.plant.pantograph.name} on {task.plant.catenary.name}"
-            frames.append(self._viewer.frame(task, place, title, float(self._reward_so_far[lane])))
+            reward = float(self._reward_so_far[lane])
+            frames.append(self._viewer.frame(task, place // task.agents, title, reward))
         return tuple(frames)
 
     @one_at_a_time
