@@ -12,7 +12,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,diagnosis,dev,docs,render]'
+	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,diagnosis,dev,docs,pettingzoo,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
@@ -128,13 +128,13 @@ fuzz: $(READY)
 # The lower bounds of pyproject.toml, all at once, without the extra 'agents'; what they need themselves is the
 # newest that there is. The versions tested are in constraints.txt.
 FLOORS := .venv-floors
-FLOOR_EXTRAS := control,diagnosis,render
+FLOOR_EXTRAS := control,diagnosis,pettingzoo,render
 floors:
 	$(PYTHON) -m venv $(FLOORS)
 	$(FLOORS)/bin/pip install -qq --upgrade pip packaging
 	$(FLOORS)/bin/python -m tests.floors $(FLOOR_EXTRAS) > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/pip install -q --constraint $(FLOORS)/floors.txt pytest pytest-xdist --editable ".[$(FLOOR_EXTRAS)]"
-	$(FLOORS)/bin/pytest -n auto --dist worksteal tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
+	$(FLOORS)/bin/pytest -n auto --dist worksteal tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_trains.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
 	  tests/envs/test_vector_rules.py tests/analysis/test_sweep.py tests/analysis/test_plots.py tests/metrics/test_trajectory.py tests/render/test_render.py
 
 # Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.

@@ -1,11 +1,23 @@
 """Active pantograph control: a trusted pantograph-catenary simulator as a Gymnasium environment."""
 
+from typing import Any
+
 from .analysis.simulation import simulate
 from .base.errors import InputError
 from .base.version import __version__
 from .envs import register
 from .metrics.trajectory import Trajectory
 
-__all__ = ["InputError", "Trajectory", "__version__", "simulate"]
+__all__ = ["InputError", "Trajectory", "__version__", "parallel_env", "simulate"]
 
 register()
+
+
+def parallel_env(**settings: Any) -> Any:
+    """A train as a PettingZoo environment; see ``envs.parallel.PantographParallelEnv``.
+
+    Raises InputError for a value that is not valid, and without PettingZoo.
+    """
+    from .envs.parallel import PantographParallelEnv  # PettingZoo is an extra
+
+    return PantographParallelEnv(**settings)

@@ -103,6 +103,7 @@ def first_info(task: Task) -> dict[str, Any]:
         plain = {key: value for key, value in infos.items() if not key.startswith("_")}
         return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
 
-    first = Results(*(own[:1] for own in task.results))
+    observation, values, flags = task.results
+    first = Results(observation[:1], values[:1], flags[:1])
     answer = Answer(first, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
     return of_lane(lane_infos(answer))

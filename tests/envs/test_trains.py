@@ -1,0 +1,160 @@
+"""Environments of trains: one pantograph of several is controlled, or each is an agent."""
+
+import copy
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import panto_env
+from panto_env import InputError
+from panto_env.envs.ids import IDS
+
+pettingzoo = pytest.importorskip("pettingzoo")
+TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0], "speed_kmh": (280.0, 320.0)}
+BOTH = {**TRAIN, "controlled": [1, 2]}
+SHORT = {"distance": 400.0, "settle": 0.0}
+
+
+def make(**settings):
+    return gymnasium.make("Pantograph-v0", **settings)
+
+
+def actions(step, rows):
+    return 0.3 * np.sin(0.2 * step + np.arange(rows)[:, None]).astype(np.float32)
+
+
+def test_the_second_pantograph_s_episode_begins_where_it_comes_onto_the_line():
+    env = make(**TRAIN, controlled=2, run_in=0.0, **SHORT)
+    _, info = env.reset(seed=1)
+    stride = info["speed_kmh"] / 3.6 * 0.01
+    assert 0 <= info["position"] < stride
+    ended = False
+    while not ended:
+        *_, terminated, truncated, info = env.step(np.zeros(1, dtype=np.float32))
+        ended = terminated or truncated
+    first, second = env.unwrapped.trajectory.train
+    assert second.distance == pytest.approx(first.distance - 100.0)
+    assert 400 <= second.distance < 400 + 2 * stride
+    assert info["figures"]["distance"] == pytest.approx(second.distance, abs=2 * stride)
+    assert info["figures"]["std"] == pytest.approx(second.summary("all").std, rel=0.02)
+
+
+def test_the_controlled_one_alone_has_an_actuator():
+    for controlled, driven in ((1, [True, False]), (2, [False, True]), ([1, 2], [True, True])):
+        env = make(**TRAIN, controlled=controlled, **SHORT, washout=None)
+        env.reset(seed=1)
+        for _ in range(200):
+            env.step(np.full(env.action_space.shape, 0.5, dtype=np.float32))
+        forces = [np.abs(own.frame_force).max() > 1 for own in env.unwrapped.trajectory.train]
+        assert forces == driven
+
+
+def test_gymnasium_accepts_a_train():
+    check_env(make(**BOTH, **SHORT).unwrapped, skip_render_check=True)
+
+
+def test_lanes_of_a_vector_environment_are_the_single_environment_bit_for_bit():
+    vector = gymnasium.make_vec("Pantograph-v0", num_envs=4, **BOTH, **SHORT)
+    alone = make(**BOTH, **SHORT)
+    seen, _ = vector.reset(seed=[3, None, 8, None])
+    own, _ = alone.reset(seed=8)
+    for step in range(700):
+        np.testing.assert_array_equal(seen[2:].ravel(), own)
+        force = actions(step, 4)
+        seen, rewards, *_, infos = vector.step(force)
+        own, reward, terminated, truncated, info = alone.step(force[2:].ravel())
+        assert reward == rewards[2:].mean()
+        assert [each["reward"] for each in info["pantographs"]] == rewards[2:].tolist()
+        if terminated or truncated:
+            break
+    assert step > 300
+    figures = [each["figures"]["std"] for each in info["pantographs"]]
+    assert infos["figures"]["std"][2:].tolist() == figures
+    assert figures[0] != figures[1]
+
+
+def test_copies_go_on_as_the_original():
+    env = make(**BOTH, **SHORT)
+    env.reset(seed=4)
+    for step in range(150):
+        env.step(actions(step, 2).ravel())
+    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    for step in range(150, 300):
+        seen, *_ = env.step(actions(step, 2).ravel())
+        for other in others:
+            np.testing.assert_array_equal(other.step(actions(step, 2).ravel())[0], seen)
+
+
+def parallel(**settings):
+    return panto_env.parallel_env(**IDS["Pantograph-v0"] | BOTH | SHORT | settings)
+
+
+def test_pettingzoo_accepts_it():
+    from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+    parallel_api_test(parallel(), num_cycles=1000)
+    parallel_seed_test(parallel, num_cycles=100)
+
+
+def test_agents_see_and_earn_what_the_environment_of_the_train_does():
+    view, env = parallel(), make(**BOTH, **SHORT)
+    seen, _ = view.reset(seed=2)
+    own, _ = env.reset(seed=2)
+    assert view.agents == ["pantograph_1", "pantograph_2"]
+    for step in range(900):
+        np.testing.assert_array_equal(np.concatenate(list(seen.values())), own)
+        force = actions(step, 2)
+        seen, rewards, terminations, truncations, infos = view.step(
+            {"pantograph_2": force[1], "pantograph_1": force[0]}
+        )
+        own, reward, terminated, truncated, info = env.step(force.ravel())
+        assert np.mean(list(rewards.values())) == reward
+        assert list(infos.values()) == info["pantographs"]
+        assert set(terminations.values()) == {terminated}
+        if terminated or truncated:
+            break
+    assert set(truncations.values()) == {True}
+    assert not view.agents
+    with pytest.raises(InputError, match="has not begun or has ended"):
+        view.step({})
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"distances": [200.0, 100.0], "pantographs": ["dsa380"] * 3}, "must increase"),
+        ({"distances": [-5.0]}, "must be positive numbers"),
+        ({"distances": [50.0, 100.0]}, "must give 1 numbers, one for each of the pantographs behind"),
+        ({"pantographs": ["dsa380"] * 5, "distances": [1, 2, 3, 4]}, "has up to 4 pantographs, not 5"),
+        ({"controlled": [1, 2, 3]}, "controlled names pantograph 3, but the train has only 2"),
+        ({"controlled": [2, 2]}, "must name different pantographs"),
+        ({"pantograph": "dsa250"}, "pantograph is the first of pantographs, 'dsa380', not 'dsa250'"),
+        ({"catenary": "periodic-stiffness"}, "Several pantographs need a flexible catenary"),
+        ({"distances": [5000.0], "spans": 20}, "5000 m behind the first.*has 1140 m for it"),
+        (
+            {"distances": [300.0], "catenary": "sweden-st15-bridge", "distance": 5e3},
+            "distance must be at most",
+        ),
+    ],
+)
+def test_trains_that_cannot_be_are_refused_in_a_sentence(given, message):
+    with pytest.raises(InputError, match=message):
+        make(**TRAIN | given)
+
+
+def test_lanes_that_are_no_whole_trains_are_refused():
+    with pytest.raises(InputError, match="must be a multiple of that, not 3"):
+        gymnasium.make_vec("Pantograph-v0", num_envs=3, **BOTH)
+
+
+def test_actions_of_agents_are_checked():
+    view = parallel()
+    view.reset(seed=1)
+    one = np.zeros(1, dtype=np.float32)
+    with pytest.raises(InputError, match="action for each of pantograph_1, pantograph_2"):
+        view.step({"pantograph_1": one})
+    with pytest.raises(InputError, match="must have the shape"):
+        view.step({"pantograph_1": one, "pantograph_2": np.zeros(2)})
