@@ -133,6 +133,21 @@ def overlapping_run():
     return found
 
 
+def train_run():
+    """Two controlled pantographs of different kinds with damped strips, one behind the other."""
+    damped = load_pantograph("en50318-2002").model_copy(update={"contact_damping": 100.0})
+    train = {"pantographs": [damped, "three-mass"], "distances": [14.0], "controlled": [1, 2]}
+    numerics = {"window": 3, "spacing": 0.5, "time_step": 2e-3}
+    given = LIGHT | train | numerics | {"catenary": short_line(), "spans": 8, "run_in": 0.0, "washout": 0.5}
+    env = gymnasium.make("Pantograph-v0", **given)
+    rows = [env.reset(seed=3)[0].tolist()]
+    for step in range(40):
+        force = 0.2 * np.sin(step + np.arange(2.0)).astype(np.float32)
+        observation, reward, *_ = env.step(force)
+        rows.append([*observation.tolist(), reward])
+    return [*rows, *(own.contact_force.tolist() for own in env.unwrapped.trajectory.train)]
+
+
 def rig_run():
     """A rig's computer and cylinder."""
     run = panto_env.simulate(catenary="rig", distance=8.0, speed_kmh=200)
@@ -160,6 +175,7 @@ RUNS = {
     "spans that differ": uneven_run,
     "stitch wires and an overlap": overlapping_run,
     "weather": run_in_weather,
+    "a train": train_run,
     "a rig": rig_run,
     "several lanes": several_lanes,
 }
