@@ -85,7 +85,7 @@ def test_the_first_collector_feels_the_second_only_once_that_is_on_the_line(syst
 
 
 def test_energy_is_balanced_under_two_collectors_through_an_overlap():
-    """The first has both wires above it before the second has. The error is one of second order in the step."""
+    """The first has both wires above it before the second has. The error is of second order in the step."""
     line = line_of("re330", overlap(2, 0.1, 0.5) | {"sequence": [{}] * 5})
     train = [Collector(DSA), Collector(REFERENCE, 40.0)]
     coarse, fine = (balance(line, train, 280.0, distance=260.0, step=step) for step in (5e-4, 2.5e-4))
