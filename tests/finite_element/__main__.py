@@ -1,4 +1,4 @@
-"""The flexible catenary beside finite elements: ``python -m tests.finite_element [--sections]``."""
+"""Both codes side by side: ``python -m tests.finite_element [--sections | --trains]``."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .differences import at_rest
 from .figures import figures as figures_of
 from .pictures import draw
 from .sections import sections
+from .trains import cases
 
 NAME = "en50318-2002"
 OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precision="double"))
@@ -76,17 +77,45 @@ def compare_sections(folder: Path) -> None:
             uplifts = " ".join(f"{each:.1f}" for each in found.uplifts_mm)
             table.add_row(name, model, *(f"{value:.2f}" for value in values), uplifts)
         table.add_section()
-        draw(runs, section.spans, folder / f"{name}.png")
+        draw({model: [run] for model, run in runs.items()}, section.spans, folder / f"{name}.png")
+    Console().print(table)
+
+
+def compare_trains(folder: Path, element: float | None = None) -> None:
+    """Print the figures of each collector by both codes, and draw their forces in a folder.
+
+    element: of the judge (m), each train's own by default.
+    """
+    names = "train", "collector", "model", "F_m (N)", "σ (N)", "max (N)", "min (N)", "CL (%)"
+    table = Table(*names, "uplift per support (mm)")
+    for name, case in cases().items():
+        runs = {
+            "finite differences": case.by_simulator(),
+            "finite elements": case.by_finite_elements(element),
+        }
+        for number, own in enumerate(case.collectors):
+            for model, run in runs.items():
+                found = figures_of(run[number], case.spans)
+                values = (found.mean, found.std, found.maximum, found.minimum, found.loss_percent)
+                uplifts = "" if number else " ".join(f"{each:.1f}" for each in found.uplifts_mm)
+                whose = f"{number + 1}: {own.pantograph.name}"
+                table.add_row(name, whose, model, *(f"{value:.2f}" for value in values), uplifts)
+        table.add_section()
+        draw(runs, case.spans, folder / f"{name}.png")
     Console().print(table)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m tests.finite_element", description=__doc__)
     parser.add_argument("--sections", action="store_true", help="sections of unlike spans, with pictures")
+    parser.add_argument("--trains", action="store_true", help="several collectors, with pictures")
+    parser.add_argument("--element", type=float, help="of trains (m), instead of each one's own")
     parser.add_argument("--output", type=Path, default=Path("runs/finite-element"), help="for the pictures")
     given = parser.parse_args()
     if given.sections:
         compare_at_rest()
         compare_sections(given.output)
+    elif given.trains:
+        compare_trains(given.output, given.element)
     else:
         main()

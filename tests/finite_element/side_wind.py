@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -12,10 +11,8 @@ from scipy import sparse
 from panto_env.plant.catenary.schema import Wire
 
 from .hermite import Array, matrices
+from .newmark import Newmark
 from .system import LineSystem
-
-if TYPE_CHECKING:
-    from .simulation import Newmark
 
 AIR, DRAG, COPPER, STRAND = 1.225, 1.2, 8900.0, 0.76
 

@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.schema import StitchWire
 
+from .contacts import Collector
 from .energy import balance
 from .pairs import pairs_of
 from .rest import at_rest
@@ -207,7 +208,7 @@ def test_lengths_and_stiffnesses_of_droppers_hold_the_designed_shape():
 
 def test_energy_is_balanced_under_stitch_wires():
     section = sections()["some-stitched"]
-    found = balance(section.line, section.pantograph, section.speed_kmh, distance=420.0)
+    found = balance(section.line, [Collector(section.pantograph)], section.speed_kmh, distance=420.0)
     assert found.steps_with_slack > 0
     assert found.error < 1e-3 * found.turnover
 
