@@ -21,7 +21,7 @@ from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
-from ..metrics.labels import HEADINGS
+from ..metrics.labels import HEADINGS, NUMBER
 from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_label, parameter_names
@@ -29,7 +29,6 @@ from .pool import Progress, check_passes, in_threads, workers_for
 from .simulation import simulate
 from .swept_train import (
     DISTANCES,
-    NUMBER,
     changed_train,
     distance_label,
     is_distance,
@@ -86,9 +85,9 @@ def sweep(
 
     Returns one row per pass, in the order of values, then policies: the swept values, the run's settings,
     and every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
-    and why. A train has a row for each pantograph, with its "number", 1 for the first; all have figures over
-    the spans that the last one covers. Raises InputError for an unknown parameter, a value that its schema
-    refuses, and as ``simulate`` does; all values are checked before the first pass.
+    and why. A train has a row for each pantograph, with its "pantograph_number", 1 for the first; all have
+    figures over the spans that the last one covers. Raises InputError for an unknown parameter, a value that
+    its schema refuses, and as ``simulate`` does; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")

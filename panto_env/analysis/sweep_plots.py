@@ -11,8 +11,7 @@ from ..base import marks
 from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
 from ..base.units import from_kmh
 from ..metrics import en50367
-from ..metrics.labels import LABELS
-from .swept_train import NUMBER
+from ..metrics.labels import LABELS, NUMBER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

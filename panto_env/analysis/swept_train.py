@@ -11,8 +11,6 @@ from ..control.settings import run_settings
 from ..plant.pantograph.schema import PantographData
 
 DISTANCES = "distances"
-NUMBER = "number"
-"""Column with the number of the pantograph, 1 for the first, in rows of a train."""
 
 
 def is_distance(name: str) -> bool:

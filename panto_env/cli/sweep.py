@@ -17,13 +17,13 @@ from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
 from ..analysis.sweep_plots import pantographs_of
-from ..analysis.swept_train import NUMBER, with_distances
+from ..analysis.swept_train import with_distances
 from ..base.errors import InputError
 from ..base.table_file import TABLES
 from ..base.version import __version__
 from ..control.identity import plain
 from ..control.settings import run_settings
-from ..metrics.labels import LABELS
+from ..metrics.labels import LABELS, NUMBER
 from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")

@@ -23,7 +23,7 @@ def figures_of(row, run, spans):
 
 def test_each_pantograph_has_a_row_over_the_spans_of_the_last_one(tmp_path):
     rows = sweep({"distances": [60.0, 150.0]}, speed_kmh=250.0, **SHORT, **TWO)
-    assert [(row["distances"], row["number"], row["pantograph"]) for row in rows] == [
+    assert [(row["distances"], row["pantograph_number"], row["pantograph"]) for row in rows] == [
         (60.0, 1, "en50318-2002"),
         (60.0, 2, "dsa250"),
         (150.0, 1, "en50318-2002"),
@@ -38,7 +38,7 @@ def test_each_pantograph_has_a_row_over_the_spans_of_the_last_one(tmp_path):
     save(rows, tmp_path / "s.csv", **TWO)
     with (tmp_path / "s.csv").open(encoding="utf-8-sig") as file:
         heading = next(csv.reader(file))
-    assert heading[:5] == ["distances (m)", "policy", "catenary", "number", "pantograph"]
+    assert heading[:5] == ["distances (m)", "policy", "catenary", "pantograph_number", "pantograph"]
     figure = plot_sweep(rows, ["distances"], labels(["distances"], **TWO))
     assert {line.get_label() for line in figure.legends[0].get_lines()} >= {
         "passive, pantograph 1",
