@@ -106,14 +106,8 @@ class Comparison:
         arguments |= {"speed_kmh": speed_kmh, "seed": seed, "distance": self.distance}
         arguments |= {"record_droppers": False}
         if (speed_kmh, seed) not in self._passive:
-            self._passive[speed_kmh, seed] = _controlled(simulate(**arguments))
-        return _controlled(simulate(**arguments, policy=policy)), self._passive[speed_kmh, seed]
-
-
-def _controlled(run: Trajectory) -> Trajectory:
-    """Record of the pantograph that is controlled, of a train the first such one."""
-    first: int = run.settings.get("controlled", [1])[0]
-    return run.train[first - 1]
+            self._passive[speed_kmh, seed] = simulate(**arguments).controlled
+        return simulate(**arguments, policy=policy).controlled, self._passive[speed_kmh, seed]
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
