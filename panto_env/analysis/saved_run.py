@@ -77,7 +77,7 @@ def check_made_anew(run: Trajectory, settings: dict[str, Any], path: str | Path)
 def _different(run: Trajectory, path: str | Path, how: str) -> InputError:
     return InputError(
         f"The run of {path} cannot be repeated: with its settings and policy '{run.controlled.policy}' it "
-        f"comes out differently now, {how}. The policy or the version has changed, or its mean force was met over "
-        "--spans, or its policy saw another observation, which the file does not record; write it again with "
-        "`panto simulate --output`."
+        f"comes out differently now, {how}. The policy or the version has changed, or its mean force was met "
+        "over --spans, or its policy saw another observation, which the file does not record; write it again "
+        "with `panto simulate --output`."
     )
