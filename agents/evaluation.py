@@ -106,8 +106,8 @@ class Comparison:
         arguments |= {"speed_kmh": speed_kmh, "seed": seed, "distance": self.distance}
         arguments |= {"record_droppers": False}
         if (speed_kmh, seed) not in self._passive:
-            self._passive[speed_kmh, seed] = simulate(**arguments)
-        return simulate(**arguments, policy=policy), self._passive[speed_kmh, seed]
+            self._passive[speed_kmh, seed] = simulate(**arguments).controlled
+        return simulate(**arguments, policy=policy).controlled, self._passive[speed_kmh, seed]
 
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:

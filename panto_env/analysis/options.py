@@ -25,7 +25,8 @@ RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
 """Options in another unit than the setting: the setting's unit, the option's unit, and the factor."""
 SEVERAL: dict[str, type] = {"pantograph": str, "distances": float, "controlled": int}
-"""Options that may be given several times, and the type of each value."""
+"""Options that may be given several times, and the type of each value. A command without distances takes one
+pantograph."""
 SIMPLE = (bool, int, float, str)
 LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS = (
     "Line",
@@ -111,6 +112,7 @@ def with_settings(
     are not given have their default, which the help then shows.
     """
     names = [name for name in only or _names() if name not in left_out]
+    trains = "distances" in names
 
     def decorate(command: Command) -> Command:
         @wraps(command)
@@ -119,14 +121,14 @@ def with_settings(
             settings = {
                 name: _to_setting(name, value) for name, value in options.items() if value is not None
             }
-            command(_riding(settings), **given)
+            command(_riding(settings) if trains else settings, **given)
 
         hints = get_type_hints(command, include_extras=True)
         own = [
             parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=_in_panel(name, hints[name]))
             for name, parameter in list(inspect.signature(command).parameters.items())[1:]
         ]
-        parameters = sorted((*(_option(name, defaults) for name in names), *own), key=_place)
+        parameters = sorted((*(_option(name, defaults, trains) for name in names), *own), key=_place)
         with_options.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         with_options.__annotations__ = {each.name: each.annotation for each in parameters}
         return with_options
@@ -176,14 +178,14 @@ def _type(name: str) -> type | None:
     return next((each for each in bare if each in SIMPLE), None)
 
 
-def _option(name: str, defaults: bool) -> inspect.Parameter:
-    field, kind = fields()[name], _type(name)
+def _option(name: str, defaults: bool, trains: bool) -> inspect.Parameter:
+    field, kind, several = fields()[name], _type(name), trains and name in SEVERAL
     text = field.description or ""
     if name in OTHER_UNITS:
         unit, shown, _ = OTHER_UNITS[name]
         text = text.replace(f"({unit})", f"({shown})", 1)
     text = f"{text[:1].upper()}{text[1:]}."
-    if name in SEVERAL:
+    if several:
         text += " May be given several times."
     if defaults and field.default not in (None, ()) and kind is not bool:
         text += f" Default: {field.default}."
@@ -194,7 +196,7 @@ def _option(name: str, defaults: bool) -> inspect.Parameter:
         option,
         inspect.Parameter.KEYWORD_ONLY,
         default=None,
-        annotation=Annotated[list[kind] | None if name in SEVERAL else kind | None, info],  # type: ignore
+        annotation=Annotated[list[kind] | None if several else kind | None, info],  # type: ignore
     )
 
 

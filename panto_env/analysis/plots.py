@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import marks
-from ..base.colours import BLUE, GREEN, PURPLE, VERMILION
+from ..base.colours import BLUE, GREEN, PURPLE, VERMILION, series_colour
 from ..base.files import PICTURES, check_output, write_whole
 from ..base.legend import legend_above
 from ..metrics import en50367
@@ -24,6 +24,9 @@ from ..plant.alignment import Spans
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+ACTUATORS = {"frame_force": "on the frame", "head_force": "on the head"}
 
 
 def save(figure: Figure, path: str | Path) -> None:
@@ -51,34 +54,49 @@ def _leave_odd_names(figure: Figure) -> None:
 
 
 def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
-    """Contact force, heights and actuator force over the spans, by default those after the start."""
+    """Contact force, heights and actuator force over the spans, by default those after the start.
+
+    A train has a panel of the contact force for each pantograph, one below the other by place.
+    """
     from matplotlib.figure import Figure
 
-    actuators = {"on the frame": (run.frame_force, GREEN), "on the head": (run.head_force, PURPLE)}
-    acting = {name: drawn for name, drawn in actuators.items() if drawn[0].any()}
-    figure = Figure(figsize=(10, 8.6 if acting else 7), layout="constrained")
-    ratios = (1.6, 1, 1) if acting else (1.6, 1)  # the force's limits take room
-    contact, height, *others = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
-    covered, shown = run.spans(spans), run.inside(spans)
-    position = run.position[shown]
-    _draw_force(contact, run, shown, raw="0.75")
-    supply = run.line.system
-    marks.fit_force_axis([contact], en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply))
-    height.plot(position, 1e3 * run.wire[shown], color=VERMILION, label="contact wire")
-    height.plot(position, 1e3 * run.head[shown], color=BLUE, label="collector head")
+    train, several = run.train, len(run.train) > 1
+    acting = any(getattr(own, name).any() for own in train for name in ACTUATORS)
+    figure = Figure(figsize=(10, (8.6 if acting else 7) + 2.6 * (len(train) - 1)), layout="constrained")
+    ratios = [1.6] * len(train) + ([1, 1] if acting else [1])  # limits of forces take room
+    axes = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios).tolist()
+    contacts, height, others = axes[: len(train)], axes[len(train)], axes[len(train) + 1 :]
+    covered = train[-1].spans(spans)  # the last one comes onto the line last
+    for place, (contact, own) in enumerate(zip(contacts, train, strict=True)):
+        shown = own.inside(spans if covered is None else covered)
+        position = own.position[shown]
+        _draw_force(contact, own, shown, raw="0.75")
+        whose = f", pantograph {place + 1}" if several else ""
+        if several:
+            contact.set(ylabel=f"pantograph {place + 1}, {own.pantograph}\ncontact force (N)")
+            height.plot(position, 1e3 * own.head[shown], color=series_colour(place), label=f"head{whose}")
+        else:
+            height.plot(position, 1e3 * run.wire[shown], color=VERMILION, label="contact wire")
+            height.plot(position, 1e3 * run.head[shown], color=BLUE, label="collector head")
+        for axis in others:
+            for number, (name, words) in enumerate(ACTUATORS.items()):
+                if getattr(own, name).any():
+                    colour = series_colour(2 * place + number) if several else (GREEN, PURPLE)[number]
+                    axis.plot(position, getattr(own, name)[shown], color=colour, label=f"{words}{whose}")
+            axis.set(ylabel="actuator force (N)")
     height.set(ylabel="height (mm)")
-    for axis in others:
-        for name, (force, colour) in acting.items():
-            axis.plot(position, force[shown], color=colour, label=name)
-        axis.set(ylabel="actuator force (N)")
+    supply = run.line.system
+    marks.fit_force_axis(contacts, en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply))
     for axis in figure.axes:
         mark_supports(axis, run)
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
     figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
-    where = f"pantograph {run.pantograph}, line {run.catenary}, {run.speed_kmh:g} km/h"
+    names, policies = ([getattr(own, each) for own in train] for each in ("pantograph", "policy"))
+    words = f"pantographs {' and '.join(names)}" if several else f"pantograph {run.pantograph}"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
-    figure.suptitle(f"{where}, policy {run.policy}, {shown_spans}")
+    policy = " and ".join(policies if len(set(policies)) > 1 else policies[:1])
+    figure.suptitle(f"{words}, line {run.catenary}, {run.speed_kmh:g} km/h, policy {policy}, {shown_spans}")
     return figure
 
 

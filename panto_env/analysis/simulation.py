@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from numbers import Integral
 from typing import Any
 
@@ -98,17 +99,23 @@ def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, 
 def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
     """Control lane 0, already reset, to the end of its run; yields the finished share after each step.
 
-    name: of the policy, for errors. Raises InputError where the policy fails, or its action is not finite or
-    has the wrong shape.
+    Further controlled pantographs have copies of the policy. name: of the policy, for errors. Raises
+    InputError where the policy fails, or its action is not finite or has the wrong shape.
     """
+    # Each controlled pantograph has a policy of its own, which sees what that one feels.
+    drivers = [policy, *(deepcopy(policy) for _ in range(task.agents - 1))]
     with errors_name(name, "reset"):
-        policy.reset(task.context(0))
+        for row, driver in enumerate(drivers):
+            driver.reset(task.context(row))
     results, shape = task.results, (len(task.actuator.places),)
     while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
             # A copy: a policy may keep its observation.
-            action = checked_action(policy.act(results.observation[0].copy()), shape)
-        task.step(action[None])
+            actions = [
+                checked_action(driver.act(results.observation[row].copy()), shape)
+                for row, driver in enumerate(drivers)
+            ]
+        task.step(np.stack(actions))
         yield task.plant.of(0, Row.STEP) / task.end(0)
 
 

@@ -21,12 +21,21 @@ from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
 from ..metrics.figures import Figures
-from ..metrics.labels import HEADINGS
+from ..metrics.labels import HEADINGS, NUMBER
 from ..metrics.spans import SpanChoice, in_words
 from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_label, parameter_names
 from .pool import Progress, check_passes, in_threads, workers_for
 from .simulation import simulate
+from .swept_train import (
+    DISTANCES,
+    changed_train,
+    distance_label,
+    is_distance,
+    placed,
+    riding,
+    with_distances,
+)
 
 SPEED = "speed_kmh"
 POLICY = "policy"
@@ -65,22 +74,25 @@ def sweep(
     """Run every policy at every value of one parameter, or at every pair of values of two.
 
     parameters: values by dotted name as in the TOML (``pantograph.masses.1``,
-    ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, or ``policy.gain`` for a keyword
-    of every policy. policies: names, model files, or None for the passive pantograph. spans: spans of the
-    figures, first and last from 1, or "all"; by default those after the start. line_spans: ``spans`` of
-    ``simulate``, the number of the line's. workers: threads, one per core by default; the results do not
-    depend on it. progress: called with the numbers of finished and of all passes. seed, settings: as for
-    ``simulate`` (catenary, pantograph, speed_kmh, distance (m), ...).
+    ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, ``policy.gain`` for a keyword of
+    every policy, or ``distances``, that of the second of two ``pantographs`` (m), ``distances.1``,
+    ``distances.2`` where there are more; ``pantograph.`` changes all pantographs of a train. policies: names,
+    model files, or None for the passive pantograph. spans: spans of the figures, first and last from 1, or
+    "all"; by default those after the start. line_spans: ``spans`` of ``simulate``, the number of the line's.
+    workers: threads, one per core by default; the results do not depend on it. progress: called with the
+    numbers of finished and of all passes. seed, settings: as for ``simulate`` (catenary, pantograph,
+    speed_kmh, distance (m), ...).
 
     Returns one row per pass, in the order of values, then policies: the swept values, the run's settings,
     and every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
-    and why. Raises InputError for an unknown parameter, a value that its schema refuses, and as ``simulate``
-    does; all values are checked before the first pass.
+    and why. A train has a row for each pantograph, with its "pantograph_number", 1 for the first; all have
+    figures over the spans that the last one covers. Raises InputError for an unknown parameter, a value that
+    its schema refuses, and as ``simulate`` does; all values are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
     check_arguments(settings, RunSettings, "sweep")
-    settings["spans"] = line_spans
+    settings = with_distances({**settings, "spans": line_spans}, parameters)
     checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
@@ -94,9 +106,10 @@ def sweep(
     ]
     _check_memory(passes, workers)
     # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
-    return in_threads(
-        [partial(_row, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
+    found = in_threads(
+        [partial(_rows, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
     )
+    return [row for rows in found for row in rows]
 
 
 def save(rows: Sequence[Row], path: str | Path, **settings: Any) -> None:
@@ -113,10 +126,14 @@ def save(rows: Sequence[Row], path: str | Path, **settings: Any) -> None:
 
 def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
     """Label of each parameter, with its unit, for the axes of a plot; settings: those of ``sweep``."""
-    entries = _entries(run_settings({name: settings[name] for name in FAMILIES if name in settings}))
+    first = {"pantograph": train[0]} if (train := riding(settings)) else {}
+    given = {name: settings[name] for name in FAMILIES if name in settings}
+    entries = _entries(run_settings(given | first))
     found = {SPEED: "speed of the train (km/h)"}
     for name in parameters:
         family, _, rest = name.partition(".")
+        if is_distance(name):
+            found[name] = distance_label(name)
         found.setdefault(
             name,
             parameter_label(name, entries[family]) if family in entries else f"policy: {rest}",
@@ -187,16 +204,16 @@ def _named(one_pass: _Pass) -> Iterator[None]:
 
 def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     family = name.partition(".")[0]
-    if name == SPEED or (family == POLICY and family != name):
+    if name == SPEED or is_distance(name) or (family == POLICY and family != name):
         return
     if family in entries:
         check_name(name, entries[family])
         return
     everything = [known for owner, entry in entries.items() for known in parameter_names(entry, owner)]
-    near = hint(name, [SPEED, *everything])
+    near = hint(name, [SPEED, DISTANCES, *everything])
     families = ", ".join(f"'{owner}.'" for owner in (*entries, POLICY))
     raise InputError(
-        f"Unknown parameter '{name}': {near}it must be {SPEED} or begin with one of {families} "
+        f"Unknown parameter '{name}': {near}it must be {SPEED}, {DISTANCES} or begin with one of {families} "
         "(e.g. pantograph.masses.1)."
     )
 
@@ -207,16 +224,23 @@ def _prepare(
     entries: Mapping[str, Settings],
     settings: dict[str, Any],
 ) -> _Pass:
-    changed, speed_kmh = dict(entries), settings.get(SPEED, default(SPEED))
+    changed: dict[str, Any] = dict(entries)
+    speed_kmh = settings.get(SPEED, default(SPEED))
     of_policy: list[str] = []
     for name, value in values.items():
         family, _, rest = name.partition(".")
         if name == SPEED:
             speed_kmh = value
+        elif is_distance(name):
+            continue
         elif family == POLICY:
             of_policy.append(f"{rest}={value!r}")
         else:
             changed[family] = change(changed[family], name, value)
+            if family == "pantograph":
+                changed |= changed_train(settings, name, changed[family])
+    if any(map(is_distance, values)):
+        changed["distances"] = placed(settings, values)
     source = None if policy is None else str(policy)
     if of_policy:
         if source is None:
@@ -228,22 +252,29 @@ def _prepare(
     return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _row(one_pass: _Pass, spans: SpanChoice) -> Row:
+def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
+    """Rows of a pass, one for each pantograph."""
     with _named(one_pass):
         run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
-        figures = Figures.none() if run.terminated else run.summary(spans)
-    return {
-        **one_pass.values,
-        "policy": one_pass.policy,
-        "catenary": run.catenary,
-        "pantograph": run.pantograph,
-        "system": run.line.system,
-        "speed_kmh": one_pass.arguments["speed_kmh"],
-        "seed": run.seed,
-        **{name: run.settings[name] for name in DISCRETISATION},
-        "nominal_force": run.nominal_force,
-        "terminated": run.terminated,
-        "ending": run.ending,
-        "spans": "" if run.terminated else in_words(run.spans(spans)),
-        **figures.as_dict(),
-    }
+        train = run.train
+        covered = spans if run.terminated else train[-1].spans(spans) or spans
+        figures = [Figures.none() if run.terminated else own.summary(covered) for own in train]
+    return [
+        {
+            **one_pass.values,
+            "policy": one_pass.policy,
+            "catenary": own.catenary,
+            **({NUMBER: number} if len(train) > 1 else {}),
+            "pantograph": own.pantograph,
+            "system": own.line.system,
+            "speed_kmh": one_pass.arguments["speed_kmh"],
+            "seed": own.seed,
+            **{name: own.settings[name] for name in DISCRETISATION},
+            "nominal_force": own.nominal_force,
+            "terminated": own.terminated,
+            "ending": own.ending,
+            "spans": "" if own.terminated else in_words(own.spans(covered)),
+            **each.as_dict(),
+        }
+        for number, (own, each) in enumerate(zip(train, figures, strict=True), start=1)
+    ]

@@ -11,7 +11,7 @@ from ..base import marks
 from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
 from ..base.units import from_kmh
 from ..metrics import en50367
-from ..metrics.labels import LABELS
+from ..metrics.labels import LABELS, NUMBER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,11 +48,13 @@ def plot_sweep(
     fixed = [f"{named[name]} = {first[name]:g}" for name in parameters if name not in varied]
     if "speed_kmh" not in parameters:
         fixed.append(f"{first['speed_kmh']:g} km/h")
-    early = sum(row["terminated"] for row in rows)
+    passes = [row for row in rows if row.get(NUMBER, 1) == 1]
+    early = sum(row["terminated"] for row in passes)
     spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
-    pair = f"pantograph {first['pantograph']}, line {first['catenary']}"
+    several = "pantographs" if NUMBER in first else "pantograph"
+    pair = f"{several} {pantographs_of(rows)}, line {first['catenary']}"
     title = ", ".join((pair, *fixed, f"spans {spans}"))
-    note = f"\n{early} of {len(rows)} passes ended early and are not shown" if early else ""
+    note = f"\n{early} of {len(passes)} passes ended early and are not shown" if early else ""
     figure.suptitle(f"{title}{note}")
     return figure
 
@@ -67,15 +69,15 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
         shown.remove("contact_loss")
     figure = Figure(figsize=(8, 1 + 2.4 * (1 + len(shown))), layout="constrained")
     force, *others = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    by_policy = _by_policy(rows)
-    for k, of_policy in enumerate(by_policy.values()):
-        values, colour = [row[parameter] for row in of_policy], series_colour(k)
+    series = _series(rows)
+    for k, own in enumerate(series.values()):
+        values, colour = [row[parameter] for row in own], series_colour(k)
         for key, style in FORCES.values():
-            force.plot(values, [row[key] for row in of_policy], style, color=colour, marker=".")
+            force.plot(values, [row[key] for row in own], style, color=colour, marker=".")
         for axis, key in zip(others, shown, strict=True):
-            scaled = [LABELS[key].scale * row[key] for row in of_policy]
+            scaled = [LABELS[key].scale * row[key] for row in own]
             axis.plot(values, scaled, color=colour, marker=".")
-    notes = _draw_limits(force, others[shown.index("std")], next(iter(by_policy.values())), parameter)
+    notes = _draw_limits(force, others[shown.index("std")], next(iter(series.values())), parameter)
     force.set(ylabel="contact force (N)")
     if no_loss:
         notes.append("No contact is lost in any pass.")
@@ -89,11 +91,11 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
     handles = [
         Line2D([], [], color="0.3", linestyle=style, label=name) for name, (_, style) in FORCES.items()
     ]
-    words = f"{en50367.maximum_source(rows[0]['system'])}: maximum; σ of 0.3 F_m ({next(iter(by_policy))})"
+    words = f"{en50367.maximum_source(rows[0]['system'])}: maximum; σ of 0.3 F_m ({next(iter(series))})"
     handles.append(Line2D([], [], color=LIMIT, linestyle=DASHES, linewidth=0.9, label=words))
     handles.append(Line2D([], [], color=LIMIT, linewidth=0.9, label="0 N: no contact"))
     handles += [
-        Line2D([], [], color=series_colour(k), marker=".", label=name) for k, name in enumerate(by_policy)
+        Line2D([], [], color=series_colour(k), marker=".", label=name) for k, name in enumerate(series)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize="small")
     figure.axes[-1].set(xlabel=labels[parameter])
@@ -125,14 +127,14 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
     from matplotlib.figure import Figure
 
     first, second = (np.array(sorted({row[name] for row in rows})) for name in parameters)
-    by_policy = _by_policy(rows)
-    figure = Figure(figsize=(13, 1.2 + 3.5 * len(by_policy)), layout="constrained")
-    axes = figure.subplots(len(by_policy), len(MAPPED), sharex=True, sharey=True, squeeze=False)
+    series = _series(rows)
+    figure = Figure(figsize=(13, 1.2 + 3.5 * len(series)), layout="constrained")
+    axes = figure.subplots(len(series), len(MAPPED), sharex=True, sharey=True, squeeze=False)
     for (key, colours), column in zip(MAPPED.items(), axes.T, strict=True):
         values = [row[key] for row in rows if not isnan(row[key])]
         low, high = (min(values), max(values)) if values else (0.0, 1.0)  # one scale for all policies
-        for axis, (policy, of_policy) in zip(column, by_policy.items(), strict=True):
-            table = {tuple(row[name] for name in parameters): row[key] for row in of_policy}
+        for axis, (policy, own) in zip(column, series.items(), strict=True):
+            table = {tuple(row[name] for name in parameters): row[key] for row in own}
             grid = [[table[x, y] for x in first] for y in second]
             shades: dict[str, Any] = {"vmin": low, "vmax": high, "cmap": colours}
             mesh = axis.pcolormesh(first, second, grid, shading="nearest", **shades)
@@ -143,7 +145,18 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
     return figure
 
 
-def _by_policy(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each policy, in the order in which policies were given."""
-    names = dict.fromkeys(row["policy"] for row in rows)
-    return {name: [row for row in rows if row["policy"] == name] for name in names}
+def _series(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Rows of each policy, and of each pantograph of a train, in the order in which they were given."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        name = f"{row['policy']}, pantograph {row[NUMBER]}" if NUMBER in row else row["policy"]
+        found.setdefault(name, []).append(row)
+    return found
+
+
+def pantographs_of(rows: Sequence[Row]) -> str:
+    """Names of the pantographs of all passes of a sweep, the first in front."""
+    numbers = dict.fromkeys(row.get(NUMBER, 1) for row in rows)
+    return " and ".join(
+        next(row["pantograph"] for row in rows if row.get(NUMBER, 1) == number) for number in numbers
+    )

@@ -31,7 +31,7 @@ def reproduce(
     ),
     json: Json = False,
 ) -> None:
-    """Reproduce a paper's results: print ours next to the paper's, write figures and all numbers."""
+    """Reproduce results of papers and of others: print ours next to theirs, write figures and all numbers."""
     names = studies.STUDIES if name == "all" else (name,)
     chosen = {name: studies.find_study(name) for name in names}
     for name in chosen:  # now: a study takes minutes
@@ -58,7 +58,10 @@ def reproduce(
                 failed.append(error)
                 continue
             if not json:
-                console.print(f"{len(files) - 1} figures and {studies.NUMBERS} are in {output / study}.\n")
+                figures = f"{len(files) - 1 - len(outcome.rows)} figures"
+                csv = [f"{name}.csv" for name in outcome.rows]
+                written = f"{', '.join([figures, *csv])} and {studies.NUMBERS}"
+                console.print(f"{written} are in {output / study}.\n")
     if json:
         print_json(found)
     if failed:
@@ -69,6 +72,8 @@ def _print(outcome: studies.Outcome) -> None:
     for table in outcome.tables:
         print_table(table)
     console.print(_comparisons(outcome))
+    if outcome.verdict:
+        console.print(outcome.verdict)
 
 
 def _comparisons(outcome: studies.Outcome) -> Table:

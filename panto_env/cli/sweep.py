@@ -16,12 +16,14 @@ from ..analysis.pool import MOST_PASSES
 from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
+from ..analysis.sweep_plots import pantographs_of
+from ..analysis.swept_train import with_distances
 from ..base.errors import InputError
 from ..base.table_file import TABLES
 from ..base.version import __version__
 from ..control.identity import plain
 from ..control.settings import run_settings
-from ..metrics.labels import LABELS
+from ..metrics.labels import LABELS, NUMBER
 from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
@@ -36,8 +38,9 @@ def sweep(
         typer.Argument(
             metavar="NAME=VALUES...",
             help="One or two parameters by dotted name, e.g. pantograph.masses.1, "
-            "catenary.contact_wire.tension, actuator.lag, policy.gain or speed_kmh; values as "
-            "start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
+            "catenary.contact_wire.tension, actuator.lag, policy.gain, speed_kmh or distances (of a train's "
+            "second pantograph; distances.1, ... of several behind the first); values as start:stop:count "
+            "or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),
     ],
     policy: Annotated[
@@ -79,7 +82,7 @@ def sweep(
         if plot is not None:
             later(save, plot_sweep(rows, list(values), labels(list(values), **settings)), plot)
         if json:
-            used = plain(run_settings(settings | {"spans": line_spans}))
+            used = plain(run_settings(with_distances(settings | {"spans": line_spans}, values)))
             facts = {"version": __version__, "seed": seed, "settings": used, "spans": parse_spans(spans)}
             print_json(facts | {"rows": rows})
             return
@@ -122,15 +125,18 @@ def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
     first = rows[0]
     at = "" if "speed_kmh" in parameters else f" at {first['speed_kmh']:g} km/h"
     spans = " or ".join(sorted({row["spans"] for row in rows} - {""})) or "none"
-    table = Table(title=f"{first['pantograph']} on {first['catenary']}{at}, spans {spans}")
+    table = Table(title=f"{pantographs_of(rows)} on {first['catenary']}{at}, spans {spans}")
     for name in (*parameters, "policy"):
         heading = re.sub("[._]", "\\g<0>\n", name) if len(name) > 12 else name  # dotted names are long
         table.add_column(heading, overflow="fold", justify="left" if name == "policy" else "right")
+    if NUMBER in first:
+        table.add_column("pantograph", justify="right")
     shown = [key for key in COLUMNS if any(isfinite(row[key]) for row in rows)]
     for key in shown:
         table.add_column(LABELS[key].column, justify="right")
     for row in rows:
         cells = [number(LABELS[key].scale * row[key], 2) for key in shown]
         policy = f"{row['policy']}, ended early" if row["terminated"] else row["policy"]
-        table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *cells)
+        whose = [f"{row[NUMBER]}"] if NUMBER in row else []
+        table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *whose, *cells)
     console.print(table)

@@ -99,6 +99,11 @@ def side_by_side(
     for name, run in zip(names, everything, strict=True):
         if run.terminated:
             raise InputError(f"{run.ending} A run that ended early cannot be judged.")
+        if run.followers:
+            raise InputError(
+                f"{name} is of {len(run.train)} pantographs, which feel each other's waves; a line is judged "
+                "from runs of one pantograph."
+            )
         with _named(name):
             check_clock(run)
     first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))

@@ -291,7 +291,9 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     @property
     def _title(self) -> str:
         plant = self.task.plant
-        return f"pantograph {plant.pantograph.name}, line {plant.catenary.name}"
+        riding = self.task.settings.riding
+        words = "pantograph" if len(riding) == 1 else "pantographs"
+        return f"{words} {' and '.join(own.name for own in riding)}, line {plant.catenary.name}"
 
 
 PantographEnv.__doc__ = described(PantographEnv.__doc__ or "")

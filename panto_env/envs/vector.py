@@ -205,9 +205,10 @@ class PantographVectorEnv(
         frames = []
         for lane in self._drawn:
             task, place = self._lanes.task_of(lane)
-            title = f"lane {lane}: {task.plant.pantograph.name} on {task.plant.catenary.name}"
+            names = " and ".join(own.name for own in task.settings.riding)
+            title = f"lane {lane}: {names} on {task.plant.catenary.name}"
             reward = float(self._reward_so_far[lane])
-            frames.append(self._viewer.frame(task, place // task.agents, title, reward))
+            frames.append(self._viewer.frame(task, place, title, reward))
         return tuple(frames)
 
     @one_at_a_time

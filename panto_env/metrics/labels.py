@@ -47,6 +47,9 @@ LABELS = {
 }
 """Label of every field of ``Figures``, in its order."""
 
+NUMBER = "pantograph_number"
+"""Column with the number of a pantograph in its train, 1 for the first, in tables of several."""
+
 HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS.items()} | {
     "speed_kmh": "speed (km/h)",
     "nominal_force": "nominal_force (N)",

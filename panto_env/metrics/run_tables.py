@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..base.errors import InputError
 from ..base.table_file import WORKBOOKS, Sheet, write_table, write_workbook
@@ -16,12 +18,12 @@ from .by_span import HEADINGS as BY_SPAN
 from .by_span import by_span
 from .droppers import HEADINGS as MOVING
 from .droppers import moving_droppers
-from .labels import HEADINGS, LABELS
+from .labels import HEADINGS, LABELS, NUMBER
 from .low_pass import low_pass
 from .spans import SpanChoice, in_words
 from .stretches import HEADINGS as BY_STRETCH
 from .stretches import by_stretch
-from .trajectory import SERIES, Trajectory
+from .trajectory import SERIES, Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"
 UNITS = {
@@ -41,12 +43,23 @@ VERDICTS = {True: "kept", False: "broken", None: ""}
 def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     """All samples of a run, a row for each time step, with the force behind EN 50317's low-pass, too.
 
-    Uplift and dropper forces are those at supports and droppers that the train reached.
+    Series of pantographs behind the first have its number in the heading, and are empty until it comes onto
+    the line. Uplift and dropper forces are those at supports and droppers that the train reached.
     """
-    columns: dict[str, Any] = {name: getattr(run, name) for name in SERIES}
-    headings = {name: f"{name} ({UNITS.get(name, 'm')})" for name in SERIES}
-    columns[FILTERED] = low_pass(run.contact_force, run.time_step)
-    headings[FILTERED] = f"{FILTERED} to 20 Hz (N)"
+    columns: dict[str, Any] = {}
+    headings: dict[str, str] = {}
+    for number, own in enumerate(run.train, start=1):
+        behind = number > 1
+        series = follower_columns(own, number, len(run.time)) if behind else _series(run)
+        whose = f" of pantograph {number}" if behind else ""
+        force = low_pass(own.contact_force, own.time_step)
+        filtered = np.concatenate([np.full(len(run.time) - len(force), np.nan), force])
+        last = f"{FILTERED}@{number}" if behind else FILTERED
+        columns |= series | {last: filtered}
+        headings |= {
+            key: f"{name}{whose} ({UNITS.get(name, 'm')})" for key, name in zip(series, SERIES, strict=True)
+        }
+        headings[last] = f"{FILTERED}{whose} to 20 Hz (N)"
     measured = [("uplift", run.support_position, "m")]
     measured += [("dropper_force", run.dropper_position, "N")] if with_droppers else []
     for name, places, unit in measured:
@@ -57,15 +70,19 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     return Sheet("run", columns, headings)
 
 
+def _series(run: Trajectory) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in SERIES}
+
+
 def figures(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     """Figures and requirements of runs, a row for each, in the units in which they are printed.
 
-    Raises InputError as ``Trajectory.summary`` does.
+    Each pantograph of a train has its own, over the spans that the last one covers. Raises InputError as
+    ``Trajectory.summary`` does.
     """
     rows: list[dict[str, Any]] = []
-    for run in runs:
-        found, criteria = run.summary(spans), {each.key: each for each in run.compliance(spans)}
-        of_run = _of_run(run, spans)
+    for run, covered, of_run in _each(runs, spans):
+        found, criteria = run.summary(covered), {each.key: each for each in run.compliance(covered)}
         for key, label in LABELS.items():
             value = label.scale * getattr(found, key)
             rows.append(of_run | _figure(key, label.name, label.unit, value, criteria.pop(key, None)))
@@ -81,15 +98,15 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     Values at rest are those of the line as designed; they are missing for lines that have none.
     """
     rows: list[dict[str, Any]] = []
-    for run in runs:
+    for run, covered, of_run in _each(runs, spans):
         at_rest = {(each.get("span"), round(each["position"], 5)): each for each in _at_rest(run.design)}
-        for moving in moving_droppers(run, spans):
+        for moving in moving_droppers(run, covered):
             unknown = dict.fromkeys(("number", *AT_REST))
             known = at_rest.get((moving.span, round(moving.position, 5)), unknown)
             own = moving._asdict()
             if moving.span is None:
                 del own["span"]
-            rows.append(_of_run(run, spans) | known | own)
+            rows.append(of_run | known | own)
     if not rows:
         raise InputError("No forces in droppers are recorded, so there is no table of them.")
     return Sheet.of_rows("droppers", rows, {"speed_kmh": HEADINGS["speed_kmh"], **AT_REST, **MOVING})
@@ -97,13 +114,21 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
 
 def of_spans(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     """Figures span by span. Raises InputError as ``Trajectory.summary`` does."""
-    rows = [_of_run(run, spans) | each._asdict() for each in by_span(run, spans)]
+    rows = [
+        of_run | each._asdict()
+        for own, covered, of_run in _each([run], spans)
+        for each in by_span(own, covered)
+    ]
     return Sheet.of_rows("by span", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_SPAN})
 
 
 def of_stretches(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     """Figures of overlaps, behind them and elsewhere. Raises InputError as ``Trajectory.summary`` does."""
-    rows = [_of_run(run, spans) | each._asdict() for each in by_stretch(run, spans)]
+    rows = [
+        of_run | each._asdict()
+        for own, covered, of_run in _each([run], spans)
+        for each in by_stretch(own, covered)
+    ]
     return Sheet.of_rows("overlaps", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_STRETCH})
 
 
@@ -114,6 +139,9 @@ def facts(run: Trajectory, without: str = "") -> Sheet:
     """
     given: dict[str, Any] = {"version": __version__, **{name: getattr(run, name) for name in RUN}}
     given |= {"nominal_force (N)": f"{run.nominal_force:.6g}", "power supply": run.line.system}
+    for number, own in enumerate(run.followers, start=2):
+        given |= {f"{name} {number}": getattr(own, name) for name in ("pantograph", "policy")}
+        given[f"nominal_force {number} (N)"] = f"{own.nominal_force:.6g}"
     given |= {"ending": run.ending, "no figures because": without}
     given |= {f"setting {name}": value for name, value in run.settings.items()}
     known = {HEADINGS.get(name, name): str(value) for name, value in given.items() if value != ""}
@@ -162,8 +190,20 @@ def _with_figures(runs: Sequence[Trajectory], spans: SpanChoice) -> Sequence[Tra
     return [run for run in runs if not run.terminated or spans is not None] or runs
 
 
-def _of_run(run: Trajectory, spans: SpanChoice) -> dict[str, Any]:
-    return {name: getattr(run, name) for name in RUN} | {"spans": in_words(run.spans(spans))}
+def _each(
+    runs: Sequence[Trajectory], spans: SpanChoice
+) -> Iterator[tuple[Trajectory, SpanChoice, dict[str, Any]]]:
+    """Records of all pantographs of runs, the spans of their figures, and the first cells of their rows.
+
+    Where a run is of several, a column has the number of each.
+    """
+    numbered = any(run.followers for run in runs)
+    for run in runs:
+        covered = run.train[-1].spans(spans) or spans
+        for number, own in enumerate(run.train, start=1):
+            cells = {name: getattr(own, name) for name in RUN}
+            cells |= {NUMBER: number} if numbered else {}
+            yield own, covered, cells | {"spans": in_words(own.spans(covered))}
 
 
 def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dict[str, Any]:

@@ -116,6 +116,12 @@ class Trajectory:
         return self, *self.followers
 
     @property
+    def controlled(self) -> Trajectory:
+        """Record of the controlled collector, of several the first, also where there was no policy."""
+        first: int = self.settings.get("controlled", [1])[0]
+        return self.train[first - 1]
+
+    @property
     def spans_differ(self) -> bool:
         """Whether the line is a sequence of spans, not one that is repeated."""
         return self.alignment.pitch is None or self.line_ends

@@ -15,6 +15,8 @@ from .packages import check_packages
 Colour = tuple[int, int, int]
 PARTS = 4
 """Resolution of places: 1 / 2^PARTS of a pixel."""
+SMALLEST = 8
+"""Minimum size of words (px)."""
 KEPT_WORDS = 2000
 """Number of drawings of words that are kept, since numbers repeat."""
 
@@ -84,7 +86,7 @@ class Canvas:
         anchor: str = "left",
     ) -> float:
         """Draw a line of text and return its width; x: left, middle or right end; y: middle."""
-        shade = _shade(text, max(8, round(size)), bold)
+        shade = _shade(text, max(SMALLEST, round(size)), bold)
         high, wide = shade.shape[:2]
         left = round(x - {"left": 0.0, "middle": 0.5, "right": 1.0}[anchor] * wide)
         top = round(y - 0.5 * high)

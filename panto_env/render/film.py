@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..analysis.simulation import ready_pass, steps_of_policy
 from ..base.errors import InputError
+from ..metrics.figures import Figures
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory
@@ -38,7 +39,7 @@ def excerpt(first: Filmed, first_span: int, seconds: float, slow_motion: float) 
 
     Every n-th control step is a frame. Raises InputError where the pass does not have the span.
     """
-    run, interval = first.run, first.control_interval
+    run, interval = first.run.controlled, first.control_interval
     begin = run.time_at(run.alignment.support(first_span - 1))
     if begin >= run.time[-1]:
         raise InputError(
@@ -78,8 +79,8 @@ def frames(
 def _highest(run: Trajectory, what: Excerpt) -> float:
     """Maximum contact force (N) of a run that a film shows: its first frame shows some before it begins."""
     begin = what.begin - BEHIND * run.alignment.mean_length / run.speed
-    shown = run.contact_force[(run.time >= begin) & (run.time <= what.end)]
-    return float(shown.max(initial=0.0))
+    shown = [own.contact_force[(own.time >= begin) & (own.time <= what.end)] for own in run.train]
+    return max(float(force.max(initial=0.0)) for force in shown)
 
 
 class _Pass:
@@ -90,9 +91,11 @@ class _Pass:
     ) -> None:
         run = filmed.run
         self.task, driver = ready_pass(filmed.policy, filmed.settings, filmed.seed)
-        self._steps = steps_of_policy(self.task, driver, run.policy)
+        self._steps = steps_of_policy(self.task, driver, run.controlled.policy)
         self._picture = Picture(*size, highest)
-        self._title = f"{filmed.title}: pantograph {run.pantograph}, line {run.catenary}"
+        names = [own.pantograph for own in run.train]
+        words = "pantograph" if len(names) == 1 else "pantographs"
+        self._title = f"{filmed.title}: {words} {' and '.join(names)}, line {run.catenary}"
         self._figures = figures
 
     @property
@@ -117,10 +120,15 @@ def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
     run = filmed.run
     if run.terminated:
         return {"figures": "none: it ends early"}
-    figures, spans = run.summary(), in_words(run.spans())
+    figures, spans = _summary(run), in_words(run.train[-1].spans())
     values = {"mean": figures.mean, "std": figures.std}
     texts = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
     if filmed is not first and not first.run.terminated and alike(filmed.run, first.run):
-        change = 100 * (figures.std / first.run.summary().std - 1)
+        change = 100 * (figures.std / _summary(first.run).std - 1)
         texts[f"σ relative to {first.title}"] = f"{change:+.1f} %"
     return texts
+
+
+def _summary(run: Trajectory) -> Figures:
+    """Figures of the pantograph that is shown, over the spans that the last one covers."""
+    return run.controlled.summary(run.train[-1].spans())

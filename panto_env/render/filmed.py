@@ -48,16 +48,16 @@ def saved_passes(sources: Sequence[str]) -> dict[str, Filmed]:
     for source in sources:
         if is_saved_run(source):
             run, settings = load_with_settings(source)
-            check_named(run.policy, source)
-            title = f"{run.policy} ({Path(source).name})"
-            found[source] = Filmed(title, run.policy, settings, run.seed, run, source)
+            check_named(run.controlled.policy, source)
+            title = f"{run.controlled.policy} ({Path(source).name})"
+            found[source] = Filmed(title, run.controlled.policy, settings, run.seed, run, source)
     return found
 
 
 def policy_pass(policy: str, settings: dict[str, Any], seed: int) -> Filmed:
     """The pass of a policy, simulated. Raises InputError as ``simulate`` does."""
     run = simulate(policy=policy, seed=seed, **settings)
-    return Filmed(run.policy, policy, settings, seed, run)
+    return Filmed(run.controlled.policy, policy, settings, seed, run)
 
 
 def check_together(filmed: Sequence[Filmed]) -> None:

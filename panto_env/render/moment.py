@@ -1,4 +1,4 @@
-"""Content of a picture: one lane of a task at one moment, and its force up to then."""
+"""Content of a picture: one pantograph of a task at one moment, its force up to then, and its train."""
 
 from __future__ import annotations
 
@@ -21,9 +21,26 @@ SETTLING = 0.5
 """Time (s) for which the low-pass of the force runs before the shown part."""
 
 
+class Rider(NamedTuple):
+    """One pantograph of a train."""
+
+    name: str
+    position: float  # along the line, negative before it comes onto it (m)
+    places: Array  # (n,): positions of its shown force (m)
+    filtered: Array  # (n,): contact force there, low-passed as below (N)
+
+
+class TrainView(NamedTuple):
+    """A train of several pantographs, and the line from behind the last one to ahead of the first."""
+
+    riders: tuple[Rider, ...]  # the first in front
+    shown: int  # which of them the picture shows, from 0
+    line: LineView
+
+
 @dataclass(frozen=True)
 class Moment:
-    """State of one lane at one moment."""
+    """State of one pantograph at one moment."""
 
     title: str  # names of pantograph, line and policy
     time: float  # since the start (s)
@@ -43,6 +60,7 @@ class Moment:
     actuators: dict[Place, float]  # forces of those that there are (N)
     force_limit: float  # of an actuator (N)
     figures: dict[str, str] = field(default_factory=dict)  # additional texts by name
+    train: TrainView | None = None  # None: the pantograph is the only one
 
 
 class Felt(NamedTuple):
@@ -54,42 +72,55 @@ class Felt(NamedTuple):
     head: Array  # (n,): height of the collector head (m)
 
 
-def position_of(task: Task, lane: int) -> float:
-    """Position of a lane's pantograph (m)."""
+def position_of(task: Task, lane: int, collector: int = 0) -> float:
+    """Position of a pantograph of a lane (m), negative before it comes onto the line."""
     plant = task.plant
-    return float(plant.position(lane, int(plant.of(lane, Row.STEP)))[0])
+    return float(plant.position(lane, int(plant.of(lane, Row.STEP)), collector)[0])
 
 
-def felt(task: Task, lane: int, behind: float) -> Felt:
-    """The contact of a lane of a task that keeps its samples; behind: length of the shown part (spans)."""
+def shown_collector(task: Task, row: int) -> tuple[int, int]:
+    """Lane, and the pantograph that a row of the results controls."""
+    lane, agent = divmod(row, task.agents)
+    return lane, task.episode.controlled[agent]
+
+
+def felt(task: Task, lane: int, behind: float, collector: int = 0) -> Felt:
+    """The contact of a pantograph of a task that keeps its samples; behind: length shown (spans)."""
     plant = task.plant
     steps, speed, step = int(plant.of(lane, Row.STEP)), float(task.speed[lane]), plant.time_step
     length = behind * plant.alignment.mean_length
     count = min(steps, int((length / speed + SETTLING) / step) + 1)
-    places = plant.position(lane, np.arange(steps - count, steps) + 0.5)
-    rows = task.samples.rows[lane, steps - count + 1 : steps + 1, 0]
+    places = plant.position(lane, np.arange(steps - count, steps) + 0.5, collector)
+    rows = task.samples.rows[lane, steps - count + 1 : steps + 1, collector]
+    if collector:  # it may have come onto the line later
+        on_line = places >= 0
+        places, rows = places[on_line], rows[on_line]
     force = rows[:, Row.CONTACT_FORCE].copy()
-    shown = places >= position_of(task, lane) - length
-    filtered = low_pass(force, step)[shown] if count else force
+    shown = places >= position_of(task, lane, collector) - length
+    filtered = low_pass(force, step)[shown] if len(force) else force
     return Felt(places[shown], force[shown], filtered, rows[shown, Row.HEAD_HEIGHT])
 
 
-def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Moment:
-    """Present moment of a lane of a task that keeps its samples."""
+def moment_of(task: Task, row: int, title: str, figures: dict[str, str]) -> Moment:
+    """Present moment of a task that keeps its samples.
+
+    row: of its results: a lane, or where several pantographs of a train are controlled, one of them.
+    """
     plant = task.plant
-    own = plant.run.table[0, lane]
-    speed, position = float(task.speed[lane]), position_of(task, lane)
-    span = plant.alignment.mean_length
-    contact = felt(task, lane, BEHIND)
-    size = len(plant.pantograph.masses)
+    lane, collector = shown_collector(task, row)
+    own = plant.run.table[collector, lane]
+    speed, position = float(task.speed[lane]), position_of(task, lane, collector)
+    span, pantograph = plant.alignment.mean_length, task.settings.riding[collector]
+    contact = felt(task, lane, BEHIND, collector)
+    size = len(pantograph.masses)
     return Moment(
         title=title,
-        time=int(own[Row.STEP]) * plant.time_step,
+        time=int(plant.of(lane, Row.STEP)) * plant.time_step,
         speed=speed,
         position=position,
         alignment=plant.alignment,
         line=plant.model.view(lane, position - BEHIND * span, position + AHEAD * span),
-        masses=np.array(plant.pantograph.masses),
+        masses=np.array(pantograph.masses),
         heights=own[Row.STATE : Row.STATE + size].copy(),
         wire=float(own[Row.WIRE_HEIGHT]),
         places=contact.places,
@@ -101,4 +132,19 @@ def moment_of(task: Task, lane: int, title: str, figures: dict[str, str]) -> Mom
         actuators={place: float(own[Row.FRAME_FORCE + place]) for place in task.actuator.places},
         force_limit=task.actuator.force_limit,
         figures=figures,
+        train=train_of(task, lane, collector),
     )
+
+
+def train_of(task: Task, lane: int, collector: int) -> TrainView | None:
+    """The train of a lane; None for a single pantograph. collector: the one that the picture shows."""
+    plant, riding = task.plant, task.settings.riding
+    if len(riding) == 1:
+        return None
+    span, positions = plant.alignment.mean_length, [position_of(task, lane, k) for k in range(len(riding))]
+    begin, end = positions[-1] - span, positions[0] + AHEAD * span
+    riders = []
+    for number, (pantograph, position) in enumerate(zip(riding, positions, strict=True)):
+        contact = felt(task, lane, (position - begin) / span, number)
+        riders.append(Rider(pantograph.name, position, contact.places, contact.filtered))
+    return TrainView(tuple(riders), collector, plant.model.view(lane, begin, end))

@@ -1,4 +1,4 @@
-"""The picture of a moment: line and pantograph above, contact force so far below."""
+"""The picture of a moment: line and pantograph above, contact force so far below, then the whole train."""
 
 from __future__ import annotations
 
@@ -8,23 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.colours import BLUE, ORANGE, VERMILION
 from ..base.units import to_kmh
 from ..plant.state import Place
-from .canvas import Canvas, Colour, rgb, zigzag
+from .canvas import SMALLEST, Canvas, Colour, zigzag
 from .layout import TITLE, Layout, force_axis, lost
 from .moment import Moment
+from .overview import SHARE, draw_train
+from .palette import (
+    BAD,
+    FAINT,
+    FORCE,
+    GROUND,
+    INK,
+    METAL,
+    PUSH,
+    QUIET,
+    RAW,
+    SUPPORT,
+    TRAIN,
+    WORDS,
+)
 
-GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222, 227, 232)
-METAL, TRAIN, RAW = (70, 78, 88), (196, 204, 213), (186, 194, 203)
-SUPPORT = (135, 144, 154)
 STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
 """Possible distances of the lines of the chart (N), and how many there are at most."""
-FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
 NEAREST = 4
 """Minimum distance of the points of a wire (px)."""
-WORDS = 0.0222
-"""Size of words, as a share of a frame's height; at 720 rows, 16 px."""
 
 
 class Picture:
@@ -45,22 +53,29 @@ class Picture:
         """The frame of a moment, (height, width, 3)."""
         layout = self._layout
         if layout is None or layout.span != moment.alignment.mean_length or moment.time == 0:
-            layout = self._layout = Layout.of(moment, *self._size)
+            width, height = self._size
+            above = height if moment.train is None else round((1 - SHARE) * height)
+            layout = self._layout = Layout.of(moment, width, above)
             self._highest = self._known_highest
-        self._highest = max(self._highest, float(moment.force.max(initial=0.0)))
+        riders = () if moment.train is None else moment.train.riders
+        forces = [moment.force, *(rider.filtered for rider in riders)]
+        self._highest = max(self._highest, *(float(force.max(initial=0.0)) for force in forces))
         axis = force_axis(self._highest, moment.nominal_force, moment.largest_force)
-        rows = _rows(moment)
+        rows, size = _rows(moment), _size(layout)
+        apart = 1.25 * (size if moment.train is None else max(size, SMALLEST))
         what = (layout, moment.title, axis, moment.largest_force, moment.nominal_force, *rows)
         if self._drawn_for != what:
             self._drawn_for = what
             _draw_still(self._still, layout, moment, axis)
-            _draw_rows(self._still, layout, list(rows), named=True)
+            _draw_rows(self._still, layout, list(rows), apart, named=True)
         self.canvas.start_from(self._still)
         _draw_line(self.canvas, layout, moment)
         _draw_pantograph(self.canvas, layout, moment)
         _draw_actuators(self.canvas, layout, moment)
         _draw_force(self.canvas, layout, moment, axis)
-        _draw_rows(self.canvas, layout, list(rows.values()), named=False)
+        _draw_rows(self.canvas, layout, list(rows.values()), apart, named=False)
+        if moment.train is not None:
+            draw_train(self.canvas, moment, layout.height, size, layout.margin, axis)
         return self.canvas.pixels
 
 
@@ -268,11 +283,14 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
 
 def _rows(moment: Moment) -> dict[str, str]:
     """Numbers to the right of the chart, by name."""
-    span = moment.alignment.span_of(moment.position)
+    place = f"{moment.position:.0f} m"
+    if moment.position >= 0:
+        place += f", span {moment.alignment.span_of(moment.position)}"
     force = f"{moment.filtered[-1]:.0f} N" if moment.filtered.size else "–"
     return {
         "speed": f"{to_kmh(moment.speed):.0f} km/h",
-        "place": f"{moment.position:.0f} m, span {span}",
+        **({"pantograph": f"{moment.train.shown + 1} of {len(moment.train.riders)}"} if moment.train else {}),
+        "place": place,
         "time": f"{moment.time:.2f} s",
         "contact force": force,
         "nominal force (- - -)": f"{moment.nominal_force:.0f} N",
@@ -280,11 +298,11 @@ def _rows(moment: Moment) -> dict[str, str]:
     }
 
 
-def _draw_rows(canvas: Canvas, layout: Layout, words: list[str], *, named: bool) -> None:
-    """Draw the names of these numbers, which do not change, or the numbers."""
+def _draw_rows(canvas: Canvas, layout: Layout, words: list[str], apart: float, *, named: bool) -> None:
+    """Draw the names of these numbers, which do not change, or the numbers; apart: distance of rows (px)."""
     size, y = _size(layout), layout.chart[0]
     x = layout.pantograph + 0.03 * layout.width if named else 0.985 * layout.width
     anchor, colour = ("left", QUIET) if named else ("right", INK)
     for each in words:
         canvas.words(x, y, each, colour, size, bold=not named, anchor=anchor)
-        y += 1.25 * size
+        y += apart

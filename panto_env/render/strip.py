@@ -12,7 +12,7 @@ from ..base.units import to_kmh
 from ..control import Task
 from ..metrics import en50367
 from ..plant.state import Row
-from .moment import felt, position_of
+from .moment import Rider, felt, position_of, shown_collector, train_of
 
 SPANS = 3.0
 """Length of the shown part of the line (spans)."""
@@ -32,10 +32,16 @@ class Strip:
     def __init__(self, task: Task, policy: str) -> None:
         """policy: its name. The task must keep its samples."""
         plant = task.plant
-        where = f"{plant.pantograph.name} on {plant.catenary.name} at {to_kmh(task.speed[0]):.4g} km/h"
+        lane, collector = shown_collector(task, 0)
+        riding = task.settings.riding
+        which = f"pantograph {collector + 1} of " if len(riding) > 1 else ""
+        names = " and ".join(own.name for own in riding)
+        where = f"{which}{names} on {plant.catenary.name} at {to_kmh(task.speed[0]):.4g} km/h"
         self._title = f"{where}, policy {policy}"
         self._share = plant.of(0, Row.STEP) / task.end(0)
-        self._felt, self._position = felt(task, 0, SPANS), position_of(task, 0)
+        self._felt, self._position = felt(task, lane, SPANS, collector), position_of(task, lane, collector)
+        train = train_of(task, lane, collector)
+        self._riders = () if train is None else train.riders
         self._alignment = plant.alignment
         self._time = plant.of(0, Row.STEP) * plant.time_step
         self._standard = en50367.maximum_source(plant.catenary.system)
@@ -58,6 +64,8 @@ class Strip:
         ends = f"{begin:.0f} m", f"{begin + length:.0f} m"
         yield Text(" " * AXIS + ends[0] + ends[1].rjust(columns - len(ends[0])), style="dim")
         yield Text(self._in_words())
+        if self._riders:
+            yield Text("  ".join(map(_rider_in_words, range(1, len(self._riders) + 1), self._riders)))
 
     def _in_words(self) -> str:
         where, force = f"{self._time:.2f} s  {self._position:.0f} m", self._felt.filtered
@@ -76,6 +84,14 @@ class Strip:
         marks = np.full(columns, " ")
         marks[_column(across[seen.force <= 0], columns)] = "x"
         return [*lines, Text.assemble(" " * AXIS, ("".join(marks), "bold red"))]
+
+
+def _rider_in_words(number: int, rider: Rider) -> str:
+    """A pantograph of a train: its place, and its force with that of the last spans."""
+    if rider.filtered.size < 2:
+        return f"{number}: {rider.position:.0f} m"
+    near = rider.filtered[-1]
+    return f"{number} {rider.name}: {rider.position:.0f} m, {near:.0f} N, σ {rider.filtered.std():.0f} N"
 
 
 def chart(

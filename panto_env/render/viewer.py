@@ -30,12 +30,15 @@ class Viewer:
         self._pictures: dict[int, Picture] = {}
         self._window: Window | None = None
 
-    def frame(self, task: Task, lane: int, title: str, reward: float) -> NDArray[np.uint8]:
-        """Present frame of a lane of a task, (height, width, 3); reward: sum over the episode so far."""
-        if lane not in self._pictures:
-            self._pictures[lane] = Picture(*self._size)
-        figures = figures_so_far(task, lane) | {"reward so far": f"{reward:.2f}"}
-        return self._pictures[lane].draw(moment_of(task, lane, title, figures))
+    def frame(self, task: Task, row: int, title: str, reward: float) -> NDArray[np.uint8]:
+        """Present frame of a row of a task's results, (height, width, 3).
+
+        row: as ``moment_of`` takes it. reward: sum over the episode so far.
+        """
+        if row not in self._pictures:
+            self._pictures[row] = Picture(*self._size)
+        figures = figures_so_far(task, row) | {"reward so far": f"{reward:.2f}"}
+        return self._pictures[row].draw(moment_of(task, row, title, figures))
 
     def show(self, frame: NDArray[np.uint8], title: str, rate: float) -> None:
         """Show a frame in a window, and wait for the time of the next one; rate: frames per second."""
@@ -52,12 +55,12 @@ class Viewer:
             self._window = None
 
 
-def figures_so_far(task: Task, lane: int) -> dict[str, str]:
-    """Figures of a lane's episode so far, as text; none before the first step, or after it has diverged."""
-    if not task.episode.table[lane, TaskRow.SAMPLES]:
+def figures_so_far(task: Task, row: int) -> dict[str, str]:
+    """Figures of a row's episode so far, as text; none before the first step, or after it has diverged."""
+    if not task.episode.table[row, TaskRow.SAMPLES]:
         return {}
     try:
-        values = task.figures(lane).as_dict()
+        values = task.figures(row).as_dict()
     except InputError:
         return {}
     texts = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in SHOWN}

@@ -66,6 +66,25 @@ def force_along(one: Findings, found: Sequence[Findings]) -> str:
     return drawn(draw, along_line=True)
 
 
+def force_together(one: Findings) -> str:
+    """Contact forces of all pantographs of a train by place, low-passed; one: findings of the first."""
+
+    def draw(axes: Axes) -> None:
+        for k, own in enumerate(one.train):
+            inside = own.inside("all" if one.covered is None else one.covered)
+            smooth = zero_phase_low_pass(own.contact_force, own.time_step)[inside]
+            label = f"pantograph {k + 1}, {own.pantograph}"
+            axes.plot(own.position[inside], smooth, color=series_colour(k), linewidth=1.1, label=label)
+        run, position = one.run, one.run.position[one.inside]
+        supports = run.alignment.supports_within(position[0], position[-1])
+        marks.mark_supports(axes, map(run.alignment.support, supports))
+        axes.set(xlabel=marks.POSITION, xlim=(position[0], position[-1]))
+        axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
+        legend_above(axes, 4)
+
+    return drawn(draw, along_line=True)
+
+
 def force_folded(names: Mapping[Findings, str]) -> str:
     """Contact force over the place within the span: median, minimum and maximum of all spans.
 
@@ -157,6 +176,12 @@ def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
     return dict(zip(found, names, strict=True))
 
 
+def of_run(one: Findings, name: str) -> str:
+    """Name for what all pantographs of a run share; name: of these findings."""
+    return f"train of {len(one.train)} pantographs ({one.file})" if one.train else name
+
+
 def _parts(one: Findings) -> tuple[str, ...]:
     run = one.run
-    return run.catenary, run.pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"
+    pantograph = f"{one.number} {run.pantograph}" if one.number else run.pantograph
+    return run.catenary, pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"

@@ -16,6 +16,7 @@ from ..metrics.criterion import Criterion
 from ..metrics.droppers import MovingDropper, moving_droppers
 from ..metrics.figures import Figures, losses_of_contact
 from ..metrics.low_pass import low_pass
+from ..metrics.spans import SpanChoice
 from ..metrics.stretches import StretchFigures, by_stretch
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
@@ -47,28 +48,47 @@ class Folded(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All findings of one run; two objects are never equal."""
+    """All findings of one run, of a train those of one pantograph; two objects are never equal."""
 
     run: Trajectory
     file: str
+    number: int = 0  # of the pantograph in a train, from 1; 0: it is the only one
+    train: tuple[Trajectory, ...] = ()  # records of all pantographs of the train
+
+    @classmethod
+    def of(cls, run: Trajectory, file: str) -> list[Findings]:
+        """Findings of each pantograph of a run."""
+        if not run.followers:
+            return [cls(run, file)]
+        return [cls(own, file, number, run.train) for number, own in enumerate(run.train, start=1)]
+
+    @property
+    def leads(self) -> bool:
+        """Whether it is the first pantograph, or the only one: what concerns the whole run is said there."""
+        return self.number <= 1
+
+    @property
+    def riding(self) -> list[str]:
+        """Names of all pantographs of the run."""
+        return [own.pantograph for own in self.train or (self.run,)]
 
     @cached_property
     def covered(self) -> Spans | None:
-        """The evaluated spans; None where the run ended early or is too short."""
+        """The evaluated spans, of a train the last one's; None where it ended early or is too short."""
         try:
-            return self.run.spans()
+            return (self.train or (self.run,))[-1].spans()
         except InputError:
             return None
 
     @cached_property
     def figures(self) -> Figures | None:
         """Figures of the evaluated spans."""
-        return None if self.covered is None else self.run.summary()
+        return None if self.covered is None else self.run.summary(self.covered)
 
     @cached_property
     def criteria(self) -> list[Criterion]:
         """Requirements, and values without limits."""
-        return [] if self.covered is None else self.run.compliance()
+        return [] if self.covered is None else self.run.compliance(self.covered)
 
     @cached_property
     def line(self) -> Any:
@@ -83,7 +103,10 @@ class Findings:
     @cached_property
     def remarks(self) -> list[str]:
         """Sentences about values far from the catalogue's, as a wrong unit makes them."""
-        return unusual(self.line) + unusual(self.pantograph)
+        if self.leads:
+            return unusual(self.line) + unusual(self.pantograph)
+        known = [own.design["pantograph"] for own in self.train[: self.number - 1]]
+        return [] if self.run.design["pantograph"] in known else unusual(self.pantograph)
 
     def _design(self, part: str) -> dict[str, Any]:
         if part not in self.run.design:
@@ -93,10 +116,16 @@ class Findings:
             )
         return dict(self.run.design[part])
 
+    @property
+    def _chosen(self) -> SpanChoice:
+        if self.covered is None:
+            return "all"
+        return self.covered if self.train else None  # the default of a single pantograph
+
     @cached_property
     def inside(self) -> Any:
         """Samples in the evaluated spans, (n,)."""
-        return self.run.inside("all" if self.covered is None else None)
+        return self.run.inside(self._chosen)
 
     @cached_property
     def filtered(self) -> Array:
@@ -133,12 +162,12 @@ class Findings:
         """Figures of each evaluated span, or of all that the run covers, where spans differ."""
         if not self.run.spans_differ:
             return []
-        return by_span(self.run, "all" if self.covered is None else None)
+        return by_span(self.run, self._chosen)
 
     @cached_property
     def by_stretch(self) -> list[StretchFigures]:
         """Figures of overlaps, of what lies behind them and of all else; none where there are no overlaps."""
-        return by_stretch(self.run, "all" if self.covered is None else None)
+        return by_stretch(self.run, self._chosen)
 
     @cached_property
     def at_rest(self) -> list[RestingDropper]:
@@ -148,7 +177,7 @@ class Findings:
     @cached_property
     def droppers(self) -> list[MovingDropper]:
         """Droppers by place in the span, or one by one where spans differ: forces over the evaluated run."""
-        return moving_droppers(self.run, "all" if self.covered is None else None)
+        return moving_droppers(self.run, self._chosen)
 
     @cached_property
     def losses(self) -> list[Loss]:

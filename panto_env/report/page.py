@@ -30,17 +30,20 @@ def page(found: Sequence[Findings]) -> str:
     Raises InputError where there are too many runs, or one does not hold its line and pantograph.
     """
     if not 1 <= len(found) <= MOST:
-        raise InputError(f"A report shows 1 to {MOST} runs, not {len(found)}.")
+        each = ", each pantograph of a train counted" if any(one.number for one in found) else ""
+        raise InputError(f"A report shows 1 to {MOST} runs, not {len(found)}{each}.")
     words = {"value": value_in_words, "limits": limits_in_words, "margin": margin_in_words}
     template = page_template("panto_env.report", number=number, digits=digits, **words)
     names = charts.names_of(found)
     judged = {one: name for one, name in names.items() if one.figures is not None}
+    felt = {one: charts.of_run(one, name) for one, name in names.items() if one.leads}
     lines = _different(found, "line")
     return template.render(
         version=__version__,
         title=_title(found),
         names=[names[one] for one in found],
         name_of=names,
+        felt=felt,
         found=found,
         labels=LABELS,
         figures=[[getattr(one.figures, key, math.nan) for one in found] for key in LABELS],
@@ -51,9 +54,10 @@ def page(found: Sequence[Findings]) -> str:
         pantographs=_different(found, "pantograph"),
         stiffness={one: charts.stiffness(one) for one in lines if one.elasticity},
         along=[charts.force_along(one, found) for one in found],
+        together={one: charts.force_together(one) for one in found if one.number == 1},
         folded=charts.force_folded(judged) if judged else "",
         spectrum=charts.spectrum(judged) if judged else "",
-        uplifts=charts.uplifts(names) if any(one.uplifts for one in found) else "",
+        uplifts=charts.uplifts(felt) if any(one.uplifts for one in felt) else "",
         words={"accuracy": ACCURACY, "filter": FILTER, "left_out": LEFT_OUT},
     )
 
@@ -64,7 +68,7 @@ def save(files: Sequence[str | Path], path: str | Path) -> None:
     Raises InputError for a name with another suffix, or files that are not runs.
     """
     check_output(path, PAGES)
-    found = [Findings(Trajectory.load(file), Path(file).name) for file in files]
+    found = [one for file in files for one in Findings.of(Trajectory.load(file), Path(file).name)]
     text = page(found)
     with write_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -81,7 +85,7 @@ def digits(value: float) -> str:
 
 
 def _title(found: Sequence[Findings]) -> str:
-    pairs = {f"{one.run.pantograph} on {one.run.catenary}" for one in found}
+    pairs = {f"{' and '.join(one.riding)} on {one.run.catenary}" for one in found}
     speeds = sorted({one.run.speed_kmh for one in found})
     return f"{', '.join(sorted(pairs))} at {', '.join(f'{speed:g}' for speed in speeds)} km/h"
 
@@ -95,7 +99,7 @@ def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]
     alike: dict[str, list[Findings]] = {}
     for one in found:
         alike.setdefault(getattr(one, part).model_dump_json(), []).append(one)
-    return {runs[0]: [one.file for one in runs] for runs in alike.values()}
+    return {runs[0]: list(dict.fromkeys(one.file for one in runs)) for runs in alike.values()}
 
 
 def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:

@@ -1,7 +1,6 @@
 """Fixed sentences of a report: limits of the model, accuracy, and meaning of its figures."""
 
 LEFT_OUT = (
-    "several pantographs on one line, and the waves that run from one to another",
     "overlaps of two sections, section insulators, crossings and neutral sections",
     "curves, stagger and the lateral plane",
     "wind on the wires, side wind, tunnels; ice and temperature that differ along the line",

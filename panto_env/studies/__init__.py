@@ -1,4 +1,4 @@
-"""Papers reproduced: each study computes ours beside the paper's, with tables, plots and a JSON."""
+"""What papers and others found, reproduced: each study has ours beside theirs, tables, plots and a JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,13 @@ __all__ = [
     "write",
 ]
 
-STUDIES: tuple[str, ...] = ("paper1-identification", "paper1-control", "paper2", "paper3-parameters")
+STUDIES: tuple[str, ...] = (
+    "paper1-identification",
+    "paper1-control",
+    "paper2",
+    "paper3-parameters",
+    "spacing",
+)
 """Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""
 
 

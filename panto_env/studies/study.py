@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -11,6 +11,8 @@ from ..analysis.plots import save
 from ..base.checksums import write_checked
 from ..base.files import check_output, finite, make_folder
 from ..base.table import Table
+from ..base.table_file import write_rows
+from ..metrics.labels import HEADINGS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,11 +58,16 @@ class Outcome:
     tables: tuple[Table, ...] = ()
     plots: Mapping[str, Figure] = field(default_factory=dict)  # by file name, without suffix
     numbers: Mapping[str, Any] = field(default_factory=dict)  # every number behind tables and plots
+    rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)  # of CSV, by file name
+    verdict: str = ""  # what it comes to, in a sentence or two
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: nan becomes None."""
         comparisons = [comparison.as_dict() for comparison in self.comparisons]
-        table: dict[str, Any] = finite({"title": self.title, "comparisons": comparisons, **self.numbers})
+        said = {"verdict": self.verdict} if self.verdict else {}
+        table: dict[str, Any] = finite(
+            {"title": self.title, **said, "comparisons": comparisons, **self.numbers}
+        )
         return table
 
 
@@ -77,7 +84,7 @@ def check_writable(folder: Path) -> None:
 
 
 def write(outcome: Outcome, folder: str | Path) -> list[Path]:
-    """Write the numbers as JSON and the plots as PNG into a folder; the files written."""
+    """Write the numbers as JSON, plots as PNG and rows as CSV into a folder; the files written."""
     folder = Path(folder)
     make_folder(folder)
     files = [folder / NUMBERS]
@@ -85,4 +92,7 @@ def write(outcome: Outcome, folder: str | Path) -> list[Path]:
     for name, plot in outcome.plots.items():
         files.append(folder / f"{name}.png")
         save(plot, files[-1])
+    for name, rows in outcome.rows.items():
+        files.append(folder / f"{name}.csv")
+        write_rows(rows, files[-1], HEADINGS)
     return files

@@ -308,6 +308,7 @@ def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
         ({"catenary": "re330"}, "different lines, 're330' and 'en50318-2002'"),
         ({"speed": 224.0 / 3.6}, "Passes at 224 and 220.* cannot be compared: speeds may differ by 1 %"),
         ({"terminated": True, "ending": "It ended."}, "It ended. A run that ended early cannot be judged"),
+        ({"followers": (None,)}, "Healthy run .* is of 2 pantographs, which feel each other's waves"),
         ({"dropper_position": np.zeros(0)}, "No run says where the line's droppers are"),
     ],
 )

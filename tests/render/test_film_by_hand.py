@@ -29,7 +29,7 @@ RUN = SimpleNamespace(
 
 
 def passed(interval):
-    return SimpleNamespace(run=RUN, control_interval=interval)
+    return SimpleNamespace(run=SimpleNamespace(controlled=RUN), control_interval=interval)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,8 @@ from panto_env.render.film import Excerpt, _highest, excerpt, figures_in_words, 
 from panto_env.render.filmed import check_together, policy_pass
 from panto_env.render.layout import Layout, force_axis
 from panto_env.render.moment import moment_of
-from panto_env.render.picture import QUIET, SUPPORT, Picture
+from panto_env.render.palette import QUIET, SUPPORT
+from panto_env.render.picture import Picture
 from panto_env.render.video import write_film
 
 SIZE = (640, 360)

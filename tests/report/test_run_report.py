@@ -13,12 +13,11 @@ from typer.testing import CliRunner
 
 from panto_baselines.report.command import report as report_command
 from panto_env import InputError, Trajectory, simulate
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
-from panto_env.plant.train import Train
 from panto_env.report import charts, save
 from panto_env.report.findings import Findings
 from panto_env.report.page import digits, page
@@ -142,15 +141,12 @@ def test_what_is_left_out_is_named_as_long_as_it_is_not_computed():
     """A line that does one of these has to take it off the list."""
     words = "; ".join(LEFT_OUT)
     for each in (
-        "several pantographs",
         "overlaps",
         "curves",
         "wind",
         "rigid rail",
     ):
         assert each in words
-    with pytest.raises(InputError, match="several pantographs on one line cannot be computed yet"):
-        Train(Train.of(load_pantograph("dsa380")).collectors * 2)
     assert set(CATENARIES) == {"flexible", "three_span", "periodic_stiffness", "rig"}  # no rigid rail
 
 

@@ -1,0 +1,1 @@
+"""Distances between two pantographs: which are bad, and which theory says so."""
