@@ -190,7 +190,8 @@ class _Contact:
         columns[:, 0] = wires.predict()
         for k, (unknowns, values, *_) in enumerate(points):
             columns[unknowns, 1 + k] = values
-        acceleration, *per_forces = self.solve(columns).T
+        acceleration, *rows = self.solve(columns).T
+        per_forces = np.array(rows)  # (wires over the strip, unknowns)
         wires.correct(acceleration)
         chain.correct(self.chain_inverse @ (chain.predict() + self.lift))
 
@@ -215,12 +216,12 @@ class _Contact:
             along = rates * values + self.c * self.speed * wires.shift * slopes
             self.matrix[:n, n + pair] = self.gain * (system.extension @ per_force)
             self.matrix[n + pair, :n] = -(along @ self.per_tension[unknowns])
-            self.matrix[n + pair, n + pair] += along @ per_force[unknowns]
+            self.matrix[n + pair, touching] += along @ per_forces[:, unknowns].T
             self.matrix[n + pair, touching] += rates * self.chain_inverse[0, 0]
         forces, rest = complementarity(self.matrix, offset, self.active)
 
         slack, on_wires = np.flatnonzero(self.active[:n]), forces[n:]
-        change = np.array(per_forces).T @ on_wires[over] - self.per_tension[:, slack] @ forces[slack]
+        change = per_forces.T @ on_wires[over] - self.per_tension[:, slack] @ forces[slack]
         head = -self.chain_inverse[:, 0] * on_wires.sum()
         for part, extra in ((wires, change), (chain, head)):
             part.u += part.shift * extra
