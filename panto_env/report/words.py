@@ -1,10 +1,11 @@
 """Fixed sentences of a report: limits of the model, accuracy, and meaning of its figures."""
 
 LEFT_OUT = (
-    "overlaps of two sections, section insulators, crossings and neutral sections",
+    "section insulators, crossings and neutral sections",
+    "two contact wires whose droppers alternate: they are one equivalent wire",
     "curves, stagger and the lateral plane",
-    "wind on the wires, side wind, tunnels; ice and temperature that differ along the line",
-    "rigid rails and third rails; stitch wires, so that a stitched line is stiffer at its supports here",
+    "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
+    "rigid rails and third rails",
     "roll and pitch of the collector head and its two strips: it is one point",
     "motion of the vehicle and of the track",
     "longitudinal motion of droppers and arms, large rotations: motion is linear about the static shape, but "

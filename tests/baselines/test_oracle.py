@@ -18,6 +18,7 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.controls import Tape
 from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.benchmark.single_pass import along
@@ -32,11 +33,21 @@ from panto_env import InputError, simulate
 from panto_env.base.checksums import with_checksum
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import actuator_settings
+from panto_env.plant.state import Row
 
+from ..finite_element.sections import line_of
 from ..pages import check_page, tables_of
 
 SHORT: dict[str, Any] = {"line_condition": "smooth", "actuator": "realistic", "speed_kmh": 300.0}
 SPANS = (2, 2)
+OVERLAP = SHORT | {
+    "catenary": line_of(
+        "en50318-2002", {"sequence": [{}] * 10, "overlaps": [{"first_span": 1, "rises": [0.1, 0.5]}]}
+    ),
+    "actuator": "ideal",
+}
+"""The wires change in the evaluated span."""
+WIRES = Row.CONTACT_FORCE, Row.SECOND_FORCE
 LINEAR: dict[str, Any] = {
     "catenary": "periodic-stiffness",
     "pantograph": "three-mass",
@@ -98,7 +109,9 @@ def test_limits_are_those_of_the_real_actuator():
 # --- the response --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("given", [SHORT | {"actuator": "ideal"}, LINEAR], ids=["flexible", "massless"])
+@pytest.mark.parametrize(
+    "given", [SHORT | {"actuator": "ideal"}, OVERLAP, LINEAR], ids=["flexible", "overlap", "massless"]
+)
 def test_response_is_the_difference_of_whole_runs(given: dict[str, Any], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(problem, "MEMORY", 100.0)
     asked = Problem(given, seed=3, spans=SPANS)
@@ -182,6 +195,23 @@ def test_every_iteration_is_better_and_the_mean_stays(short: Problem, descent: s
     assert descent.iterations[0].std == pytest.approx(passive.std, rel=1e-12)
     assert descent.std < 0.8 * passive.std
     assert descent.iterations[-1].mean == pytest.approx(passive.mean, rel=search.MEAN_TOLERANCE)
+
+
+def test_an_oracle_is_found_where_wires_change():
+    asked = Problem(OVERLAP, seed=3, spans=SPANS)
+    found = descend(asked, "zero", np.zeros((asked.count, 1)), iterations=3)
+    assert found.std < 0.8 * asked.figures.std
+    forces: list[list[float]] = []
+    run = simulate(
+        **OVERLAP,
+        policy=Tape(asked.knots.commands(found.knots) / asked.knots.limit),
+        seed=3,
+        evaluated=SPANS,
+        watch=lambda task: forces.append([task.plant.of(0, row) for row in WIRES]),
+    )
+    assert run.summary(SPANS).std == pytest.approx(found.std, rel=1e-12)
+    total, second = np.array(forces).T
+    assert ((second > 0) & (second < total)).any()
 
 
 def test_simulate_says_the_same_to_the_digit(short: Problem, descent: solver.Descent):

@@ -1,8 +1,10 @@
-"""Both codes side by side: ``python -m tests.finite_element [--sections | --trains]``."""
+"""Both codes side by side: ``python -m tests.finite_element [--sections | --trains | --twin]``."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -13,12 +15,14 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318.convergence import in_use
 
-from . import simulation
+from . import simulation, twin
 from .differences import at_rest
+from .figures import Run
 from .figures import figures as figures_of
 from .pictures import draw
-from .sections import sections
+from .sections import Section, sections
 from .trains import cases
+from .windy import ALIKE, STRONG, WIND, by_both, compared
 
 NAME = "en50318-2002"
 OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precision="double"))
@@ -53,31 +57,33 @@ def main() -> None:
     Console().print(table)
 
 
-def compare_at_rest() -> None:
-    """Print the largest differences of both codes at rest, section by section."""
+def compare_at_rest(only: str) -> None:
+    """Print the largest differences of both codes at rest, of sections that have a text in their name."""
     table = Table("section", "contact wire (mm)", "messenger (mm)", "droppers' forces (N)", "lengths (mm)")
     for name, section in sections().items():
+        if only not in name:
+            continue
         found = at_rest(section.line)
         values = (1e3 * found.contact, 1e3 * found.messenger, found.force, 1e3 * found.length)
         table.add_row(name, *(f"{value:.4f}" for value in values))
-    Console().print(table)
+    if table.rows:
+        Console().print(table)
 
 
-def compare_sections(folder: Path) -> None:
-    """Print the figures of each section of unlike spans by both codes, and draw their forces in a folder."""
+def compare_sections(only: str, folder: Path) -> None:
+    """Print the figures of passes by both codes, of those that have a text in their name, and draw them."""
     table = Table("section", "model", "F_m (N)", "σ (N)", "max (N)", "min (N)", "uplift per support (mm)")
-    for name, section in sections().items():
-        runs = {
-            "finite differences": section.by_simulator(),
-            "finite elements": section.by_finite_elements(),
-        }
+    for name, (make, spans) in passes().items():
+        if only not in name:
+            continue
+        runs = make()
         for model, run in runs.items():
-            found = figures_of(run, section.spans)
+            found = figures_of(run, spans)
             values = (found.mean, found.std, found.maximum, found.minimum)
             uplifts = " ".join(f"{each:.1f}" for each in found.uplifts_mm)
             table.add_row(name, model, *(f"{value:.2f}" for value in values), uplifts)
         table.add_section()
-        draw({model: [run] for model, run in runs.items()}, section.spans, folder / f"{name}.png")
+        draw({model: [run] for model, run in runs.items()}, spans, folder / f"{name}.png")
     Console().print(table)
 
 
@@ -105,17 +111,58 @@ def compare_trains(folder: Path, element: float | None = None) -> None:
     Console().print(table)
 
 
+def compare_twins() -> None:
+    """Print the figures of two contact wires with alternating droppers, and of one equivalent wire."""
+    table = Table("km/h", "droppers (m)", "model", "F_m (N)", "σ (N)", "max (N)", "min (N)", "uplift (mm)")
+    for name in ("σ of a wire (N)", "share of a wire (%)", "one wire alone (% of the way)"):
+        table.add_column(name)
+    for speed, spacing in twin.CASES:
+        one = twin.section(speed, spacing)
+        twins = twin.along_twins(one, twin.ALTERNATING)
+        by_wire = twin.shared(twins, one.spans)
+        own = (f"{by_wire.std:.2f}", f"{by_wire.first:.1f}", f"{by_wire.alone:.1f}")
+        rows = {
+            "finite differences, one wire": (one.by_simulator(), ()),
+            "finite elements, one wire": (one.by_finite_elements(), ()),
+            "finite elements, two wires": (twins, own),
+        }
+        for model, (run, more) in rows.items():
+            found = figures_of(run, one.spans)
+            values = (found.mean, found.std, found.maximum, found.minimum)
+            forces = (f"{value:.2f}" for value in values)
+            table.add_row(f"{speed:g}", f"{spacing:g}", model, *forces, f"{found.uplift_mm:.1f}", *more)
+        table.add_section()
+    Console().print(table)
+
+
+def passes() -> dict[str, tuple[Callable[[], dict[str, Run]], tuple[int, int]]]:
+    """By name, what makes the runs of both codes, and the spans whose figures are compared."""
+
+    def along(section: Section) -> dict[str, Run]:
+        return {"finite differences": section.by_simulator(), "finite elements": section.by_finite_elements()}
+
+    return {name: (partial(along, section), section.spans) for name, section in sections().items()} | {
+        "gusts": (partial(by_both, ALIKE, STRONG, side_wind=WIND), compared(ALIKE))
+    }
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m tests.finite_element", description=__doc__)
-    parser.add_argument("--sections", action="store_true", help="sections of unlike spans, with pictures")
+    parser.add_argument(
+        "--sections", action="store_true", help="sections of unlike spans, and wind, with pictures"
+    )
+    parser.add_argument("--only", default="", help="of these, those that have this text in their name")
     parser.add_argument("--trains", action="store_true", help="several collectors, with pictures")
     parser.add_argument("--element", type=float, help="of trains (m), instead of each one's own")
+    parser.add_argument("--twin", action="store_true", help="two contact wires beside one equivalent wire")
     parser.add_argument("--output", type=Path, default=Path("runs/finite-element"), help="for the pictures")
     given = parser.parse_args()
     if given.sections:
-        compare_at_rest()
-        compare_sections(given.output)
+        compare_at_rest(given.only)
+        compare_sections(given.only, given.output)
     elif given.trains:
         compare_trains(given.output, given.element)
+    elif given.twin:
+        compare_twins()
     else:
         main()

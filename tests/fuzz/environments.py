@@ -22,6 +22,7 @@ from pydantic import ValidationError
 
 from panto_env import InputError
 from panto_env.catalog import available, load_catenary, load_pantograph
+from panto_env.catalog.loader import load_drawn
 
 from .processes import End, run_all
 
@@ -91,11 +92,17 @@ def case_of(seed: int) -> dict[str, Any]:
         "speed_drift": one_of(random, 0.0, 5.0),
         "mean_force": one_of(random, None, None, 90.0),
     }
+    if drawn := drawn_of(np.random.default_rng([seed, 1])):
+        entries["catenary"] = drawn
+        settings["speed_kmh"] = (50.0, 450.0)  # of which those of the drawn lines are left
+        settings["line_condition"] = one_of(random, "new", "fair", "worn", *CONDITIONS["flexible"])
     chosen = {name: value for name, value in settings.items() if name in KEEP or random.random() < 0.4}
     entries = {
         name: (type(entry), varied(entry.model_dump(mode="json"), random, most))
         for name, entry in entries.items()
     }
+    if drawn and seed % 2:  # as it is: with other ranges most are refused
+        entries["catenary"] = (type(drawn), drawn.model_dump(mode="json"))
     return {
         "entries": entries,
         "settings": chosen,
@@ -105,7 +112,19 @@ def case_of(seed: int) -> dict[str, Any]:
     }
 
 
-CONDITIONS = {"flexible": ("as-built", "as-built", {"ice": 0.5}, {"ice": 0.2, "wind": 12.0})}
+def drawn_of(random: np.random.Generator) -> Any:
+    """In some cases a family of lines, or a section, to draw a line from in each episode."""
+    if random.random() > DRAWN:
+        return None
+    names = [f"{kind}:{name}" for kind in ("family", "section") for name in available(kind)]
+    return load_drawn(one_of(random, *names))
+
+
+DRAWN = 1 / 6
+"""Share of cases whose lines are drawn."""
+CONDITIONS = {
+    "flexible": ("as-built", "as-built", {"ice": 0.5}, {"ice": 0.2, "wind": 12.0}, {"side_wind": 25.0})
+}
 """Further conditions that lines of a kind have."""
 KEEP = ("speed_kmh", "distance")
 HANDS = ("uniform", "reversed", "full", "huge", "wrong")

@@ -28,7 +28,8 @@ from panto_env import Trajectory, simulate
 from panto_env.base.array_file import write_arrays
 from panto_env.base.checksums import read_checked
 from panto_env.catalog import available, load_catenary, load_pantograph
-from panto_env.catalog.loader import text_of
+from panto_env.catalog.loader import load_family, load_section, text_of
+from panto_env.catalog.masts import line_from_masts
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification.record_file import read_record
 from panto_env.rig.computer import load_rig
@@ -65,6 +66,12 @@ def subjects(folder: Path) -> dict[str, Subject]:
         f"pantograph {name}": Subject("TOML", _entry(name, folder), _pantograph)
         for name in ("three-mass", "own-two-mass")
     }
+    drawn = (("family", load_family), ("section", load_section))
+    found |= {
+        f"{kind} {name}": Subject("TOML", _entry(name, folder), load)
+        for kind, load in drawn
+        for name in available(kind)
+    }
     configs = ROOT / "configs"
     found |= {
         "training": Subject("TOML", configs / "agent-high-speed.toml", load_training),
@@ -74,6 +81,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "designs": Subject("TOML", configs / "dataset-designs.toml", load_designs),
         "gains": Subject("TOML", next((configs / "policies").glob("*.toml")), load_gains),
         "record": Subject("CSV", folder / "rig.csv", read_record),
+        "masts": Subject("CSV", ROOT / "examples" / "masts.csv", lambda path: line_from_masts("re250", path)),
         "motion": Subject("CSV", folder / "motion.csv", lambda path: read_motion(path, 120.0)),
         "evaluations": Subject("CSV", run.evaluations, _evaluations),
         "saved run": Subject("Parquet", folder / "run.parquet", Trajectory.load, checked=True),
