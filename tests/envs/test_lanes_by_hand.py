@@ -85,6 +85,7 @@ def test_a_run_that_diverged_has_no_figures_and_the_warning_is_the_caller_s():
     task = SimpleNamespace(
         figures_of=lambda lanes: ({"mean": np.array([1.0, 2.0])}, without),
         divergence=lambda lane: f"Lane {lane} diverged.",
+        agents=1,
     )
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")

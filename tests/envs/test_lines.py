@@ -136,7 +136,7 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
     for seed in (0, 1):
         env.reset(seed=seed)
         task = env.unwrapped.task
-        target, spread = task.targets(task.speed, np.array([120.0]))
+        target, spread = task.targets(0, task.speed, np.array([120.0]))
         targets.append((float(target[0]), float(spread[0])))
     assert targets[0] != targets[1]
     assert all(100 < target < 125 and 8 < spread < 60 for target, spread in targets)

@@ -8,6 +8,7 @@ import pytest
 from panto_env import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control.settings import run_settings
+from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.drift import draw_drift
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Collector, Train
@@ -15,10 +16,16 @@ from panto_env.plant.train import Collector, Train
 ONE = Train.of(load_pantograph("dsa380"))
 
 
-@pytest.mark.parametrize("count", [0, 2, 3])
-def test_any_number_of_collectors_but_one_is_refused_in_a_sentence(count):
-    with pytest.raises(InputError, match=f"must have one collector, not {count}: several pantographs"):
+@pytest.mark.parametrize("count", [0, 5])
+def test_too_few_or_too_many_collectors_are_refused_in_a_sentence(count):
+    with pytest.raises(InputError, match=f"must have 1 to 4 pantographs, not {count}"):
         Train(ONE.collectors * count)
+
+
+def test_different_actuators_are_refused_in_a_sentence():
+    other = replace(ONE.first, actuator=actuator_settings("realistic"), distance=50.0)
+    with pytest.raises(InputError, match="must have the same actuator and sensors"):
+        Train((ONE.first, other))
 
 
 def test_settings_of_a_run_say_who_rides():
