@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable
@@ -29,6 +30,10 @@ SECTION = 5 * (50.0, 65.0, 55.0, 70.0, 60.0, 60.0)
 """Lengths of spans (m) of a line whose spans differ; their mean is that of the line with equal ones."""
 OVERLAP: dict[str, Any] = {"first_span": 13, "rises": [0.1, 0.5]}
 STITCH_WIRE = {"length": 16.0, "tension": 2800.0, "mass": 0.31}
+TRAINS = ((), (200.0,), (70.0, 140.0, 200.0))
+"""Distances of pantographs behind the first (m), of trains whose cost is compared with that of one."""
+TRAIN_WINDOW = 20
+"""Spans about all of them, so that their wires cost the same."""
 DISCRETISATIONS: tuple[dict[str, Any], ...] = (
     {},
     {"precision": "double"},
@@ -117,7 +122,30 @@ def cost_of_settings(repeats: int, report: Report) -> dict[str, list[dict[str, A
     for what, entry in _lines().items():
         speed, _ = measured({"catenary": entry, "distance": 27 * entry.stride}, what)
         lines.append({"line": what} | speed)
-    return {"spans": spans, "modes": modes, "discretisation": discretisations, "lines": lines}
+    trains = []
+    for distances in TRAINS:
+        count = 1 + len(distances)
+        speed, task = measured(_train(distances), f"{count} pantographs on one wire")
+        assert task.plant.model.line.window == TRAIN_WINDOW
+        trains.append({"pantographs": count} | speed)
+    return {
+        "spans": spans,
+        "modes": modes,
+        "discretisation": discretisations,
+        "lines": lines,
+        "trains": trains,
+    }
+
+
+def _train(distances: tuple[float, ...]) -> dict[str, Any]:
+    """Settings of a train of reference pantographs in a window as wide as the others'."""
+    line = load_catenary("en50318-2002")
+    spans_of_train = math.ceil(max(distances, default=0.0) / line.span_length)
+    window = {"window": TRAIN_WINDOW - spans_of_train, "distance": 20 * line.span_length}
+    if not distances:
+        return window | {"pantograph": "en50318-2002"}
+    count = 1 + len(distances)
+    return window | {"pantographs": ["en50318-2002"] * count, "distances": distances}
 
 
 def _lines() -> dict[str, FlexibleCatenaryData]:

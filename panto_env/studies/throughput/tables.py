@@ -79,6 +79,14 @@ def details(result: Row) -> list[Table | str]:
         (f"{row['line']}, {row['times_real_time'] / lines[0]['times_real_time']:.2f} of the speed", row)
         for row in lines
     ]
+    trains = scaling.get("trains", [])  # older results have none
+    of_trains = [
+        (
+            f"{row['pantographs']}, {trains[0]['times_real_time'] / row['times_real_time']:.2f} of the time",
+            row,
+        )
+        for row in trains
+    ]
     environments = [(_environment(row), row) for row in result["environments"]]
     cores = [(f"{_environment(row)}, {_count(row['cores'], 'core')}", row) for row in scaling["cores"]]
     return [
@@ -88,6 +96,11 @@ def details(result: Row) -> list[Table | str]:
         _plants("Modes of the three-span catenary", "modes", modes),
         _plants(f"Speed, accuracy and precision of {flexible}", "speed, accuracy, grid, step", grids),
         *([_plants("Lines, their window travelling", "line", of_lines)] if lines else []),
+        *(
+            [_plants("Pantographs on one wire, 20 spans computed", "pantographs", of_trains)]
+            if trains
+            else []
+        ),
         _environments("Environments", environments),
         _environments("Vector environments by cores", cores)
         if cores
