@@ -178,6 +178,9 @@ def _check_values(name, values):
     if name in SETTINGS:
         given = {key: values.get(key) for key in ("catenary", "pantograph", "actuator", "line_condition")}
         given |= {key: values.get(key) for key in ("sensors", "pantograph_scatter", "speed_drift")}
+        if isinstance(given["pantograph"], list | tuple):  # each is checked by itself: distances may be swept
+            for own in given.pop("pantograph"):
+                run_settings({"pantograph": own} if ".toml" not in own else {})
         run_settings({key: value for key, value in given.items() if value and ".toml" not in str(value)})
 
 

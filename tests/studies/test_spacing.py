@@ -10,8 +10,10 @@ import pytest
 from panto_env import simulate
 from panto_env.studies import Outcome, find_study, write
 from panto_env.studies.spacing.passes import CASES, INTERVAL, SPEEDS_KMH, WATCHED, Curve, Wake, curves, wake
-from panto_env.studies.spacing.tables import distances_table, verdict
+from panto_env.studies.spacing.tables import distances_table, extremes_table, verdict
 from panto_env.studies.spacing.theories import THEORIES, Fit, at_arrival, fit, frequencies, strongest
+
+from ..pages import check_page
 
 DISTANCES = np.arange(35.0, 400.0, 2.5)
 SPEED = 250.0
@@ -101,6 +103,19 @@ def test_rows_are_written_as_csv_beside_the_numbers(tmp_path):
     assert outcome.as_dict()["verdict"] == "It is so."
 
 
+def test_extremes_by_hand():
+    curve = made_up(1.0, 0.0)
+    level = replace(curve, first={"std": 40.0 + 0 * DISTANCES})
+    table = extremes_table([(level, {"height": 0.5, "velocity": 0.0})])
+    (row,) = table.rows
+    worst = DISTANCES[curve.second["std"].argmax()]
+    assert worst % (SPEED / 3.6) == pytest.approx(0.0, abs=1.5) or worst % (SPEED / 3.6) > SPEED / 3.6 - 1.5
+    assert row[2] == "40.0"
+    assert row[4] == f"{curve.second['std'].max():.1f} at {worst:g}"
+    assert 45 < float(row[5]) < 55
+    assert row[6] == "100"
+
+
 DIFFER = {"correlation of the second's σ with the wire's upward velocity when it arrives, mean"}
 """What does not agree with others; docs/train-spacing.md says why."""
 
@@ -108,6 +123,7 @@ DIFFER = {"correlation of the second's σ with the wire's upward velocity when i
 @pytest.mark.study
 def test_the_wire_s_own_swing_says_which_distances_are_bad():
     outcome = find_study("spacing")(lambda what, share: None)
+    check_page("train-spacing.md", {table.title: table for table in outcome.tables})
     mean = outcome.numbers["mean_correlation"]
     assert mean["measured"] > 0.75
     assert max(mean[key] for key in ("span", "half_span", "contact_wire", "both_wires")) < 0.35

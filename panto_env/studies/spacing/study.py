@@ -7,7 +7,15 @@ from typing import Any
 from ..study import Outcome, Report
 from .passes import CASES, DISTANCES, SPEEDS_KMH, curves, wake
 from .plots import plot_std, plot_uplift
-from .tables import arrival_comparison, comparisons, distances_table, means, theories_table, verdict
+from .tables import (
+    arrival_comparison,
+    comparisons,
+    distances_table,
+    extremes_table,
+    means,
+    theories_table,
+    verdict,
+)
 from .theories import at_arrival, fits
 
 KEPT = ("distances", "speed_kmh", "catenary", "pantograph_number", "pantograph", "spans", "mean", "std",
@@ -48,7 +56,11 @@ def run(report: Report) -> Outcome:
             *comparisons(by_place, CASES[0]),
             arrival_comparison([each["velocity"] for each in arrivals]),
         ),
-        tables=(*(distances_table(each) for each in by_case.values()), theories_table(found)),
+        tables=(
+            *(distances_table(each) for each in by_case.values()),
+            extremes_table([(curve, arrival) for (curve, _), arrival in zip(found, arrivals, strict=True)]),
+            theories_table(found),
+        ),
         plots={"spacing-sigma": plot_std(by_case, measured), "spacing-uplift": plot_uplift(by_case)},
         numbers=numbers,
         rows={"spacing": rows},

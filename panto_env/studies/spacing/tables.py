@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.table import Table
 from ...base.units import from_kmh
+from ...metrics.en50367 import STD_OF_MEAN
 from ..study import Comparison
 from .passes import SPEEDS_KMH, Case, Curve
 from .theories import BEST, THEORIES, Fit
@@ -45,6 +46,47 @@ def distances_table(curves: Sequence[Curve]) -> Table:
         rows.append((f"{first.distances[k]:g}", *cells))
     title = f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)"
     return Table(title, tuple(headings), rows, text_columns=0)
+
+
+def extremes_table(found: Sequence[tuple[Curve, Mapping[str, float]]]) -> Table:
+    """Best and worst distances by line and speed, and how σ goes with the wire when the second arrives.
+
+    found: curves, and correlations of ``at_arrival``.
+    """
+    rows = []
+    for curve, arrival in found:
+        std, first = curve.second["std"], curve.first["std"]
+        low, high, uplift = std.argmin(), std.argmax(), 1e3 * curve.second["max_uplift"]
+        rows.append(
+            (
+                curve.case.line,
+                f"{curve.speed_kmh:g}",
+                f"{np.median(first):.1f}",
+                f"{std[low]:.1f} at {curve.distances[low]:g}",
+                f"{std[high]:.1f} at {curve.distances[high]:g}",
+                f"{100 * np.mean(std < first):.0f}",
+                f"{100 * np.mean(std > STD_OF_MEAN * curve.second['mean']):.0f}",
+                f"{curve.second['contact_loss'].max():.1f}",
+                f"{uplift.min():.0f} to {uplift.max():.0f}",
+                f"{arrival['height']:+.2f}",
+                f"{arrival['velocity']:+.2f}",
+            )
+        )
+    headings = (
+        "line",
+        "km/h",
+        "σ of the first (N)",
+        "second, lowest σ (N) at (m)",
+        "highest σ (N) at (m)",
+        "below the first (%)",
+        "over 0.3 F_m (%)",
+        "highest CL (%)",
+        "uplift (mm)",
+        "r with height",
+        "r with velocity",
+    )
+    title = "Distances of 35 to 400 m; r: σ with the wire's height and velocity when the second arrives"
+    return Table(title, headings, rows, text_columns=2)
 
 
 def theories_table(found: Sequence[tuple[Curve, Found]]) -> Table:
