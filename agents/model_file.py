@@ -33,6 +33,7 @@ class Needs(Settings):
     observation: str  # kind of the layout
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps that are observed
+    front: tuple[float, ...] = ()  # places ahead whose contact force the pantograph in front measured (m)
     line_values: bool = False  # whether the line's are observed
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
     entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
@@ -60,6 +61,7 @@ class Needs(Settings):
             observation=layout.kind,
             harmonics=layout.harmonics,
             history=layout.history,
+            front=layout.front,
             line_values=layout.line_values,
             normalise=layout.normalise,
             entries=tuple(

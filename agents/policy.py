@@ -33,7 +33,8 @@ class TrainedPolicy:
         self._policy = policy_of(actor, facts)
         needs = facts.needs
         self.observation, self.harmonics, self.history = needs.observation, needs.harmonics, needs.history
-        self.line_values, self.normalise, self.washout = needs.line_values, needs.normalise, needs.washout
+        self.front, self.line_values = needs.front, needs.line_values
+        self.normalise, self.washout = needs.normalise, needs.washout
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""

@@ -19,7 +19,7 @@ from ..plant.sensors import READING
 from ..plant.state import ROW
 from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .line_values import LINE_CENTRES, LINE_ENTRIES, SPAN_LENGTH
-from .state import NOW, TASK_ROW
+from .state import NOW, NOW_ROWS, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
 """Kinds of observation: what a train can measure; in addition values that it cannot, without noise and
@@ -33,6 +33,7 @@ CENTRES = {
     "frame velocity": (0.0, 0.1),
     "speed": (76.0, 12.0),
     "nominal force": (120.0, 30.0),
+    "front force": (120.0, 30.0),
     **LINE_CENTRES,
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
@@ -73,6 +74,7 @@ class EntryOptions(NamedTuple):
     pantograph: PantographData
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
+    front: tuple[float, ...] = ()  # places ahead whose contact force the one in front measured (m)
     line_values: bool = False  # whether the line's are among them
 
 
@@ -167,6 +169,17 @@ def _span_harmonic(episode, own, task, now, number):
 @entry(MEASURED, "speed", 100.0, "m/s")
 def _speed(episode, own, task, now, number):
     return now[NOW.SPEED]
+
+
+def _front(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    return [
+        (f"front force, {place:g} m ahead", 100.0, "N", number) for number, place in enumerate(options.front)
+    ]
+
+
+@entries(MEASURED, _front)
+def _front_force(episode, own, task, now, number):
+    return now[NOW_ROWS + number]
 
 
 @entries(MEASURED, lambda options: [(*SPAN_LENGTH, 0)] if options.line_values else [])

@@ -14,6 +14,7 @@ from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
+from .front import FrontArrays, front_arrays
 from .line_values import line_values
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
@@ -34,7 +35,7 @@ class Episode(NamedTuple):
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
     table: Array  # (rows, ACTION + actions + history): rows of ``TaskRow``
-    now: Array  # (rows, rows of ``Now``): of the present control step
+    now: Array  # (rows, rows of ``Now``, then places of ``FrontArrays``): of the present control step
     weights: Array  # (terms,): of the reward
     cost_weights: Array  # (terms,): of the cost
     idle: Flags  # (lanes,): lanes that the next call skips
@@ -49,6 +50,7 @@ class Episode(NamedTuple):
     line_values: Array  # (values,): those in the observation, in the order of ``LINE_ENTRIES``
     time_step: float  # s
     control_steps: int  # plant steps in a control step
+    front: FrontArrays
     mean_share: float  # weight of a control step in the running mean of the force
     washout_share: float  # weight of a control step in the washout's average; 0: there is no washout
     loss_limit: int  # plant steps without contact that end an episode
@@ -68,7 +70,7 @@ def new_episode(
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,
         table=aligned_zeros((rows, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
-        now=aligned_zeros((rows, NOW_ROWS)),
+        now=aligned_zeros((rows, NOW_ROWS + len(layout.front))),
         weights=settings.reward.weights,
         cost_weights=settings.cost.weights,
         idle=np.zeros(lanes, dtype=np.bool_),
@@ -83,6 +85,13 @@ def new_episode(
         line_values=line_values(plant.catenary) if layout.line_values else np.zeros(0),
         time_step=plant.time_step,
         control_steps=control_steps,
+        front=front_arrays(
+            layout.front,
+            plant.train,
+            lanes,
+            settings.runs.speeds[0] * plant.time_step * control_steps,
+            control_steps,
+        ),
         mean_share=_share(settings.control_interval, MEAN_TIME),
         washout_share=_share(settings.control_interval, settings.washout),
         loss_limit=round(LOSS_TIME / plant.time_step),

@@ -18,7 +18,8 @@ from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from ..plant.train import place_on_line, stride
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, EntryOptions, earlier, entries_of
-from .state import NOW, TASK_ROW
+from .front import force_in_front
+from .state import NOW, NOW_ROWS, TASK_ROW
 
 READINGS = len(Reading)
 BOUND = 10.0
@@ -33,6 +34,7 @@ class Layout:
     entries: tuple[Entry, ...]
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
+    front: tuple[float, ...] = ()  # places ahead whose contact force the one in front measured (m)
     line_values: bool = False  # whether the line's are among the entries
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
 
@@ -87,7 +89,7 @@ class Layout:
         return entry.centre + shift + float(observation[place]) * entry.scale
 
 
-OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "line_values", "normalise")
+OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "front", "line_values", "normalise")
 """Settings of a run that determine only the observation."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
@@ -96,7 +98,7 @@ OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 def layout(kind: str, options: EntryOptions) -> Layout:
     """Layout of an observation; kind: one of OBSERVATIONS."""
     entries = tuple(entries_of(kind, options))
-    return Layout(kind, entries, options.harmonics, options.history, options.line_values)
+    return Layout(kind, entries, options.harmonics, options.history, options.front, options.line_values)
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
@@ -133,10 +135,13 @@ def use_noise(sensors, lane):
 
 
 @inlined
-def prepare_entries(episode, sensors, run, own, now, collector, lane, row):
+def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
     """Prepare the values that entries of an observation read: readings with noise, position, speed."""
+    collector = episode.controlled[agent]
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], collector, lane)
+    for place in range(episode.front.ahead.size):
+        now[NOW_ROWS + place] = force_in_front(episode.front, own, agent, row, place)
     now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))
     now[NOW.STRIDE] = stride(run, collector, lane, own[ROW.STEP])
     now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)

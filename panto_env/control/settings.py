@@ -99,6 +99,15 @@ def _distances(value: Any) -> tuple[float, ...]:
     return tuple(float(each) for each in numbers)
 
 
+def _front(value: Any) -> tuple[float, ...]:
+    several = value if isinstance(value, list | tuple | np.ndarray) else [value]
+    numbers = [each for each in several if isinstance(each, int | float) and not isinstance(each, bool)]
+    rising = all(before < after for before, after in pairwise(numbers))
+    if len(numbers) < len(several) or not all(0 <= each <= FARTHEST for each in numbers) or not rising:
+        raise InputError(f"front must be increasing distances from 0 m up, not {shown(value)}.")
+    return tuple(float(each) for each in numbers)
+
+
 def _controlled(value: Any) -> tuple[int, ...]:
     several = value if isinstance(value, list | tuple) else [value]
     numbers = [each for each in several if isinstance(each, int) and not isinstance(each, bool)]
@@ -243,6 +252,11 @@ class RunSettings(Numerics):
     )
     history: Annotated[int, Between(0, 8)] = Field(
         0, description="earlier control steps whose readings and actions are also observed (-)"
+    )
+    front: Annotated[tuple[float, ...], BeforeValidator(_front)] = Field(
+        (),
+        description="distances ahead (m) at which a controlled pantograph also observes the contact force "
+        "that the one in front of it measured there",
     )
     line_values: bool = Field(
         False,

@@ -12,6 +12,7 @@ from ..plant.state import PLACE, ROW
 from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, place_on_line, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
+from .front import keep_front
 from .observation import begin_history, entry_of, prepare_entries, remember, use_noise
 from .reward import (
     add_sample_to_terms,
@@ -123,6 +124,23 @@ def plant_steps(line, wire, pantographs, actuators, run, sensors, samples, episo
             add_sample_to_terms(own, task, now)
             add_sample_to_figures(running, samples, own, task, now, lane, row)
             take_readings(sensors, c, step, own, now[NOW.READING :], lane)
+            if episode.front.ahead.size > 0 and not front_is_controlled(episode, a):
+                own = run.table[episode.front.own[a], lane]
+                take_readings(sensors, episode.front.own[a], step, own, episode.front.reading[row], lane)
+    if episode.front.ahead.size > 0:
+        for a in range(agents):
+            row = lane * agents + a
+            if front_is_controlled(episode, a):
+                reading = episode.now[row - 1, NOW.READING :]
+            else:
+                reading = episode.front.reading[row]
+            keep_front(episode.front, sensors, run, reading, a, lane, row)
+
+
+@inlined
+def front_is_controlled(episode, agent):
+    """Whether the pantograph in front of a controlled one is the controlled one before it."""
+    return agent > 0 and episode.controlled[agent - 1] == episode.front.own[agent]
 
 
 @inlined
@@ -162,7 +180,7 @@ def control_lane(packed, entries, values, flags, lane):
     for a in range(agents):
         c, row = episode.controlled[a], lane * agents + a
         own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
-        prepare_entries(episode, sensors, run, own, now, c, lane, row)
+        prepare_entries(episode, sensors, run, own, now, a, lane, row)
         diverged = task[TASK_ROW.ENDING] == ENDING.DIVERGED
         for k in range(entries.shape[1]):
             entry = entry_of(episode, own, task, now, k)
@@ -212,7 +230,7 @@ def observe_start(packed, entries, values, flags, first, last):
                 c, row = episode.controlled[a], lane * agents + a
                 own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
                 take_first_readings(sensors, c, own, now[NOW.READING :], lane)
-                prepare_entries(episode, sensors, run, own, now, c, lane, row)
+                prepare_entries(episode, sensors, run, own, now, a, lane, row)
                 begin_history(episode, task, now)
                 for k in range(entries.shape[1]):
                     entries[row, k] = entry_of(episode, own, task, now, k)

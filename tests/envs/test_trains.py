@@ -122,9 +122,55 @@ def test_agents_see_and_earn_what_the_environment_of_the_train_does():
         view.step({})
 
 
+@pytest.mark.parametrize("controlled", [2, [1, 2]])
+def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled):
+    """Between control steps on the straight line between readings; at rest before the first was there."""
+    places, behind = (0.0, 12.5, 100.0), 100.0
+    settings = {**TRAIN, "controlled": controlled, "front": places, "sensors": "ideal", **SHORT}
+    env = make(**settings | {"observation": "measured", "run_in": 0.0, "speed_kmh": 300.0})
+    seen, _ = env.reset(seed=1)
+    rows = [seen]
+    ended = False
+    while not ended:
+        seen, _, terminated, truncated, _ = env.step(0.1 * np.ones(env.action_space.shape, dtype=np.float32))
+        rows.append(seen)
+        ended = terminated or truncated
+    task, first = env.unwrapped.task, env.unwrapped.trajectory
+    names = [entry.name for entry in task.layout.entries]
+    columns = [names.index(f"front force, {place:g} m ahead") for place in places]
+    observed = 100 * np.array(rows)[:, -len(names) :][:, columns]
+    every = task.length.control_steps
+    read = np.append(
+        first.contact_force[0], first.contact_force[every - 1 :: every]
+    )  # after each control step
+    last = len(first.contact_force) // every
+    times = np.arange(last + 1)
+    ago = (behind - np.array(places)) / (300 / 3.6 * 0.01)
+    expected = np.interp((times[-len(rows) :, None] - ago).ravel(), times, read).reshape(len(rows), -1)
+    assert expected.std() > 20
+    np.testing.assert_allclose(observed, expected, atol=2e-2)
+
+
+def test_noise_of_the_one_in_front_is_in_what_it_tells():
+    def told(noise):
+        env = make(**TRAIN, controlled=2, front=(100.0,), sensors={"force_noise": noise}, **SHORT)
+        env.reset(seed=3)
+        rows = [env.step(np.zeros(1, dtype=np.float32))[0] for _ in range(200)]
+        place = env.unwrapped.task.layout.index("front force, 100 m ahead")
+        return 30 * np.array(rows)[:, place]
+
+    assert np.std(told(10.0) - told(0.0)) == pytest.approx(10.0, rel=0.2)
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
+        (
+            {"controlled": 2, "front": (0.0, 101.0)},
+            "must be at most the 100 m to the pantograph in front",
+        ),
+        ({"controlled": 1, "front": (0.0,)}, "no controlled one has any in front of it"),
+        ({"controlled": 2, "front": (5.0, 2.0)}, "front must be increasing distances"),
         ({"distances": [200.0, 100.0], "pantographs": ["dsa380"] * 3}, "must increase"),
         ({"distances": [-5.0]}, "must be positive numbers"),
         ({"distances": [50.0, 100.0]}, "must give 1 numbers, one for each of the pantographs behind"),
