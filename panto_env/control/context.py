@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..plant.alignment import Alignment
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
+from ..plant.train import Train
 from .observation import Layout
 
 
@@ -25,3 +26,5 @@ class Context:
     nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
     catenary: CatenaryData
     pantograph: PantographData
+    train: Train  # of which this is the pantograph ``collector``
+    collector: int  # counted from 0 in front

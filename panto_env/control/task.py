@@ -170,6 +170,8 @@ class Task(TaskState):
             nominal_force=self.plant.of(lane, Row.NOMINAL_FORCE, collector),
             catenary=self.plant.catenary,
             pantograph=self.settings.known_pantograph or self.settings.riding[collector],
+            train=self.plant.train,
+            collector=collector,
         )
 
     def figures(self, row: int) -> Figures:

@@ -11,6 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import panto_env
 from panto_env import InputError
 from panto_env.envs.ids import IDS
+from panto_env.plant.state import Row
 
 pettingzoo = pytest.importorskip("pettingzoo")
 TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0], "speed_kmh": (280.0, 320.0)}
@@ -140,9 +141,8 @@ def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled):
     columns = [names.index(f"front force, {place:g} m ahead") for place in places]
     observed = 100 * np.array(rows)[:, -len(names) :][:, columns]
     every = task.length.control_steps
-    read = np.append(
-        first.contact_force[0], first.contact_force[every - 1 :: every]
-    )  # after each control step
+    at_rest = task.samples.rows[0, 0, 0, Row.CONTACT_FORCE]
+    read = np.append(at_rest, first.contact_force[every - 1 :: every])
     last = len(first.contact_force) // every
     times = np.arange(last + 1)
     ago = (behind - np.array(places)) / (300 / 3.6 * 0.01)
