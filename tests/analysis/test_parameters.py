@@ -5,7 +5,7 @@ import typer
 
 from panto_env import InputError
 from panto_env.analysis import parameters
-from panto_env.analysis.options import parse_spans, with_settings
+from panto_env.analysis.options import SEVERAL, parse_spans, with_settings
 from panto_env.analysis.parameters import (
     change,
     change_together,
@@ -80,7 +80,7 @@ def test_only_the_speed_and_the_families_values_are_swept(name):
         with pytest.raises(InputError) as told:
             sweep({name: [250.0]}, workers=1)
         assert (
-            "it must be speed_kmh or begin with one of 'catenary.', 'pantograph.', 'actuator.', 'sensors.', "
+            "it must be speed_kmh, distances or begin with one of 'catenary.', 'pantograph.', 'actuator.', "
             in str(told.value)
         )
 
@@ -185,8 +185,9 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
         assert option.default is None
         own = field.description.replace("(s)", "(ms)", 1) if name == "time_step" else field.description
         flag = isinstance(field.default, bool)
-        default = "" if flag or field.default is None else f" Default: {field.default}."
-        assert info.help == f"{own[:1].upper()}{own[1:]}.{default}"
+        default = "" if flag or field.default in (None, ()) else f" Default: {field.default}."
+        often = " May be given several times." * (name in SEVERAL)
+        assert info.help == f"{own[:1].upper()}{own[1:]}.{often}{default}"
     app = typer.Typer()
     app.command()(command)
     for option in typer.main.get_command(app).params:

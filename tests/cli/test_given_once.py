@@ -39,7 +39,7 @@ def test_an_option_given_twice_is_refused(words, option, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("simulate", "--pantograph", "a", "--speed", "3", "--pantograph=b"), "--pantograph is given twice"),
+        (("simulate", "--catenary", "a", "--speed", "3", "--catenary=b"), "--catenary is given twice"),
         (("simulate", "--json", "--json", "--json"), "--json is given 3 times; give it once"),
         (("benchmark", "--speed", "x", "--speed", "x"), "Invalid value for '--speed'"),  # it may be repeated
         (("simulate", "--pantograph", "a", "--pantograf", "b"), "No such option"),

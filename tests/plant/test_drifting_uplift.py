@@ -43,7 +43,7 @@ def passive(given, seed=0):
     """A passive run, and the pantograph's state at its start."""
     task = Task(run_settings(given))
     task.reset(0, np.random.default_rng(seed))
-    start = task.plant.run.table[0, 0, Row.STATE :][: task.plant.pantographs.size].copy()
+    start = task.plant.run.table[0, 0, Row.STATE :][: task.plant.pantographs.sizes[0]].copy()
     task.run_passively()
     return task.trajectory(0), start
 

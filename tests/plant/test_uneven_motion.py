@@ -29,7 +29,7 @@ def test_both_codes_are_printed_and_drawn_section_by_section(monkeypatch, tmp_pa
     short = Section(line, load_pantograph("en50318-2002"), 250.0, spans=(2, 3))
     monkeypatch.setattr(comparison, "sections", lambda: {"short": short})
     monkeypatch.setenv("COLUMNS", "150")
-    comparison.compare_sections(tmp_path / "pictures")
+    comparison.compare_sections("short", tmp_path / "pictures")
     rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if "short" in line]
     ours, theirs = ([float(each) for each in row[3:7] + row[7].split()] for row in rows)
     assert ours == pytest.approx(theirs, abs=1.5)

@@ -161,7 +161,7 @@ def test_the_numbers_beside_the_chart():
     size = 0.0222 * 720
     for named, x, look in ((True, HEAD + 24.6, (QUIET, False, "left")), (False, 807.7, (INK, True, "right"))):
         canvas = Kept()
-        picture._draw_rows(canvas, LAYOUT, ["a", "b", "c"], named=named)
+        picture._draw_rows(canvas, LAYOUT, ["a", "b", "c"], 1.25 * size, named=named)
         drew(
             canvas,
             *(("words", [x, TOP + 1.25 * k * size, size], (word, *look)) for k, word in enumerate("abc")),
