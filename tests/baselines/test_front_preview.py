@@ -6,7 +6,8 @@ from panto_baselines.policies.front_preview import FrontPreview
 from panto_env import InputError, simulate
 
 TRAIN = {
-    "catenary": "re330", "pantographs": ["dsa380"] * 2, "distances": [100.0], "controlled": 2, "speed_kmh": 250.0,
+    "catenary": "re330", "pantographs": ["dsa380"] * 2, "distances": [100.0], "controlled": 2,
+    "speed_kmh": 250.0,
     "line_condition": "as-built", "actuator": "realistic", "sensors": "realistic",
 }  # fmt: skip
 
