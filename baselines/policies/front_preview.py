@@ -49,7 +49,7 @@ class FrontPreview:
     """Feed-forward of the contact force that the pantograph in front had at places ahead, and of its past.
 
     On a line as built the force behind repeats much of the force in front, with a phase that depends on
-    distance and speed: at 250 and 300 km/h a filter of the force in front, 40 m to either side, explains 53
+    distance and speed: at 250 and 300 km/h a filter of the force in front, 40 m to either side, explains 55
     to 86 % of the variance 100 and 200 m behind (`docs/train.md`). The command minimises, by least squares
     over passes under training seeds on lines as built, the square of the force that it leaves,
     sum(h * front) + g * u, beside 0.3 of its own square; g is the mean response of the

@@ -20,7 +20,7 @@ from panto_env.plant.side_wind import (
 )
 
 from ..finite_element.figures import figures
-from ..finite_element.windy import ALIKE, ELEMENT, MIXED, STRONG, WIND, by_both, compared, in_wind
+from ..finite_element.windy import ALIKE, ELEMENT, MIXED, SPEED, STRONG, WIND, by_both, compared, in_wind
 from ..lanes import check_lanes_are_singles
 
 
@@ -111,7 +111,9 @@ def agrees(line, seed, element, **condition):
 
 def test_finite_elements_agree_on_what_the_mean_wind_damps():
     damped = agrees(ALIKE, 0, 1.0, side_wind=WIND, turbulence=0.0)
-    still = figures(simulate(spans=9, distance=55.0 * 7.5, window=0), (3, 6))
+    still = figures(
+        simulate(ALIKE, "en50318-2002", SPEED, spans=9, distance=60.0 * 7.5, window=0), compared(ALIKE)
+    )
     assert damped.std < 0.99 * still.std
 
 
@@ -130,7 +132,7 @@ def test_finite_elements_agree_where_spans_differ():
 )
 def test_finite_elements_agree_in_gusts(line, seed):
     gusty = agrees(line, seed, ELEMENT, side_wind=WIND)
-    assert gusty.std > 1.4 * 26.9 or seed != STRONG
+    assert gusty.std > 1.4 * 27.1 or seed != STRONG
 
 
 def test_every_seed_has_its_gusts_and_without_turbulence_there_are_none():
