@@ -22,7 +22,9 @@ SUFFIX = ".actions.safetensors"
 class Played(NamedTuple):
     """What a policy did in one pass."""
 
-    actions: Array  # (control steps, actions): as it gave them, clipped to -1..1
+    # (control steps, actions): as it gave them, clipped to -1..1. Of several pantographs side by side, each
+    # from where it comes onto the line, with zeros after the last.
+    actions: Array
     washout: float  # time constant (s) of what the environment subtracted from them, 0 for nothing
 
 

@@ -53,53 +53,54 @@ INTERPRETER = "PANTO_POLICY_PYTHON"
 MODULE = "panto_baselines.benchmark.policy_process"
 
 
-def find_apart(source: Any, trusted: bool) -> Any:
+def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:
     """The policy that a benchmark runs: apart from the plant, or in this process.
 
-    Objects run in this process, as do installed policies if they are ``trusted``. Raises InputError where the
-    policy doesn't exist or cannot be made.
+    number: of the process among those that run side by side, one for each controlled pantograph. Objects run
+    in this process, as do installed policies if they are ``trusted``. Raises InputError where the policy
+    doesn't exist or cannot be made.
     """
     if not isinstance(source, str) or (trusted and source.partition(":")[0] in policy_names()):
         return find_policy(source)
-    return PolicyApart(source)
+    return PolicyApart(source, number)
 
 
 class PolicyApart:
     """A policy in a process of its own. It has the attributes of the policy that say what it wishes."""
 
-    def __init__(self, source: str) -> None:
-        """source: name, model file, or class in a Python file. Raises InputError if it cannot be made."""
-        self._source = source
-        if _running is not None and _running.ended:
+    def __init__(self, source: str, number: int = 0) -> None:
+        """source: name, model file, or class in a Python file. number: of its process, see ``find_apart``.
+
+        Raises InputError if it cannot be made.
+        """
+        self._source, self._number = source, number
+        if number in _running and _running[number].ended:
             close()
-        vars(self).update(_process().load(source))
+        vars(self).update(_process(number).load(source))
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode, in a process that has seen no other. Raises InputError if that fails."""
-        _process().begin(self._source, context)
+        _process(self._number).begin(self._source, context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
         """Action, (actions,), for an observation, (entries,). Raises InputError if the policy fails."""
-        return _process().act(observation)
+        return _process(self._number).act(observation)
 
 
 def close() -> None:
     """End this process's policies apart, with everything that they have started."""
-    global _running
-    if _running is not None:
-        _running.close()
-        _running = None
+    while _running:
+        _running.popitem()[1].close()
 
 
-_running: _PolicyProcess | None = None
+_running: dict[int, _PolicyProcess] = {}
 atexit.register(close)
 
 
-def _process() -> _PolicyProcess:
-    global _running
-    if _running is None:
-        _running = _PolicyProcess()
-    return _running
+def _process(number: int) -> _PolicyProcess:
+    if number not in _running:
+        _running[number] = _PolicyProcess()
+    return _running[number]
 
 
 class _PolicyProcess:

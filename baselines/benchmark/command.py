@@ -28,12 +28,23 @@ from .run import SUFFIXES, run
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
 
+PLACE = ("catenary", "pantograph", "pantographs", "distances", "controlled")
+"""Options that say what runs on which line: they replace the lines of a file."""
 DRAW = "draw"
 """Salt that stands for one drawn at random."""
 
 
 @with_settings(
-    only=("catenary", "pantograph", "actuator", "sensors", "line_condition", "control_interval"),
+    only=(
+        "catenary",
+        "pantograph",
+        "distances",
+        "controlled",
+        "actuator",
+        "sensors",
+        "line_condition",
+        "control_interval",
+    ),
     defaults=False,
 )
 def benchmark(
@@ -93,7 +104,7 @@ def benchmark(
     from .report import tables
     from .seeds import salt_hash
 
-    line = {name: given.pop(name, None) for name in ("catenary", "pantograph")}
+    line = {name: given.pop(name, None) for name in PLACE}
     settings = _settings(
         config,
         line=line | {"speeds_kmh": speed or None},
@@ -136,7 +147,7 @@ def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> Benchm
     base = BenchmarkSettings() if config is None else load_benchmark(config)
     line_changes = _without_none(line)
     table = base.model_dump() | _without_none(given)
-    if "catenary" in line_changes or "pantograph" in line_changes:
+    if line_changes.keys() & set(PLACE):
         table["lines"] = [line_changes]
     else:
         table["lines"] = [old | line_changes for old in table["lines"]]

@@ -165,16 +165,16 @@ def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     chosen = run_settings(given)
     task = Task(far_enough(on_example(chosen)))
-    last = task.plant.alignment.last_whole_span(task.length.distance)
+    last = task.plant.alignment.last_whole_span(task.length.own_distance)
     if (shortest := fewest_spans(chosen)) is not None:  # whose end reflects waves
         last = min(last, shortest - CLEAR)
     first, last = line.spans or (FIRST_SETTLED, last)
-    where = f"on line '{line.catenary}', where every run covers {task.length.distance:g} m"
+    where = f"on line '{line.catenary}', where every run covers {task.length.own_distance:g} m"
     if not 1 <= first <= last:
         raise InputError(
             f"There are no spans {first} to {last} to evaluate {where}; "
             "give a longer distance or other spans."
         )
-    if task.plant.alignment.support(last) > task.length.distance:
+    if task.plant.alignment.support(last) > task.length.own_distance:
         raise InputError(f"Spans {first} to {last} can't be evaluated {where}; give a longer distance.")
     return first, last

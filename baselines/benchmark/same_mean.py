@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from panto_env import Trajectory, simulate
@@ -18,19 +19,25 @@ class PassiveFigures(NamedTuple):
 NONE = PassiveFigures(float("nan"), float("nan"))
 
 
-def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
+def passive_at_mean_of(
+    run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any], controlled: Sequence[int] = (1,)
+) -> PassiveFigures:
     """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
 
-    arguments: those of ``simulate`` that the run was made with, except its policy.
+    Of a train each has the mean force that it had, and the figures are those of the controlled one, by its
+    number, whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
+    policy.
     """
-    mean = run.summary(spans).mean
-    if not mean > 0:
+    means = [own.summary(spans).mean for own in run.train]
+    if not min(means) > 0:
         return NONE
     try:
+        mean = means if len(means) > 1 else means[0]
         passive = simulate(**arguments, mean_force=mean, evaluated=spans)
     except InputError:  # no static force gives this mean
         return NONE
     if passive.terminated:
         return NONE
-    figures = passive.summary(spans)
-    return PassiveFigures(figures.std, figures.cost_function)
+    each = [passive.train[number - 1].summary(spans) for number in controlled]
+    worst = max(each, key=lambda figures: figures.std)
+    return PassiveFigures(worst.std, worst.cost_function)

@@ -20,6 +20,7 @@ from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,
     SpeedDrift,
+    controlled_numbers,
     default,
     description,
 )
@@ -63,6 +64,16 @@ class Line(Settings):
 
     catenary: str = Field(default("catenary"), description=description("catenary"))
     pantograph: str = Field(default("pantograph"), description=description("pantograph"))
+    pantographs: tuple[str, ...] = Field(
+        (), description="of a train, the first in front, instead of pantograph"
+    )
+    distances: tuple[Positive, ...] = Field((), description=description("distances"))
+    controlled: Annotated[tuple[int, ...], BeforeValidator(_clause(controlled_numbers))] = Field(
+        default("controlled"),
+        validate_default=True,
+        description="numbers of the pantographs that a policy controls, each an instance of its own, 1 for "
+        "the first; the figures are those of the one of them whose sigma is largest",
+    )
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
     distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
     spans: tuple[_Span, _Span] | None = Field(
@@ -73,6 +84,13 @@ class Line(Settings):
     policies: tuple[str, ...] = Field(
         (), description="policies that run on this line only, in addition to those that run on every line"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_of_several(cls, values: Any) -> Any:
+        """The pantograph is the first of several."""
+        several = values.get("pantographs") if isinstance(values, dict) else None
+        return {"pantograph": several[0], **values} if several else values
 
     @field_validator("speeds_kmh", "policies")
     @classmethod

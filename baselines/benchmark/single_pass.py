@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
@@ -96,21 +96,21 @@ def run_pass(
 
     Raises InputError, naming the policy, if the policy fails.
     """
-    run, recorder = _record(settings, line, policy, speed_kmh, seed, played)
+    first, recorders = _record(settings, line, policy, speed_kmh, seed, played)
+    number = 0 if first.terminated else judged(first, line, spans)
+    run, recorder = first.train[line.controlled[number] - 1], recorders[number]
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        # A command counts if its first time step lies within the spans, as for the figures of the run.
-        steps = round(settings.control_interval / run.time_step)
-        commands = recorder.forces()[run.inside(spans)[::steps]]
+        commands = _within(recorder.forces(), run, spans, settings.control_interval)
         changes = np.diff(commands, axis=0) / settings.control_interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
         watts = run.mechanical_power(spans)
         if policy != REFERENCE:
             arguments = _arguments(settings, line, speed_kmh, seed)
-            at_same_mean = passive_at_mean_of(run, spans, arguments)
+            at_same_mean = passive_at_mean_of(first, spans, arguments, line.controlled)
         else:
             at_same_mean = PassiveFigures(figures.std, figures.cost_function)
     row = Row(
@@ -129,7 +129,7 @@ def run_pass(
         pressed_cost_function=at_same_mean.cost_function,
     )
     kept = traced and not run.terminated
-    return Pass(row, recorder.played(), trace(run, spans, policy, line) if kept else None)
+    return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)
 
 
 def drive(
@@ -142,10 +142,27 @@ def drive(
 ) -> tuple[Trajectory, Array]:
     """Run one pass: its record, and the commanded forces (N), (control steps, actions).
 
-    played: as for ``run_pass``.
+    Both are those of the first controlled pantograph. played: as for ``run_pass``.
     """
-    run, recorder = _record(settings, line, policy, speed_kmh, seed, played)
-    return run, recorder.forces()
+    run, recorders = _record(settings, line, policy, speed_kmh, seed, played)
+    return run.train[line.controlled[0] - 1], recorders[0].forces()
+
+
+def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:
+    """Which of the controlled pantographs is judged, from 0: that with the largest sigma."""
+    return int(np.argmax([run.train[number - 1].summary(spans).std for number in line.controlled]))
+
+
+def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: float) -> Array:
+    """Commands, (control steps, actions), whose first time step lies within the spans, as the figures do.
+
+    Both end together; the record begins where its pantograph comes onto the line.
+    """
+    steps = round(interval / run.time_step)
+    inside = np.zeros(max(len(commands) * steps, len(run.time)), dtype=np.bool_)
+    inside[len(inside) - len(run.time) :] = run.inside(spans)
+    within: Array = commands[inside[len(inside) - len(commands) * steps :][::steps]]
+    return within
 
 
 def _record(
@@ -155,20 +172,25 @@ def _record(
     speed_kmh: float,
     seed: int,
     played: Played | None = None,
-) -> tuple[Trajectory, _CommandRecorder]:
-    player = Tape(*played) if played else _player(settings, line, policy, speed_kmh, seed)
-    recorder = _CommandRecorder(player, policy)
+) -> tuple[Trajectory, list[_CommandRecorder]]:
+    players = tapes(played, line) if played else _players(settings, line, policy, speed_kmh, seed)
+    recorders = [_CommandRecorder(player, policy, row) for row, player in enumerate(players)]
+
+    def watch(task: Task) -> None:
+        for recorder in recorders:
+            recorder.watch(task)
+
     with _torch_on_one_thread():
         arguments = _arguments(settings, line, speed_kmh, seed)
-        run = simulate(policy=recorder, watch=recorder.watch, **arguments)
-    return run, recorder
+        run = simulate(policy=recorders, watch=watch, **arguments)
+    return run, recorders
 
 
 def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     """Settings of the runs along a line, by name, except the speed."""
     return {
         "catenary": line.catenary,
-        "pantograph": line.pantograph,
+        **_riding(line),
         "actuator": settings.actuator,
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
@@ -179,26 +201,45 @@ def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     }
 
 
+def _riding(line: Line) -> dict[str, Any]:
+    if not (line.pantographs or line.distances) and line.controlled == (1,):
+        return {"pantograph": line.pantograph}
+    several = line.pantographs or (line.pantograph,)
+    return {"pantographs": several, "distances": line.distances, "controlled": line.controlled}
+
+
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
     """Arguments of ``simulate`` for a pass, except its policy."""
     return along(settings, line) | {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
 
 
-def _player(settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int) -> Policy:
-    """The policy that runs in a pass: itself, or a control of it."""
-    control = control_of(policy)
+def _players(
+    settings: BenchmarkSettings, line: Line, policy: str, speed_kmh: float, seed: int
+) -> Sequence[Policy]:
+    """The policies that run in a pass, one for each controlled pantograph: itself, or a control of it."""
     if policy == ORACLE_TAPE:
-        return oracle_tape(settings, line, speed_kmh)
-    if control == TAPE:
-        _, recorder = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
-        return Tape(*recorder.played())
-    found = find_apart(policy_of(policy), settings.trusted)
+        return [oracle_tape(settings, line, speed_kmh)]
+    if control_of(policy) == TAPE:
+        _, recorders = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
+        return tapes(played_by(recorders), line)
+    return [_player(settings, policy, number) for number in range(len(line.controlled))]
+
+
+def tapes(played: Played, line: Line) -> list[Tape]:
+    """Tapes that play a pass again, one for each controlled pantograph."""
+    each = np.split(played.actions, len(line.controlled), axis=1)
+    return [Tape(actions, played.washout) for actions in each]
+
+
+def _player(settings: BenchmarkSettings, policy: str, number: int) -> Policy:
+    """The policy that drives one of the controlled pantographs, from 0: itself, or blind."""
+    found = find_apart(policy_of(policy), settings.trusted, number)
     if wishes(found).get("observation") == NOT_MEASURED:
         raise PolicyError(
             f"The policy '{policy_of(policy)}' wishes the observation '{NOT_MEASURED}', which holds what no "
             "train can measure; let it take another one."
         )
-    return Blind(found) if control == BLIND else found
+    return Blind(found) if control_of(policy) == BLIND else found
 
 
 def oracle_tape(settings: BenchmarkSettings, line: Line, speed_kmh: float) -> Tape:
@@ -215,8 +256,9 @@ def oracle_tape(settings: BenchmarkSettings, line: Line, speed_kmh: float) -> Ta
 class _CommandRecorder:
     """A wrapper that records a policy's actions and what is commanded, under that policy's name."""
 
-    def __init__(self, policy: Policy, name: str) -> None:
-        self._policy, self.name = policy, name
+    def __init__(self, policy: Policy, name: str, row: int) -> None:
+        """row: of the task, that of the pantograph."""
+        self._policy, self.name, self._row = policy, name, row
         vars(self).update(wishes(policy))
         self._actions: list[Array] = []
         self._commands: list[Array] = []
@@ -233,7 +275,7 @@ class _CommandRecorder:
     def watch(self, task: Task) -> None:
         """Record what the plant was commanded: the action, clipped, less a washout's slow average."""
         actions = len(task.actuator.places)
-        self._commands.append(task.episode.table[0, TaskRow.ACTION : TaskRow.ACTION + actions].copy())
+        self._commands.append(task.episode.table[self._row, TaskRow.ACTION : TaskRow.ACTION + actions].copy())
 
     def played(self) -> Played:
         """What the policy did."""
@@ -242,6 +284,14 @@ class _CommandRecorder:
     def forces(self) -> Array:
         """Commanded forces (N), (control steps, actions)."""
         return self._force_limit * np.array(self._commands)
+
+
+def played_by(recorders: Sequence[_CommandRecorder]) -> Played:
+    """What the policies of a pass did, the pantographs' actions side by side."""
+    each = [recorder.played() for recorder in recorders]
+    longest = max(len(own.actions) for own in each)
+    actions = [np.pad(own.actions, ((0, longest - len(own.actions)), (0, 0))) for own in each]
+    return Played(np.hstack(actions), each[0].washout)
 
 
 @contextmanager

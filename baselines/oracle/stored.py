@@ -17,6 +17,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import is_entry
+from panto_env.control.identity import OF_TRAINS
 from panto_env.control.settings import run_settings
 
 from .search import METHOD, Oracle
@@ -52,9 +53,8 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     """
     settings = run_settings(given)
     # Without defaults: a setting added later changes no oracle while it is off; a different kind does.
-    plain = settings.model_dump(
-        mode="json", include=set(MATTER), serialize_as_any=True, exclude_defaults=True
-    )
+    matter = {*MATTER, *(OF_TRAINS if settings.pantographs else ())}
+    plain = settings.model_dump(mode="json", include=matter, serialize_as_any=True, exclude_defaults=True)
     for name in ("catenary", "pantograph"):
         for words in ("description", "sources", "system", "uplift_stop"):  # no force depends on these
             plain[name].pop(words, None)

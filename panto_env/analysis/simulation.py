@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from numbers import Integral
 from typing import Any
@@ -16,12 +16,15 @@ from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
 from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
+from ..control.state import Result
 from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary import CATENARIES
 from ..plant.state import Row
 from ..policies import Policy, checked_action, errors_name, find_policy, wishes
 
+OFF_LINE = 1e-6
+"""Position before the line's start (m) from which on a pantograph waits: nearer is rounding."""
 _LINE, _PANTOGRAPH, _SPEED_KMH = (default(name) for name in ("catenary", "pantograph", "speed_kmh"))
 
 
@@ -42,7 +45,8 @@ def simulate(
 
     policy: None, a name ("pd"), a model file, or an object with reset and act, which is named by its
     attribute ``name`` if it has one, else by its class. It gets the observation of its attribute
-    ``observation``, unless that is among the settings. seed: of all random values and the sensors' noise.
+    ``observation``, unless that is among the settings. Each of several controlled pantographs has a copy of
+    its own; or a list gives one for each. seed: of all random values and the sensors' noise.
     progress: called with the finished share. watch: called with the running task, lane 0 of which is this
     pass, after each control step, or after several without a policy; it must change nothing.
     record_droppers: keep the tension of every dropper. evaluated: spans over which a required mean force is
@@ -59,22 +63,28 @@ def simulate(
         raise InputError(f"seed must be a whole number from 0 up, not {shown(seed)}.")
     if not isinstance(record_droppers, bool):
         raise InputError(f"record_droppers must be True or False, not {shown(record_droppers)}.")
-    driver = None if policy is None else find_policy(policy)
+    drivers = [] if policy is None else _drivers(policy)
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
-    given |= wishes(driver) | settings
+    given |= wishes(drivers[0] if drivers else None) | settings
     task = _ready(given, seed, evaluated, record_droppers)
     line = task.settings.line
     CATENARIES[line.kind].warn_if_short(line, task.settings.numerics, task.settings.runs)
-    if driver is None:
+    if not drivers:
         task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)
-    name = policy if isinstance(policy, str) else str(getattr(policy, "name", type(policy).__name__))
-    for share in steps_of_policy(task, driver, name):
+    first = policy[0] if isinstance(policy, list | tuple) else policy
+    name = first if isinstance(first, str) else str(getattr(first, "name", type(first).__name__))
+    for share in steps_of_policy(task, drivers, name):
         if progress is not None:
             progress(share)
         if watch is not None:
             watch(task)
     return task.trajectory(0, policy=name, seed=seed, last=True)
+
+
+def _drivers(policy: Any) -> list[Policy]:
+    several = policy if isinstance(policy, list | tuple) else [policy]
+    return [find_policy(each) for each in several]
 
 
 def _ready(given: dict[str, Any], seed: int, evaluated: SpanChoice, record_droppers: bool) -> Task:
@@ -96,26 +106,34 @@ def ready_pass(policy: Any, settings: dict[str, Any], seed: int) -> tuple[Task, 
     return _ready(wishes(driver) | settings, seed, None, record_droppers=False), driver
 
 
-def steps_of_policy(task: Task, policy: Policy, name: str) -> Iterator[float]:
+def steps_of_policy(task: Task, policy: Policy | Sequence[Policy], name: str) -> Iterator[float]:
     """Control lane 0, already reset, to the end of its run; yields the finished share after each step.
 
-    Further controlled pantographs have copies of the policy. name: of the policy, for errors. Raises
-    InputError where the policy fails, or its action is not finite or has the wrong shape.
+    policy: one, of which further controlled pantographs have copies, or one for each of them; each acts from
+    where its pantograph comes onto the line. name: of the policy, for errors. Raises InputError where the
+    policy fails, its action is not finite or has the wrong shape, or there are more or fewer policies than
+    controlled pantographs.
     """
+    given = list(policy) if isinstance(policy, Sequence) else [policy]
     # Each controlled pantograph has a policy of its own, which sees what that one feels.
-    drivers = [policy, *(deepcopy(policy) for _ in range(task.agents - 1))]
+    drivers = given if len(given) > 1 else [*given, *(deepcopy(given[0]) for _ in range(task.agents - 1))]
+    if len(drivers) != task.agents:
+        raise InputError(
+            f"policy must be one, or one for each of the {task.agents} controlled pantographs, not "
+            f"{len(drivers)}."
+        )
     with errors_name(name, "reset"):
         for row, driver in enumerate(drivers):
             driver.reset(task.context(row))
-    results, shape = task.results, (len(task.actuator.places),)
+    results, actions = task.results, np.zeros((task.agents, len(task.actuator.places)))
     while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
-            # A copy: a policy may keep its observation.
-            actions = [
-                checked_action(driver.act(results.observation[row].copy()), shape)
-                for row, driver in enumerate(drivers)
-            ]
-        task.step(np.stack(actions))
+            for row, driver in enumerate(drivers):
+                if results.values[row, Result.POSITION] < -OFF_LINE:
+                    continue  # it waits: nothing there is worth learning
+                # A copy: a policy may keep its observation.
+                actions[row] = checked_action(driver.act(results.observation[row].copy()), actions[row].shape)
+        task.step(actions)
         yield task.plant.of(0, Row.STEP) / task.end(0)
 
 

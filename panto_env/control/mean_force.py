@@ -59,6 +59,8 @@ def target_mean(settings: RunSettings, speed: float, collector: int = 0) -> floa
     required = settings.mean_force
     if required == "en50367":
         return largest_mean(speed, settings.line.system) - TOLERANCE
+    if isinstance(required, tuple):
+        return required[collector]
     if required is not None:
         return float(required)
     pantograph = settings.riding[collector]

@@ -108,7 +108,8 @@ def _front(value: Any) -> tuple[float, ...]:
     return tuple(float(each) for each in numbers)
 
 
-def _controlled(value: Any) -> tuple[int, ...]:
+def controlled_numbers(value: Any) -> tuple[int, ...]:
+    """Numbers of the controlled pantographs, from the front. Raises InputError for anything else."""
     several = value if isinstance(value, list | tuple) else [value]
     numbers = [each for each in several if isinstance(each, int) and not isinstance(each, bool)]
     if not numbers or len(set(numbers)) < len(several) or min(numbers) < 1:
@@ -133,11 +134,17 @@ def _none_is_zero(value: Any) -> Any:
     return 0.0 if value is None else value
 
 
-def _mean_force(value: Any) -> float | str | None:
+def _mean_force(value: Any) -> float | str | tuple[float, ...] | None:
+    if isinstance(value, list | tuple) and len(value):
+        return tuple(_force(each) for each in value)
     if value is None:
         return None
     if isinstance(value, str) and value == "en50367":
         return "en50367"
+    return _force(value)
+
+
+def _force(value: Any) -> float:
     try:
         force = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -189,7 +196,7 @@ class RunSettings(Numerics):
     distances: Annotated[tuple[float, ...], BeforeValidator(_distances)] = Field(
         (), description="distance of each further pantograph behind the first (m)"
     )
-    controlled: Annotated[tuple[int, ...], BeforeValidator(_controlled)] = Field(
+    controlled: Annotated[tuple[int, ...], BeforeValidator(controlled_numbers)] = Field(
         1,
         validate_default=True,
         description="numbers of the pantographs that have an actuator and are controlled, 1 for the first; "
@@ -224,10 +231,11 @@ class RunSettings(Numerics):
         'defects and weather such as "worn:broken_droppers=[(4, 5)],wind=15,ice=0.3", or a table; from a '
         "list one is drawn per run",
     )
-    mean_force: Annotated[str | float | None, BeforeValidator(_mean_force)] = Field(
+    mean_force: Annotated[str | float | tuple[float, ...] | None, BeforeValidator(_mean_force)] = Field(
         None,
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
-        "standard's maximum; by default as the pantograph's data say: its force applied, or met by the mean",
+        "standard's maximum; in Python a list has one for each pantograph of a train; by default as the "
+        "pantograph's data say: its force applied, or met by the mean",
     )
     washout: Annotated[float, Between(0, 100, "s"), BeforeValidator(_none_is_zero)] = Field(
         0.0,
@@ -336,6 +344,11 @@ class RunSettings(Numerics):
         if self.controlled[-1] > count:
             raise InputError(
                 f"controlled names pantograph {self.controlled[-1]}, but the train has only {count}."
+            )
+        if isinstance(self.mean_force, tuple) and len(self.mean_force) != count:
+            raise InputError(
+                f"mean_force must be one number, or one for each of the {count} pantographs, not "
+                f"{len(self.mean_force)}."
             )
         return self
 

@@ -1,0 +1,105 @@
+"""A benchmark of trains: the judged pantograph is the controlled one, the worst where several are."""
+
+import numpy as np
+import pytest
+
+from panto_baselines.benchmark import apart
+from panto_baselines.benchmark.run import evaluated_spans
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.single_pass import run_pass
+from panto_baselines.oracle.stored import fingerprint
+from panto_env import InputError, simulate
+from panto_env.base.settings import parse
+
+TRAIN = {"pantographs": ("dsa380", "en50318-2002"), "distances": (80.0,), "distance": 600.0}
+SPANS = (5, 9)
+SPEED_KMH = 280.0
+
+
+class Shaking:
+    """Commands that alternate, so that their rate is known: 40 N up, 40 N down."""
+
+    def reset(self, context):
+        self.sign = 1.0
+
+    def act(self, observation):
+        self.sign = -self.sign
+        return np.array([0.4 * self.sign])
+
+
+def settings(**given):
+    return parse(BenchmarkSettings, given, "the benchmark")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def ended():
+    yield
+    apart.close()
+
+
+def test_figures_are_those_of_the_controlled_pantograph():
+    line = Line(**TRAIN, controlled=2)
+    row = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0).row
+    run = simulate(**TRAIN, controlled=2, speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
+    own = run.train[1]
+    assert row.figures == own.summary(SPANS)
+    assert row.nominal_force == own.nominal_force
+    assert own.summary(SPANS).std != run.summary(SPANS).std
+    means = [each.summary(SPANS).mean for each in run.train]
+    pressed = simulate(
+        **TRAIN, speed_kmh=SPEED_KMH, line_condition="smooth", mean_force=means, evaluated=SPANS
+    )
+    for each, mean in zip(pressed.train, means, strict=True):
+        assert each.summary(SPANS).mean == pytest.approx(mean, abs=0.06)
+    assert abs(means[0] - means[1]) > 5
+    assert row.pressed_std == pytest.approx(pressed.train[1].summary(SPANS).std)
+
+
+def test_its_commands_count_while_it_is_in_the_spans():
+    row = run_pass(settings(), Line(**TRAIN, controlled=2), SPANS, Shaking(), SPEED_KMH, seed=0).row
+    assert row.action_rate == pytest.approx(80.0 / 0.01)
+
+
+def test_of_two_the_worst_counts_and_both_play_again():
+    line = Line(**TRAIN, controlled=[1, 2])
+    done = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0)
+    run = simulate(**TRAIN, controlled=[1, 2], speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
+    sigmas = [each.summary(SPANS).std for each in run.train]
+    assert done.row.figures.std == max(sigmas) > min(sigmas)
+    assert done.played.actions.shape[1] == 2
+    assert not np.array_equal(*done.played.actions.T)
+    again = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0, played=done.played)
+    assert again.row == done.row
+
+
+def test_one_that_learns_does_not_learn_while_it_waits():
+    """The second stands at the line's start for 200 m: what it reads there repeats with nothing."""
+    given = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": 250.0, "policy": "repetitive"}
+    given |= {"actuator": "realistic", "sensors": "realistic", "line_condition": "smooth"}
+    alone, both = (simulate(**given, controlled=numbers).train[1] for numbers in (2, [1, 2]))
+    assert not both.frame_force[: np.searchsorted(both.position, 0.5)].any()
+    assert both.summary().effort > 0.5 * alone.summary().effort > 5
+
+
+def test_spans_are_those_that_the_last_one_covers():
+    asked = settings(lines=[TRAIN | {"controlled": 2, "distance": 900.0}])
+    lone = settings(lines=[{"pantograph": "dsa380", "distance": 900.0}])
+    assert evaluated_spans(asked, asked.lines[0]) == evaluated_spans(lone, lone.lines[0])
+
+
+def test_what_cannot_be_a_train_is_refused_in_a_sentence():
+    with pytest.raises(InputError, match="names pantograph 2, but the train has only 1"):
+        evaluated_spans(settings(), Line(controlled=2))
+    with pytest.raises(InputError, match=r"controlled.*by their numbers, 1 for the first"):
+        settings(lines=[TRAIN | {"controlled": 0}])
+    with pytest.raises(InputError, match="one for each of the 2 pantographs, not 3"):
+        simulate(**TRAIN, mean_force=[100.0, 100.0, 100.0])
+    with pytest.raises(InputError, match="one for each of the 2 controlled pantographs, not 3"):
+        simulate(**TRAIN, controlled=[1, 2], policy=["pd"] * 3)
+
+
+def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
+    lone = {"pantograph": "dsa380", "speed_kmh": SPEED_KMH}
+    train = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": SPEED_KMH}
+    found = {fingerprint(lone), fingerprint(train), fingerprint(train | {"controlled": 2})}
+    assert len(found) == 3
