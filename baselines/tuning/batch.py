@@ -92,17 +92,19 @@ def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
 
 
 def _low_passed(task: Task) -> Array:
-    """Low-passed contact force over the evaluated spans, (lanes, samples), N.
+    """Low-passed contact force of the controlled pantograph over the evaluated spans, (lanes, samples), N.
 
     Each lane's samples are those in which its own train is inside the spans. If speeds drift, trains stay
     there for different times; each lane then gets as many samples as the fastest one, equally spaced in time.
     """
     time_step, alignment = task.plant.time_step, task.plant.alignment
-    force = task.samples.rows[:, 1:, 0, Row.CONTACT_FORCE]
+    collector = task.episode.controlled[0]
+    force = task.samples.rows[:, 1:, collector, Row.CONTACT_FORCE]
     middle = np.arange(force.shape[1]) + 0.5
-    spans = chosen_spans(None, task.length.distance, alignment, task.plant.catenary.ends)
+    spans = chosen_spans(None, task.length.own_distance, alignment, task.plant.catenary.ends)
     assert spans is not None  # None stands for the choice "all" only
-    inside = [alignment.within(task.plant.position(lane, middle), spans) for lane in range(task.lanes)]
+    places = [task.plant.position(lane, middle, collector) for lane in range(task.lanes)]
+    inside = [alignment.within(own, spans) for own in places]
     count = min(int(own.sum()) for own in inside)
     chosen = [own[where] for own, where in zip(low_pass(force, time_step), inside, strict=True)]
     kept = np.array([own[np.rint(np.linspace(0, len(own) - 1, count)).astype(int)] for own in chosen])

@@ -16,6 +16,8 @@ from panto_env.terminal import Force, Json, counting_on, print_json, print_table
     only=(
         "catenary",
         "pantograph",
+        "distances",
+        "controlled",
         "pantograph_scatter",
         "speed_drift",
         "actuator",

@@ -28,11 +28,12 @@ def make_tuning(
     conditions = [
         condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
     ]
+    pantograph = settings.riding[settings.controlled[0] - 1]
     return Tuning(
         catenary=settings.line.name,
-        pantograph=settings.pantograph.name,
+        pantograph=pantograph.name,
         catenary_sha256=content_unless_catalogue(settings.line),
-        pantograph_sha256=content_unless_catalogue(settings.pantograph),
+        pantograph_sha256=content_unless_catalogue(pantograph),
         place=settings.actuator.place,
         names=tuple(names),
         speeds_kmh=tuple(each.speed_kmh for each in tuned),
@@ -60,10 +61,11 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
-    case = settings.line, settings.pantograph, settings.actuator.place
+    pantograph = settings.riding[settings.controlled[0] - 1]
+    case = settings.line, pantograph, settings.actuator.place
     if not force and any(each.is_for(*case) for each in file.tunings):
         raise InputError(
-            f"{path} already holds gains for {settings.pantograph.name} on {settings.line.name}, "
+            f"{path} already holds gains for {pantograph.name} on {settings.line.name}, "
             f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
         )
 
