@@ -145,7 +145,7 @@ def drive(
     Both are those of the first controlled pantograph. played: as for ``run_pass``.
     """
     run, recorders = _record(settings, line, policy, speed_kmh, seed, played)
-    return run.train[line.controlled[0] - 1], recorders[0].forces()
+    return run.controlled, recorders[0].forces()
 
 
 def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:

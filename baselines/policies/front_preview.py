@@ -14,7 +14,7 @@ from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import RunSettings, run_settings
 from panto_env.metrics.low_pass import low_pass
-from panto_env.plant.state import Row
+from panto_env.plant.state import Place
 from panto_env.policies import Policy, find_policy, wishes
 
 from ..benchmark.seeds import TRAINING
@@ -81,8 +81,7 @@ class FrontPreview:
             raise InputError("front-preview needs a pantograph in front: control one behind another.")
         distances = tuple(own.distance for own in train.collectors)
         pantographs = tuple(own.pantograph for own in train.collectors)
-        place = "both" if len(context.channels) > 1 else ("frame", "head")[context.channels[0]]
-        if place == "both":
+        if len(context.channels) > 1:
             raise InputError("front-preview drives one actuator, on frame or head, not both.")
         self._gains = _gains(
             context.catenary,
@@ -91,7 +90,7 @@ class FrontPreview:
             number + 1,
             context.speed,
             context.control_interval,
-            place,
+            Place(context.channels[0]).name.lower(),
             self._assumed,
         )
         self._base.reset(context)
@@ -179,12 +178,11 @@ class _Pass:
             given.append(0.0 if commands is None else commands[len(given) % len(commands)])
             action = policy.act(task.results.observation[0].copy()) + given[-1] / limit
             task.step(action[None])
-        own = task.trajectory(0, last=True).train[task.episode.controlled[0]]
+        own = task.trajectory(0, last=True).controlled
         count = len(given) * task.length.control_steps
         force = low_pass(own.contact_force, own.time_step)[-count:]
         self.told, self.given = np.array(told), np.array(given)
         self.force = force.reshape(len(given), -1).mean(axis=1)
-        assert task.plant.of(0, Row.STEP) >= count
 
     def features(self, mean: float) -> Array:
         """Deviations of what was told, at places ahead and in the past, (n, gains)."""

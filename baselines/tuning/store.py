@@ -28,7 +28,7 @@ def make_tuning(
     conditions = [
         condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
     ]
-    pantograph = settings.riding[settings.controlled[0] - 1]
+    pantograph = settings.controlled_pantograph
     return Tuning(
         catenary=settings.line.name,
         pantograph=pantograph.name,
@@ -61,7 +61,7 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
-    pantograph = settings.riding[settings.controlled[0] - 1]
+    pantograph = settings.controlled_pantograph
     case = settings.line, pantograph, settings.actuator.place
     if not force and any(each.is_for(*case) for each in file.tunings):
         raise InputError(

@@ -66,7 +66,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
     ratios = [1.6] * len(train) + ([1, 1] if acting else [1])  # limits of forces take room
     axes = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios).tolist()
     contacts, height, others = axes[: len(train)], axes[len(train)], axes[len(train) + 1 :]
-    covered = train[-1].spans(spans)  # the last one comes onto the line last
+    covered = run.common_spans(spans)
     for place, (contact, own) in enumerate(zip(contacts, train, strict=True)):
         shown = own.inside(spans if covered is None else covered)
         position = own.position[shown]
@@ -92,11 +92,10 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
     figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
-    names, policies = ([getattr(own, each) for own in train] for each in ("pantograph", "policy"))
-    words = f"pantographs {' and '.join(names)}" if several else f"pantograph {run.pantograph}"
+    words = f"{'pantographs' if several else 'pantograph'} {run.pantographs}"
+    where = f"{words}, line {run.catenary}, {run.speed_kmh:g} km/h"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
-    policy = " and ".join(policies if len(set(policies)) > 1 else policies[:1])
-    figure.suptitle(f"{words}, line {run.catenary}, {run.speed_kmh:g} km/h, policy {policy}, {shown_spans}")
+    figure.suptitle(f"{where}, policy {run.policies}, {shown_spans}")
     return figure
 
 

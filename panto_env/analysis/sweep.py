@@ -257,7 +257,7 @@ def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
     with _named(one_pass):
         run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
         train = run.train
-        covered = spans if run.terminated else train[-1].spans(spans) or spans
+        covered = spans if run.terminated else run.common_spans(spans) or spans
         figures = [Figures.none() if run.terminated else own.summary(covered) for own in train]
     return [
         {

@@ -1,4 +1,4 @@
-"""Trains in a sweep: distances between pantographs as parameters, and rows of each pantograph."""
+"""Trains in a sweep: distances between pantographs as parameters."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
             alert(trajectory.ending, "It has no figures.")
         raise typer.Exit(1)
     train = trajectory.train
-    covered = train[-1].spans(chosen)  # the last one comes onto the line last: all are compared over these
+    covered = trajectory.common_spans(chosen)
     chosen = covered or chosen
     if json:
         results = [
@@ -102,13 +102,13 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
         behind = {"followers": others} if others else {}
         print_json(_facts(trajectory) | {"spans": covered} | results[0] | behind)
         return
-    names = [own.pantograph for own in train]
-    table = Table("figure", *(["value"] if len(train) == 1 else _numbered(names)), "unit")
+    numbered = [f"{place} {own.pantograph}" for place, own in enumerate(train, start=1)]
+    table = Table("figure", *(numbered if len(train) > 1 else ["value"]), "unit")
     every = [own.summary(chosen) for own in train]
     for key, label in LABELS.items():
         table.add_row(label.name, *(number(label.scale * getattr(own, key), 2) for own in every), label.unit)
-    title = f"{' and '.join(names)} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
-    console.print(f"{title}, policy {' and '.join(_policies(trajectory))}, spans {in_words(covered)}")
+    title = f"{trajectory.pantographs} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
+    console.print(f"{title}, policy {trajectory.policies}, spans {in_words(covered)}")
     for place, own in enumerate(train, start=1):
         if not math.isnan(own.target_mean):
             at = ", both at the mean speed" if own.drifts else ""
@@ -122,16 +122,6 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
         title = f"Requirements at {own.speed_kmh:g} km/h, {own.line.system}"
         title += f", pantograph {place}" if len(train) > 1 else ""
         print_criteria(own.compliance(chosen), title)
-
-
-def _numbered(names: list[str]) -> list[str]:
-    return [f"{place} {name}" for place, name in enumerate(names, start=1)]
-
-
-def _policies(run: Trajectory) -> list[str]:
-    """Policies of a train's pantographs; one name where all have the same."""
-    names = [own.policy for own in run.train]
-    return names[:1] if len(set(names)) == 1 else names
 
 
 @contextmanager

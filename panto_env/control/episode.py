@@ -86,11 +86,7 @@ def new_episode(
         time_step=plant.time_step,
         control_steps=control_steps,
         front=front_arrays(
-            layout.front,
-            plant.train,
-            lanes,
-            settings.runs.speeds[0] * plant.time_step * control_steps,
-            control_steps,
+            layout.front, plant.train, lanes, settings.runs.speeds[0] * plant.time_step * control_steps
         ),
         mean_share=_share(settings.control_interval, MEAN_TIME),
         washout_share=_share(settings.control_interval, settings.washout),

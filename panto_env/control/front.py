@@ -24,15 +24,12 @@ class FrontArrays(NamedTuple):
 
     ahead: Array  # (places,): distances ahead of a controlled pantograph (m)
     behind: Array  # (agents,): its distance behind the one in front (m); 0 where there is none
-    own: tuple[int, ...]  # collector in front of each agent; its own where there is none
+    collector: tuple[int, ...]  # that in front of each agent; its own where there is none
     reading: Array  # (rows, readings): of the one in front, where it is not controlled itself
     kept: Array  # (rows, times): its contact force after each control step (N), time n in column n % times
-    control_steps: int  # plant steps in a control step
 
 
-def front_arrays(
-    places: tuple[float, ...], train: Train, lanes: int, slowest: float, control_steps: int
-) -> FrontArrays:
+def front_arrays(places: tuple[float, ...], train: Train, lanes: int, slowest: float) -> FrontArrays:
     """Arrays for the agents of all lanes; slowest: distance that a train covers in a control step (m).
 
     Raises InputError where a place lies beyond the pantograph in front, or no controlled one has any.
@@ -59,31 +56,29 @@ def front_arrays(
     return FrontArrays(
         ahead=np.array(places, dtype=float),
         behind=behind,
-        own=tuple(max(number - 1, 0) for number in driven),
+        collector=tuple(max(number - 1, 0) for number in driven),
         reading=np.zeros((rows, len(Reading) if places else 0)),
         kept=np.zeros((rows, times)),
-        control_steps=control_steps,
     )
 
 
 @inlined
-def keep_front(front, sensors, run, reading, agent, lane, row):
+def keep_front(episode, sensors, run, reading, agent, lane, row):
     """Keep the contact force that the one in front has read in a control step; reading: its readings."""
-    c = front.own[agent]
+    c, kept = episode.front.collector[agent], episode.front.kept[row]
     force = reading[READING.CONTACT_FORCE]
     if sensors.noise.shape[2] > 0:
         force += sensors.noise[lane, c, sensors.noise_used[lane] & NOT_NEGATIVE, READING.CONTACT_FORCE]
-    time = int(run.table[c, lane, ROW.STEP]) // front.control_steps
-    front.kept[row, time % front.kept.shape[1]] = force
+    kept[int(run.table[c, lane, ROW.STEP]) // episode.control_steps % kept.size] = force
 
 
 @inlined
-def force_in_front(front, own, agent, row, place):
+def force_in_front(episode, own, agent, row, place):
     """Contact force (N) that the one in front measured at a place ahead: between the nearest two readings."""
-    stride = own[ROW.STRIDE] * front.control_steps
+    front, kept = episode.front, episode.front.kept[row]
+    stride = own[ROW.STRIDE] * episode.control_steps
     ago = max(front.behind[agent] - front.ahead[place], 0.0) / stride
-    time, times = int(own[ROW.STEP]) // front.control_steps, front.kept.shape[1]
-    whole = int(ago)
-    later = front.kept[row, (time - whole + times * times) % times]
-    earlier = front.kept[row, (time - whole - 1 + times * times) % times]
+    time, times, whole = int(own[ROW.STEP]) // episode.control_steps, kept.size, int(ago)
+    later = kept[(time - whole + times * times) % times]
+    earlier = kept[(time - whole - 1 + times * times) % times]
     return later + (ago - whole) * (earlier - later)

@@ -39,7 +39,7 @@ class EpisodeLength:
                 f"distance must be at most {plant.model.length - train:g} m on {plant.spans} spans, "
                 f"not {beside(self.distance - train, plant.model.length - train, '.6g')} m; set more spans."
             )
-        self.own_distance = self.distance - train if train else self.distance  # of the last collector
+        self.own_distance = self.distance - train  # of the last collector
         self.control_interval = settings.control_interval
         self.control_steps = whole_steps(settings.control_interval, plant.time_step)
         self.speed_range = self.check_speeds(settings.speed_kmh)

@@ -141,7 +141,7 @@ def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], collector, lane)
     for place in range(episode.front.ahead.size):
-        now[NOW_ROWS + place] = force_in_front(episode.front, own, agent, row, place)
+        now[NOW_ROWS + place] = force_in_front(episode, own, agent, row, place)
     now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))
     now[NOW.STRIDE] = stride(run, collector, lane, own[ROW.STEP])
     now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)

@@ -124,7 +124,7 @@ def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array,
     values[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
     table[rows] = values
     if task.episode.front.ahead.size and not start[:, Row.STEP].any():
-        in_front = task.plant.run.table[task.episode.front.own[agent], lanes]
+        in_front = task.plant.run.table[task.episode.front.collector[agent], lanes]
         task.episode.front.kept[rows] = in_front[:, Row.CONTACT_FORCE, None]  # at rest
     task.running.peak[rows] = -np.inf
 

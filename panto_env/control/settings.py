@@ -84,10 +84,16 @@ def _pantographs(value: Any) -> tuple[PantographData, ...]:
     return tuple(load_pantograph(each) for each in several)
 
 
+def _several(value: Any, kind: Any) -> list[Any] | None:
+    """One number or several, of a kind, as a list; None where some are none."""
+    several = list(value) if isinstance(value, list | tuple | np.ndarray) else [value]
+    right = all(isinstance(each, kind) and not isinstance(each, bool) for each in several)
+    return several if right else None
+
+
 def _distances(value: Any) -> tuple[float, ...]:
-    several = value if isinstance(value, list | tuple | np.ndarray) else [value]
-    numbers = [each for each in several if isinstance(each, int | float) and not isinstance(each, bool)]
-    if len(numbers) < len(several) or not all(0 < each <= FARTHEST for each in numbers):
+    numbers = _several(value, int | float)
+    if numbers is None or not all(0 < each <= FARTHEST for each in numbers):
         raise InputError(
             "distances must be positive numbers (m), one for each pantograph behind the first, not "
             f"{shown(value)}."
@@ -100,19 +106,17 @@ def _distances(value: Any) -> tuple[float, ...]:
 
 
 def _front(value: Any) -> tuple[float, ...]:
-    several = value if isinstance(value, list | tuple | np.ndarray) else [value]
-    numbers = [each for each in several if isinstance(each, int | float) and not isinstance(each, bool)]
-    rising = all(before < after for before, after in pairwise(numbers))
-    if len(numbers) < len(several) or not all(0 <= each <= FARTHEST for each in numbers) or not rising:
+    numbers = _several(value, int | float)
+    rising = numbers is not None and all(before < after for before, after in pairwise(numbers))
+    if numbers is None or not rising or not all(0 <= each <= FARTHEST for each in numbers):
         raise InputError(f"front must be increasing distances from 0 m up, not {shown(value)}.")
     return tuple(float(each) for each in numbers)
 
 
 def controlled_numbers(value: Any) -> tuple[int, ...]:
     """Numbers of the controlled pantographs, from the front. Raises InputError for anything else."""
-    several = value if isinstance(value, list | tuple) else [value]
-    numbers = [each for each in several if isinstance(each, int) and not isinstance(each, bool)]
-    if not numbers or len(set(numbers)) < len(several) or min(numbers) < 1:
+    numbers = _several(value, int)
+    if not numbers or len(set(numbers)) < len(numbers) or min(numbers) < 1:
         raise InputError(
             "controlled must name different pantographs by their numbers, 1 for the first, not "
             f"{shown(value)}."
@@ -365,6 +369,16 @@ class RunSettings(Numerics):
     def riding(self) -> tuple[PantographData, ...]:
         """The pantographs of the train, the first in front."""
         return self.pantographs or (self.pantograph,)
+
+    @property
+    def names(self) -> str:
+        """Names of the pantographs of the train, the first in front."""
+        return " and ".join(own.name for own in self.riding)
+
+    @property
+    def controlled_pantograph(self) -> PantographData:
+        """The controlled pantograph, of several the first."""
+        return self.riding[self.controlled[0] - 1]
 
     def with_pantograph(self, collector: int, pantograph: PantographData) -> Self:
         """These settings with another pantograph of a collector, counted from 0."""

@@ -81,7 +81,7 @@ def ending_of(line, wire, run, episode, lane):
 
 
 @inlined
-def end_episode(run, episode, own, task, values, flags, ending):
+def end_episode(episode, own, task, values, flags, ending):
     """Whether a controlled collector's episode ends here; an early end is charged to reward and cost."""
     early, at_end = ending > 0, own[ROW.STEP] >= task[TASK_ROW.END]
     if ending == ENDING.DIVERGED:
@@ -125,8 +125,8 @@ def plant_steps(line, wire, pantographs, actuators, run, sensors, samples, episo
             add_sample_to_figures(running, samples, own, task, now, lane, row)
             take_readings(sensors, c, step, own, now[NOW.READING :], lane)
             if episode.front.ahead.size > 0 and not front_is_controlled(episode, a):
-                own = run.table[episode.front.own[a], lane]
-                take_readings(sensors, episode.front.own[a], step, own, episode.front.reading[row], lane)
+                c = episode.front.collector[a]
+                take_readings(sensors, c, step, run.table[c, lane], episode.front.reading[row], lane)
     if episode.front.ahead.size > 0:
         for a in range(agents):
             row = lane * agents + a
@@ -134,13 +134,13 @@ def plant_steps(line, wire, pantographs, actuators, run, sensors, samples, episo
                 reading = episode.now[row - 1, NOW.READING :]
             else:
                 reading = episode.front.reading[row]
-            keep_front(episode.front, sensors, run, reading, a, lane, row)
+            keep_front(episode, sensors, run, reading, a, lane, row)
 
 
 @inlined
 def front_is_controlled(episode, agent):
     """Whether the pantograph in front of a controlled one is the controlled one before it."""
-    return agent > 0 and episode.controlled[agent - 1] == episode.front.own[agent]
+    return agent > 0 and episode.controlled[agent - 1] == episode.front.collector[agent]
 
 
 @inlined
@@ -174,7 +174,7 @@ def control_lane(packed, entries, values, flags, lane):
                 add_control_step_to_figures(task, now)
             else:
                 forget_reward(values[row])
-            ended = end_episode(run, episode, own, task, values[row], flags[row], ending)
+            ended = end_episode(episode, own, task, values[row], flags[row], ending)
         if ended:
             break
     for a in range(agents):

@@ -113,7 +113,7 @@ class Stepping:
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
         if self.odometers.drawn:
-            rows = skip if skip is None or self.agents == 1 else np.repeat(skip, self.agents)
+            rows = None if skip is None else np.repeat(skip, self.agents)
             self.odometers.prepare(self.episode.odometer, rows)
         if skip is None and results is None:
             return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible

@@ -65,9 +65,9 @@ class Task(TaskState):
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
         self.layout = layout(settings.observation, _entry_options(settings))
-        self.known_pantograph = settings.known_pantograph or settings.riding[settings.controlled[0] - 1]
+        self.known_pantograph = settings.known_pantograph or settings.controlled_pantograph
         if settings.normalise is not None:
-            known = settings.with_pantograph(settings.controlled[0] - 1, self.known_pantograph)
+            known = settings.with_pantograph(plant.train.driven[0], self.known_pantograph)
             speeds = self._speeds_of_passive_runs(settings.normalise)
             run = PassiveRun(known, speeds, passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
@@ -231,7 +231,7 @@ def passive_pass(settings: RunSettings) -> Trajectory:
     task = Task(settings)
     task.reset(0, np.random.default_rng(0))
     task.run_passively()
-    return task.trajectory(0, last=True).train[settings.controlled[0] - 1]
+    return task.trajectory(0, last=True).controlled
 
 
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:

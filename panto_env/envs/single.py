@@ -291,9 +291,8 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     @property
     def _title(self) -> str:
         plant = self.task.plant
-        riding = self.task.settings.riding
-        words = "pantograph" if len(riding) == 1 else "pantographs"
-        return f"{words} {' and '.join(own.name for own in riding)}, line {plant.catenary.name}"
+        words = "pantographs" if len(plant.train.collectors) > 1 else "pantograph"
+        return f"{words} {self.task.settings.names}, line {plant.catenary.name}"
 
 
 PantographEnv.__doc__ = described(PantographEnv.__doc__ or "")

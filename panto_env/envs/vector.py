@@ -205,8 +205,7 @@ class PantographVectorEnv(
         frames = []
         for lane in self._drawn:
             task, place = self._lanes.task_of(lane)
-            names = " and ".join(own.name for own in task.settings.riding)
-            title = f"lane {lane}: {names} on {task.plant.catenary.name}"
+            title = f"lane {lane}: {task.settings.names} on {task.plant.catenary.name}"
             reward = float(self._reward_so_far[lane])
             frames.append(self._viewer.frame(task, place, title, reward))
         return tuple(frames)

@@ -199,7 +199,7 @@ def _each(
     """
     numbered = any(run.followers for run in runs)
     for run in runs:
-        covered = run.train[-1].spans(spans) or spans
+        covered = run.common_spans(spans) or spans
         for number, own in enumerate(run.train, start=1):
             cells = {name: getattr(own, name) for name in RUN}
             cells |= {NUMBER: number} if numbered else {}

@@ -122,6 +122,24 @@ class Trajectory:
         return self.train[first - 1]
 
     @property
+    def pantographs(self) -> str:
+        """Names of the pantographs of all collectors, the first in front."""
+        return " and ".join(own.pantograph for own in self.train)
+
+    @property
+    def policies(self) -> str:
+        """Names of the policies of all collectors; one name where all have the same."""
+        names = [own.policy for own in self.train]
+        return names[0] if len(set(names)) == 1 else " and ".join(names)
+
+    def common_spans(self, choice: SpanChoice = None) -> Spans | None:
+        """First and last span over which all collectors are compared: those that the last one covers.
+
+        None for the whole run. Raises InputError as ``spans`` does.
+        """
+        return self.train[-1].spans(choice)
+
+    @property
     def spans_differ(self) -> bool:
         """Whether the line is a sequence of spans, not one that is repeated."""
         return self.alignment.pitch is None or self.line_ends

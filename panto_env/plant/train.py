@@ -16,6 +16,7 @@ from .state import ROW
 from .wind import wind_at
 
 MOST_COLLECTORS = 4
+"""Maximum number of pantographs of a train."""
 
 
 @dataclass(frozen=True)

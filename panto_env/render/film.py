@@ -93,9 +93,8 @@ class _Pass:
         self.task, driver = ready_pass(filmed.policy, filmed.settings, filmed.seed)
         self._steps = steps_of_policy(self.task, driver, run.controlled.policy)
         self._picture = Picture(*size, highest)
-        names = [own.pantograph for own in run.train]
-        words = "pantograph" if len(names) == 1 else "pantographs"
-        self._title = f"{filmed.title}: {words} {' and '.join(names)}, line {run.catenary}"
+        words = "pantographs" if run.followers else "pantograph"
+        self._title = f"{filmed.title}: {words} {run.pantographs}, line {run.catenary}"
         self._figures = figures
 
     @property
@@ -120,7 +119,7 @@ def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
     run = filmed.run
     if run.terminated:
         return {"figures": "none: it ends early"}
-    figures, spans = _summary(run), in_words(run.train[-1].spans())
+    figures, spans = _summary(run), in_words(run.common_spans())
     values = {"mean": figures.mean, "std": figures.std}
     texts = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
     if filmed is not first and not first.run.terminated and alike(filmed.run, first.run):
@@ -131,4 +130,4 @@ def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
 
 def _summary(run: Trajectory) -> Figures:
     """Figures of the pantograph that is shown, over the spans that the last one covers."""
-    return run.controlled.summary(run.train[-1].spans())
+    return run.controlled.summary(run.common_spans())

@@ -33,10 +33,8 @@ class Strip:
         """policy: its name. The task must keep its samples."""
         plant = task.plant
         lane, collector = shown_collector(task, 0)
-        riding = task.settings.riding
-        which = f"pantograph {collector + 1} of " if len(riding) > 1 else ""
-        names = " and ".join(own.name for own in riding)
-        where = f"{which}{names} on {plant.catenary.name} at {to_kmh(task.speed[0]):.4g} km/h"
+        which = f"pantograph {collector + 1} of " if len(plant.train.collectors) > 1 else ""
+        where = f"{which}{task.settings.names} on {plant.catenary.name} at {to_kmh(task.speed[0]):.4g} km/h"
         self._title = f"{where}, policy {policy}"
         self._share = plant.of(0, Row.STEP) / task.end(0)
         self._felt, self._position = felt(task, lane, SPANS, collector), position_of(task, lane, collector)

@@ -68,15 +68,15 @@ class Findings:
         return self.number <= 1
 
     @property
-    def riding(self) -> list[str]:
-        """Names of all pantographs of the run."""
-        return [own.pantograph for own in self.train or (self.run,)]
+    def whole(self) -> Trajectory:
+        """The run, with the records of all its pantographs."""
+        return self.train[0] if self.train else self.run
 
     @cached_property
     def covered(self) -> Spans | None:
         """The evaluated spans, of a train the last one's; None where it ended early or is too short."""
         try:
-            return (self.train or (self.run,))[-1].spans()
+            return self.whole.common_spans()
         except InputError:
             return None
 

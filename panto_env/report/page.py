@@ -85,7 +85,7 @@ def digits(value: float) -> str:
 
 
 def _title(found: Sequence[Findings]) -> str:
-    pairs = {f"{' and '.join(one.riding)} on {one.run.catenary}" for one in found}
+    pairs = {f"{one.whole.pantographs} on {one.run.catenary}" for one in found}
     speeds = sorted({one.run.speed_kmh for one in found})
     return f"{', '.join(sorted(pairs))} at {', '.join(f'{speed:g}' for speed in speeds)} km/h"
 

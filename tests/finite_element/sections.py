@@ -60,6 +60,12 @@ def overlap(first_span: int, *rises: float) -> dict[str, Any]:
     return {"sequence": [{}] * 14, "overlaps": [{"first_span": first_span, "rises": rises}]}
 
 
+def behind_last(line: FlexibleCatenaryData, spans: tuple[int, int]) -> float:
+    """Position (m) in the middle of the span behind the last of some spans."""
+    supports = line.alignment().supports
+    return float(supports[spans[1]] + supports[spans[1] + 1]) / 2
+
+
 @dataclass(frozen=True)
 class Section:
     """A line, the pantograph that runs along it, and the spans whose figures are compared."""
@@ -74,8 +80,7 @@ class Section:
     @property
     def distance(self) -> float:
         """Length of a pass (m): to the middle of the span behind the last one compared."""
-        supports = self.line.alignment().supports
-        return (supports[self.spans[1]] + supports[self.spans[1] + 1]) / 2
+        return behind_last(self.line, self.spans)
 
     def by_simulator(self) -> Trajectory:
         """The same pass by the simulator: its default grid and step, the whole line at once.

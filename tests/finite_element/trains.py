@@ -16,7 +16,7 @@ from panto_env.plant.train import Train
 
 from .contacts import Collector
 from .hermite import Array
-from .sections import sections
+from .sections import behind_last, sections
 from .simulation import Result, ride_together
 from .system import build
 
@@ -52,8 +52,7 @@ class Case:
     @property
     def distance(self) -> float:
         """Way of the first collector (m): the last one ends in the middle of the span behind the last."""
-        supports = self.line.alignment().supports
-        return float(supports[self.spans[1]] + supports[self.spans[1] + 1]) / 2 + self.collectors[-1].behind
+        return behind_last(self.line, self.spans) + self.collectors[-1].behind
 
     def by_simulator(self, numerics: Mapping[str, float | str] | None = None) -> list[Trace]:
         """The pass by the simulator, one trace a collector; numerics: settings besides the whole line."""

@@ -59,11 +59,11 @@ def test_what_is_judged_by_span_stretch_and_dropper_is_what_is_evaluated(monkeyp
             raise InputError("The run is too short.")
         return covered
 
-    one = Findings(SimpleNamespace(spans=spans, spans_differ=True), "it")
+    one = Findings(SimpleNamespace(common_spans=spans, spans_differ=True), "it")
     assert one.covered == covered
     assert (one.by_span, one.by_stretch, one.droppers) == (["by_span"], ["by_stretch"], ["moving_droppers"])
     assert asked == [(name, choice) for name in ("by_span", "by_stretch", "moving_droppers")]
-    assert Findings(SimpleNamespace(spans=spans, spans_differ=False), "it").by_span == []
+    assert Findings(SimpleNamespace(common_spans=spans, spans_differ=False), "it").by_span == []
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,8 @@ def test_a_run_without_its_design_is_refused(short):
 def test_titles_and_names_tell_runs_apart():
     def of(file, **facts):
         usual = {"catenary": "a", "pantograph": "b", "speed_kmh": 250.0, "policy": "passive", "seed": 0}
-        return Findings(SimpleNamespace(**usual | facts), file)
+        known = usual | facts
+        return Findings(SimpleNamespace(**known, pantographs=known["pantograph"]), file)
 
     runs = [of("1"), of("2", speed_kmh=80.5), of("3", pantograph="c")]
     assert _title(runs) == "b on a, c on a at 80.5, 250 km/h"

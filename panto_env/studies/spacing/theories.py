@@ -52,7 +52,7 @@ def frequencies(case: Case, speed_kmh: float, after: Wake) -> dict[str, float]:
     return {
         "span": per_span,
         "half_span": 2 * per_span,
-        "contact_wire": math.sqrt(tensions[0] / masses[0]) / (2 * length),
+        "contact_wire": wires[0].wave_speed / (2 * length),
         "both_wires": math.sqrt(sum(tensions) / sum(masses)) / (2 * length),
         "measured": strongest(after),
     }
