@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
@@ -20,7 +18,6 @@ from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,
     SpeedDrift,
-    controlled_numbers,
     default,
     description,
 )
@@ -30,51 +27,30 @@ from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import check_named
 
+from ..line import LineAndTrain, as_clause, distinct
 from .controls import policy_of
 from .seeds import TEST, check_seeds, salted_seed
 
-S = TypeVar("S", bound=Settings)
 _Span = Annotated[int, Between(1, MOST_SPANS)]
 REFERENCE = "passive"
 """The policy that every other one is compared with."""
-
-
-def _clause(read: Callable[[Any], S]) -> Callable[[Any], S]:
-    """``read`` for a field: its errors become clauses, to which pydantic adds the key and the value."""
-
-    def read_field(value: Any) -> S:
-        try:
-            return read(value)
-        except InputError as error:
-            raise ValueError(str(error).rstrip(".")) from error
-
-    return read_field
 
 
 def _condition(value: Any) -> LineCondition:
     return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
 
 
-_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(_clause(actuator_settings))]]
-_Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(_clause(sensor_settings))]]
+_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
+_Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(as_clause(sensor_settings))]]
 
 
-class Line(Settings):
-    """A pantograph on a line, and the speeds to run at."""
+class Line(LineAndTrain):
+    """A train on a line, the speeds to run at, and the policies that run there only.
 
-    catenary: str = Field(default("catenary"), description=description("catenary"))
-    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
-    pantographs: tuple[str, ...] = Field(
-        (), description="of a train, the first in front, instead of pantograph"
-    )
-    distances: tuple[Positive, ...] = Field((), description=description("distances"))
-    controlled: Annotated[tuple[int, ...], BeforeValidator(_clause(controlled_numbers))] = Field(
-        default("controlled"),
-        validate_default=True,
-        description="numbers of the pantographs that a policy controls, each an instance of its own, 1 for "
-        "the first; the figures are those of the one of them whose sigma is largest",
-    )
-    speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
+    Each controlled pantograph has an instance of the policy of its own; the figures are those of the one of
+    them whose sigma is largest.
+    """
+
     distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
     spans: tuple[_Span, _Span] | None = Field(
         None,
@@ -85,17 +61,10 @@ class Line(Settings):
         (), description="policies that run on this line only, in addition to those that run on every line"
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _first_of_several(cls, values: Any) -> Any:
-        """The pantograph is the first of several."""
-        several = values.get("pantographs") if isinstance(values, dict) else None
-        return {"pantograph": several[0], **values} if several else values
-
-    @field_validator("speeds_kmh", "policies")
+    @field_validator("policies")
     @classmethod
     def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _checked_distinct(value)
+        return distinct(value)
 
 
 class BenchmarkSettings(Settings):
@@ -135,7 +104,7 @@ class BenchmarkSettings(Settings):
         default("actuator"), validate_default=True, description=description("actuator")
     )
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
-    line_condition: Annotated[LineCondition, BeforeValidator(_clause(_condition))] = Field(
+    line_condition: Annotated[LineCondition, BeforeValidator(as_clause(_condition))] = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     pantograph_scatter: PantographScatter = Field(
@@ -168,7 +137,7 @@ class BenchmarkSettings(Settings):
     @field_validator("policies", "seeds")
     @classmethod
     def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _checked_distinct(value)
+        return distinct(value)
 
     @field_validator("seeds")
     @classmethod
@@ -194,20 +163,13 @@ class BenchmarkSettings(Settings):
 
     @model_validator(mode="after")
     def _with_distinct_names(self) -> Self:
-        _checked_distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
+        distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
         return self
 
     @model_validator(mode="after")
     def _without_repeated_line(self) -> Self:
-        _checked_distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
+        distinct(tuple(line.place for line in self.lines))
         return self
-
-
-def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    twice = next((value for value, count in Counter(values).items() if count > 1), None)
-    if twice is not None:
-        raise ValueError(f"{shown(twice)} is given twice")
-    return values
 
 
 def load_benchmark(path: str | Path) -> BenchmarkSettings:

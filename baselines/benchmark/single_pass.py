@@ -150,7 +150,8 @@ def drive(
 
 def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:
     """Which of the controlled pantographs is judged, from 0: that with the largest sigma."""
-    return int(np.argmax([run.train[number - 1].summary(spans).std for number in line.controlled]))
+    worst = run.worst_controlled(spans)
+    return next(agent for agent, number in enumerate(line.controlled) if run.train[number - 1] is worst)
 
 
 def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: float) -> Array:
@@ -190,7 +191,7 @@ def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     """Settings of the runs along a line, by name, except the speed."""
     return {
         "catenary": line.catenary,
-        **_riding(line),
+        **line.riding,
         "actuator": settings.actuator,
         "sensors": settings.sensors,
         "line_condition": settings.line_condition,
@@ -199,13 +200,6 @@ def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
         "control_interval": settings.control_interval,
         "distance": line.distance,
     }
-
-
-def _riding(line: Line) -> dict[str, Any]:
-    if not (line.pantographs or line.distances) and line.controlled == (1,):
-        return {"pantograph": line.pantograph}
-    several = line.pantographs or (line.pantograph,)
-    return {"pantographs": several, "distances": line.distances, "controlled": line.controlled}
 
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:

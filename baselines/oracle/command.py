@@ -30,7 +30,16 @@ if TYPE_CHECKING:
 
 
 @with_settings(
-    only=("catenary", "pantograph", "actuator", "line_condition", "control_interval"), defaults=False
+    only=(
+        "catenary",
+        "pantograph",
+        "distances",
+        "controlled",
+        "actuator",
+        "line_condition",
+        "control_interval",
+    ),
+    defaults=False,
 )
 def oracle(
     given: dict[str, Any],

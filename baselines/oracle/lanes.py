@@ -82,15 +82,17 @@ class _Group:
         self._places = [int(place) for place in task.actuator.places]
         self._first = begin * task.length.control_steps
         rows = self._first + control_steps * task.length.control_steps + 1
-        shape = (lanes, rows, 1, SAMPLE_ROWS)
-        check_record(8.0 * lanes * (rows - self._first) * SAMPLE_ROWS, "the lanes of an oracle")
+        collectors = len(task.plant.train.collectors)
+        self._controlled = settings.controlled[0] - 1
+        shape = (lanes, rows, collectors, SAMPLE_ROWS)
+        check_record(8.0 * lanes * (rows - self._first) * collectors * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never written, so they take no memory.
         self._samples = Samples(
             rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))
         )
-        self._plant.advance_passively(
-            self._first, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0)))
-        )
+        # One that rides behind others begins where it comes onto the line.
+        rest = self._first - int(task.plant.of(0, Row.STEP, self._controlled))
+        self._plant.advance_passively(rest, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0))))
         moving = self._plant.model.wire, self._plant.actuators, self._plant.run
         self._moving = list(arrays_of(moving))
         self._start = [(array, array.copy()) for array in self._moving]
@@ -136,14 +138,14 @@ class _Group:
 
     @property
     def _force(self) -> Array:
-        """Contact force recorded last along the stretch (N), (lanes, samples), a view."""
-        return self._samples.rows[:, self._first + 1 :, 0, Row.CONTACT_FORCE]
+        """Contact force of the controlled pantograph, recorded last (N), (lanes, samples of the stretch)."""
+        return self._samples.rows[:, self._first + 1 :, self._controlled, Row.CONTACT_FORCE]
 
     def _advance(self, commands: Array) -> None:
         """Advance all lanes under commands (N), (lanes, steps, places)."""
-        now = np.zeros((len(commands), 1, len(Place)))
+        now = np.zeros((len(commands), self._samples.rows.shape[2], len(Place)))
         for step in range(commands.shape[1]):
-            now[:, 0, self._places] = commands[:, step]
+            now[:, self._controlled, self._places] = commands[:, step]
             self._plant.advance(now, self._steps, self._samples)
 
 

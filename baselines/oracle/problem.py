@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from panto_env import Trajectory, simulate
+from panto_env.analysis.simulation import OFF_LINE
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import passive_mean, trim_of_pass
@@ -42,12 +44,15 @@ class Problem:
         settings = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
         if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
             raise InputError("An oracle takes one speed, without run_in and without pantograph_scatter.")
+        if len(settings.controlled) > 1:
+            numbers = " and ".join(map(str, settings.controlled))
+            raise InputError(f"An oracle controls one pantograph of a train, not {numbers}; name one.")
         self.given, self.seed, self.settings = dict(given), seed, settings
-        self.passive = passive = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
+        run = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
+        self.passive = passive = run.controlled
         if passive.terminated:
             raise InputError(f"There is no oracle, because the passive run has no figures. {passive.ending}")
         covered = passive.spans(spans)
-        inside = np.flatnonzero(passive.inside(spans))
         self.spans = covered
         self.figures = passive.summary(spans)
         self.chosen = spans
@@ -55,11 +60,17 @@ class Problem:
         self.interval = settings.control_interval
         self.steps = whole_steps(self.interval, passive.time_step)
         start = 0.0 if covered is None else passive.time_at(passive.alignment.limits(covered)[0])
-        self.begin = max(0, int((start - LEAD) / self.interval + 1e-9))
+        waited = round(passive.time[0] / passive.time_step - 0.5)
+        """Plant steps before the controlled pantograph came onto the line."""
+        inside = waited + np.flatnonzero(passive.inside(spans))
+        on_line = passive.position[0] - 0.5 * (passive.position[1] - passive.position[0]) >= -OFF_LINE
+        self.first_action = math.ceil((waited + (not on_line)) / self.steps)
+        """Control step of a policy's first action, when the pantograph has come onto the line."""
+        self.begin = max(self.first_action, int((start - LEAD) / self.interval + 1e-9))
         self.count = int(inside[-1]) // self.steps + 1 - self.begin
         """Number of knots of one actuator."""
         self._inside = inside - self.begin * self.steps  # samples evaluated, counted from the first knot's
-        before = passive.contact_force[: self.begin * self.steps]
+        before = passive.contact_force[: self.begin * self.steps - waited]
         self.every = max(1, round(RESOLUTION / passive.time_step))
         """Evaluated samples from one row of the least squares to the next."""
         settled = settled_at(passive.contact_force[0], passive.time_step)
@@ -107,16 +118,17 @@ class Problem:
         return self._inside[:: self.every]
 
     def replay(self, commands: Array) -> Trajectory:
-        """The whole pass as ``simulate`` runs it under commands (N), (count, places)."""
-        rest = np.zeros((self.begin, self.places))
+        """The controlled pantograph's pass as ``simulate`` runs it under commands (N), (count, places)."""
+        rest = np.zeros((self.begin - self.first_action, self.places))
         actions = np.concatenate([rest, commands / self.knots.limit, np.zeros((1, self.places))])
-        return simulate(
+        run = simulate(
             **self.given,
             policy=Tape(actions),
             seed=self.seed,
             record_droppers=False,
             evaluated=self.chosen,
         )
+        return run.controlled
 
     def _filtered(self, force: Array) -> Array:
         """Force (N), (runs, samples), from the first knot on, low-passed as EN 50317 says."""

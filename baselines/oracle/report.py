@@ -31,10 +31,16 @@ LEGEND = (
 def title(oracle: Oracle) -> str:
     """Title of a pass: pantograph, line, speed, spans and seed."""
     problem = oracle.problem
+    which = which_of_train(problem.settings.pantographs, problem.settings.controlled)
     return (
-        f"{problem.passive.pantograph} on {problem.passive.catenary} at {problem.passive.speed_kmh:g} km/h, "
-        f"spans {in_words(problem.spans)}, seed {problem.seed}"
+        f"{problem.passive.pantograph}{which} on {problem.passive.catenary} "
+        f"at {problem.passive.speed_kmh:g} km/h, spans {in_words(problem.spans)}, seed {problem.seed}"
     )
+
+
+def which_of_train(pantographs: Sequence[Any], controlled: Sequence[int]) -> str:
+    """Which pantograph of a train of several is controlled, after a comma; empty for one alone."""
+    return f", pantograph {controlled[0]} of {len(pantographs)}" if pantographs else ""
 
 
 def convergence(oracle: Oracle) -> Table:
@@ -100,7 +106,7 @@ def stored_table(data: Mapping[str, Any]) -> Table:
         changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
         rows.append(
             (
-                cell["catenary"],
+                cell["catenary"] + which_of_train(cell.get("pantographs", ()), cell.get("controlled", ())),
                 f"{preset}, {actuator.place}",
                 number(cell["speed_kmh"], 0),
                 in_words(tuple(cell["spans"])),

@@ -17,6 +17,7 @@ from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
+from ..line import LineAndTrain
 from .search import STARTS
 
 MOST_HOPS = 1000
@@ -30,11 +31,9 @@ def _condition(value: Any) -> LineCondition:
     return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
 
 
-class OracleCell(Settings):
-    """A pantograph with an actuator on a line, and the speeds to run at."""
+class OracleCell(LineAndTrain):
+    """A train with an actuator on a line, and the speeds to run at."""
 
-    catenary: str = Field(default("catenary"), description=description("catenary"))
-    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
     actuator: _Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
@@ -75,7 +74,7 @@ class OracleSettings(Settings):
         """Settings of a run, by name, for a cell at a speed (km/h)."""
         return {
             "catenary": cell.catenary,
-            "pantograph": cell.pantograph,
+            **cell.riding,
             "speed_kmh": speed_kmh,
             "actuator": cell.actuator,
             "line_condition": self.line_condition,

@@ -18,7 +18,7 @@ from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import is_entry
 from panto_env.control.identity import OF_TRAINS
-from panto_env.control.settings import run_settings
+from panto_env.control.settings import RunSettings, run_settings
 
 from .search import METHOD, Oracle
 from .settings import OracleSettings
@@ -79,6 +79,7 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
         {
             "catenary": settings.line.name,
             "pantograph": settings.pantograph.name,
+            **_train(settings),
             "speed_kmh": settings.speed_kmh[0],
             "actuator": settings.actuator.model_dump(mode="json"),
             "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
@@ -90,6 +91,14 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
         }
     )
     return table
+
+
+def _train(settings: RunSettings) -> dict[str, Any]:
+    """Pantographs, distances and the controlled one of a train of several, as plain data."""
+    if not settings.pantographs:
+        return {}
+    names = [each.name for each in settings.pantographs]
+    return {"pantographs": names, "distances": settings.distances, "controlled": settings.controlled}
 
 
 def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
@@ -147,12 +156,19 @@ def stored_actions(given: Mapping[str, Any], path: Path = RESULTS) -> NDArray[np
     """Actions, (control steps, actions), of a stored oracle from the start of its pass on; None without one.
 
     The oracle may be for another condition of the line: line and pantograph, by their values, speed and
-    actuator are those of ``given``, settings of a run by name. Those of files are not found.
+    actuator are those of ``given``, settings of a run by name. Those of files are not found, nor those of
+    trains of several pantographs.
     """
     settings = run_settings(given)
+    if settings.pantographs:
+        return None
     actuator = settings.actuator.model_dump(mode="json")
     for one in load(path)["cells"]:
-        same = one["speed_kmh"] == settings.speed_kmh[0] and one["actuator"] == actuator
+        same = (
+            "pantographs" not in one
+            and one["speed_kmh"] == settings.speed_kmh[0]
+            and one["actuator"] == actuator
+        )
         same = same and is_entry(settings.line, one["catenary"], None)
         if same and is_entry(settings.pantograph, one["pantograph"], None):
             found = one["passes"][0]

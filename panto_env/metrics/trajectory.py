@@ -121,6 +121,16 @@ class Trajectory:
         first: int = self.settings.get("controlled", [1])[0]
         return self.train[first - 1]
 
+    def worst_controlled(self, spans: SpanChoice = None) -> Trajectory:
+        """Record of the controlled collector by which a train is judged: that with the largest sigma.
+
+        spans: as in ``summary``. The first one where the run ended early. Raises InputError as ``summary``.
+        """
+        numbers = self.settings.get("controlled", [1])
+        if len(numbers) == 1 or self.terminated:
+            return self.controlled
+        return max((self.train[number - 1] for number in numbers), key=lambda own: own.summary(spans).std)
+
     @property
     def pantographs(self) -> str:
         """Names of the pantographs of all collectors, the first in front."""

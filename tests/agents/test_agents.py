@@ -602,3 +602,15 @@ class TestResidual:
         given = {"policies": (path, f"blind of {path}"), "lines": (line,), "seeds": (0,)}
         outcome = run(BenchmarkSettings(**given, actuator="realistic"), workers=1)
         assert outcome.cells[1].figures["effort"] > 0
+
+
+def test_a_train_is_evaluated_by_the_controlled_pantograph_that_swings_most():
+    train = {"pantographs": ["dsa380"] * 2, "distances": [80.0], "controlled": [1, 2], "accuracy": "fast"}
+    (own,) = Comparison(train, (280.0,), (0,)).run("pd")
+    active, passive = (simulate(**train, speed_kmh=280.0, policy=policy).train for policy in ("pd", None))
+    assert (
+        own.passive.std
+        == max(run.summary().std for run in passive)
+        > min(run.summary().std for run in passive)
+    )
+    assert own.policy.std == max(run.summary().std for run in active)

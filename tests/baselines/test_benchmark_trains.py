@@ -1,7 +1,5 @@
 """A benchmark of trains: the judged pantograph is the controlled one, the worst where several are."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 TRAIN = {"pantographs": ("dsa380", "en50318-2002"), "distances": (80.0,), "distance": 600.0}
 SPANS = (5, 9)
 SPEED_KMH = 280.0
@@ -112,7 +109,7 @@ def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
 
 @pytest.mark.parametrize(("name", "controlled"), [("train-trailing", (2,)), ("train-both", (1, 2))])
 def test_shipped_benchmarks_of_trains_load_with_every_policy_that_they_name(name, controlled):
-    loaded = load_benchmark(CONFIGS / f"{name}.toml")
+    loaded = load_benchmark(f"benchmark/{name}")
     assert [line.controlled for line in loaded.lines] == [controlled] * len(loaded.lines)
     for policy in loaded.policies:
         find_policy(policy_of(policy))

@@ -47,6 +47,7 @@ OVERLAP = SHORT | {
     "actuator": "ideal",
 }
 """The wires change in the evaluated span."""
+TRAILING = SHORT | {"pantographs": ("dsa380", "dsa380"), "distances": (35.0,), "controlled": 2}
 WIRES = Row.CONTACT_FORCE, Row.SECOND_FORCE
 LINEAR: dict[str, Any] = {
     "catenary": "periodic-stiffness",
@@ -110,7 +111,9 @@ def test_limits_are_those_of_the_real_actuator():
 
 
 @pytest.mark.parametrize(
-    "given", [SHORT | {"actuator": "ideal"}, OVERLAP, LINEAR], ids=["flexible", "overlap", "massless"]
+    "given",
+    [SHORT | {"actuator": "ideal"}, OVERLAP, TRAILING | {"actuator": "ideal"}, LINEAR],
+    ids=["flexible", "overlap", "trailing", "massless"],
 )
 def test_response_is_the_difference_of_whole_runs(given: dict[str, Any], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(problem, "MEMORY", 100.0)
@@ -214,6 +217,24 @@ def test_an_oracle_is_found_where_wires_change():
     assert ((second > 0) & (second < total)).any()
 
 
+def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
+    asked = Problem(TRAILING, seed=3, spans=SPANS)
+    passive = simulate(**TRAILING, seed=3, evaluated=SPANS).train
+    assert asked.figures.std == pytest.approx(passive[1].summary(SPANS).std, rel=1e-12)
+    assert abs(asked.figures.std / passive[0].summary(SPANS).std - 1) > 0.05
+    found = descend(asked, "zero", np.zeros((asked.count, 1)), iterations=4)
+    assert found.std < 0.8 * asked.figures.std
+    run = asked.replay(asked.knots.commands(found.knots))
+    assert run.summary(SPANS).std == pytest.approx(found.std, rel=1e-12)
+    assert run.policy == "Tape"
+    # It waits until it comes onto the line, 35 m behind.
+    assert (
+        35.0 / run.speed - asked.interval
+        < asked.first_action * asked.interval
+        < 35.0 / run.speed + asked.interval
+    )
+
+
 def test_simulate_says_the_same_to_the_digit(short: Problem, descent: solver.Descent):
     run = short.replay(short.knots.commands(descent.knots))
     figures = run.summary(SPANS)
@@ -285,7 +306,8 @@ def test_stored_oracles_are_what_simulate_says_today():
     cells = stored.load()["cells"]
     assert cells
     for cell in cells:
-        names = ("catenary", "pantograph", "speed_kmh", "actuator", "line_condition", "control_interval")
+        names = ["catenary", "speed_kmh", "actuator", "line_condition", "control_interval"]
+        names += ["pantographs", "distances", "controlled"] if "pantographs" in cell else ["pantograph"]
         given, spans = {name: cell[name] for name in names}, tuple(cell["spans"])
         assert stored.fingerprint(given) == cell["asked"]["fingerprint"]
         ratios = [each["oracle"]["std"] / each["passive"]["std"] for each in cell["passes"]]
@@ -338,7 +360,7 @@ def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
     kept = {
         each["speed_kmh"]: 100 * (each["ratio"] - 1)
         for each in stored.load()["cells"]
-        if (each["catenary"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
+        if (each["pantograph"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
     }
     assert kept
     found = stored_bounds(settings, [(10, 19)])
@@ -488,5 +510,10 @@ def test_bad_settings_are_refused(changes: dict[str, Any], cell: dict[str, Any],
 def test_problems_without_an_oracle_are_refused(short: Problem):
     with pytest.raises(InputError, match="one speed"):
         Problem({"speed_kmh": (250, 300)})
+    both = TRAILING | {"controlled": (1, 2)}
+    with pytest.raises(
+        InputError, match="An oracle controls one pantograph of a train, not 1 and 2; name one"
+    ):
+        Problem(both)
     with pytest.raises(InputError, match="start must be one of zero, periodic, random, not 'best'"):
         find(short, ("best",))
