@@ -63,14 +63,9 @@ class LineAndTrain(Settings):
         return distinct(value)
 
     @property
-    def place(self) -> tuple[Any, ...]:
-        """What tells it from others: line, pantographs, their distances, and which of them are controlled."""
-        return self.catenary, self.pantographs or (self.pantograph,), self.distances, self.controlled
-
-    @property
     def riding(self) -> dict[str, Any]:
         """The train as settings of a run, by name."""
         if not (self.pantographs or self.distances) and self.controlled == (1,):
             return {"pantograph": self.pantograph}
-        _, several, distances, controlled = self.place
-        return {"pantographs": several, "distances": distances, "controlled": controlled}
+        several = self.pantographs or (self.pantograph,)
+        return {"pantographs": several, "distances": self.distances, "controlled": self.controlled}

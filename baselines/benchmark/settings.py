@@ -168,7 +168,8 @@ class BenchmarkSettings(Settings):
 
     @model_validator(mode="after")
     def _without_repeated_line(self) -> Self:
-        distinct(tuple(line.place for line in self.lines))
+        # Rows and cells tell lines apart by these.
+        distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
         return self
 
 

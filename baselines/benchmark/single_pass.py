@@ -18,6 +18,7 @@ from panto_env.control.context import Context
 from panto_env.control.entries import FULL as NOT_MEASURED
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
+from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
 from ..oracle.stored import stored_actions
@@ -40,6 +41,7 @@ ROW_HEADINGS = {
     "power": "power (W)",
     "pressed_std": "pressed_std (N)",
     "pressed_cost_function": "pressed_cost_function (N m)",
+    **{f"mean_{number}": f"mean_{number} (N)" for number in range(1, MOST_COLLECTORS + 1)},
 }
 """Headings with units, in files of tables, of the figures that ``Row`` has beside those of a run."""
 
@@ -61,13 +63,23 @@ class Row:
     power: float  # mechanical, `Trajectory.mechanical_power` (W)
     pressed_std: float  # sigma of the passive pantograph at the same mean force (N)
     pressed_cost_function: float  # CF of that passive pantograph (N m)
+    controlled_means: tuple[float, ...] = ()  # of several controlled pantographs, the first in front (N)
+
+    @property
+    def means(self) -> tuple[float, ...]:
+        """Mean force of each controlled pantograph (N)."""
+        return self.controlled_means or (self.figures.mean,)
 
     def as_dict(self) -> dict[str, Any]:
-        """Names and values in the order above; the figures stand in the same table as the rest."""
-        names = [f.name for f in fields(self)]
+        """Names and values in the order above; the figures stand in the same table as the rest.
+
+        Means of several controlled pantographs come last, as mean_1, mean_2, ...
+        """
+        names = [f.name for f in fields(self) if f.name != "controlled_means"]
         before, after = names[: names.index("figures")], names[names.index("figures") + 1 :]
         first, last = ({name: getattr(self, name) for name in part} for part in (before, after))
-        return first | self.figures.as_dict() | last
+        each = {f"mean_{agent}": mean for agent, mean in enumerate(self.controlled_means, start=1)}
+        return first | self.figures.as_dict() | last | each
 
 
 class Pass(NamedTuple):
@@ -101,7 +113,11 @@ def run_pass(
     run, recorder = first.train[line.controlled[number] - 1], recorders[number]
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
+    several = len(line.controlled) if len(line.controlled) > 1 else 0
+    means: tuple[float, ...] = several * (float("nan"),)
     if not run.terminated:
+        if several:
+            means = tuple(first.train[number - 1].summary(spans).mean for number in line.controlled)
         figures = run.summary(spans)
         commands = _within(recorder.forces(), run, spans, settings.control_interval)
         changes = np.diff(commands, axis=0) / settings.control_interval
@@ -127,6 +143,7 @@ def run_pass(
         power=watts,
         pressed_std=at_same_mean.std,
         pressed_cost_function=at_same_mean.cost_function,
+        controlled_means=means,
     )
     kept = traced and not run.terminated
     return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)

@@ -115,7 +115,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cel
     )
     # Pass by pass, with the same line, speed, seed and noise.
     paired = zip(rows, passive_rows, strict=True)
-    means = np.array([row.figures.mean / passive.figures.mean - 1 for row, passive in paired])
+    means = np.array([_mean_moved(row, passive) for row, passive in paired])
     return Cell(
         policy=first.policy,
         catenary=first.catenary,
@@ -136,6 +136,12 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cel
         disqualified=_disqualification(rows, passive_rows, means),
         rank=None,
     )
+
+
+def _mean_moved(row: Row, passive: Row) -> float:
+    """Relative change of the mean force in a pass: of several controlled pantographs the largest in size."""
+    each = [own / its - 1 for own, its in zip(row.means, passive.means, strict=True)]
+    return max(each, key=abs)
 
 
 def relative_changes(rows: Sequence[Row]) -> Array:

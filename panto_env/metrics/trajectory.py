@@ -126,10 +126,11 @@ class Trajectory:
 
         spans: as in ``summary``. The first one where the run ended early. Raises InputError as ``summary``.
         """
-        numbers = self.settings.get("controlled", [1])
+        numbers: list[int] = self.settings.get("controlled", [1])
         if len(numbers) == 1 or self.terminated:
             return self.controlled
-        return max((self.train[number - 1] for number in numbers), key=lambda own: own.summary(spans).std)
+        each = [self.train[number - 1] for number in numbers]
+        return max(each, key=lambda own: own.summary(spans).std)
 
     @property
     def pantographs(self) -> str:

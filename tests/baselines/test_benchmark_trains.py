@@ -1,5 +1,7 @@
 """A benchmark of trains: the judged pantograph is the controlled one, the worst where several are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from panto_baselines.benchmark.controls import policy_of
 from panto_baselines.benchmark.run import evaluated_spans
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
 from panto_baselines.benchmark.single_pass import run_pass
+from panto_baselines.benchmark.statistics import compare
 from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
@@ -68,10 +71,31 @@ def test_of_two_the_worst_counts_and_both_play_again():
     run = simulate(**TRAIN, controlled=[1, 2], speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
     sigmas = [each.summary(SPANS).std for each in run.train]
     assert done.row.figures.std == max(sigmas) > min(sigmas)
+    means = [each.summary(SPANS).mean for each in run.train]
+    assert list(done.row.means) == means
+    assert [done.row.as_dict()[name] for name in ("mean_1", "mean_2")] == means
     assert done.played.actions.shape[1] == 2
     assert not np.array_equal(*done.played.actions.T)
     again = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0, played=done.played)
     assert again.row == done.row
+
+
+def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
+    """Passively the second swings more; the policy calms it, and moves the mean of the first."""
+    passive = run_pass(settings(), Line(**TRAIN, controlled=[1, 2]), SPANS, "passive", SPEED_KMH, seed=0).row
+    first, second = passive.means
+    assert passive.figures.mean == second != first
+    for moved in ((1.04 * first, second), (0.96 * first, second), (first, 1.04 * second)):
+        row = replace(passive, policy="p", controlled_means=moved)
+        cell = next(each for each in compare([passive, row]) if each.policy == "p")
+        assert abs(cell.mean_change) == pytest.approx(4.0)
+        assert "it moves the mean force by" in cell.disqualified
+    kept = replace(
+        passive, policy="p", figures=replace(passive.figures, mean=first)
+    )  # the first one is judged
+    cell = next(each for each in compare([passive, kept]) if each.policy == "p")
+    assert cell.mean_change == 0.0
+    assert not cell.disqualified
 
 
 def test_one_that_learns_does_not_learn_while_it_waits():
