@@ -34,3 +34,12 @@ def high_speed() -> TrainedPolicy:
     observation is normalised by passive runs at these speeds, which a slower line refuses.
     """
     return load(FOLDER / "high-speed.safetensors")
+
+
+def train() -> TrainedPolicy:
+    """Agent for both of two dsa380, 200 m apart on en50318-2002, 200 to 300 km/h, as built.
+
+    It adds to ``repetitive``. Both pantographs trained one network by PPO, with realistic actuator and
+    sensors; it sees what the pantograph in front measured.
+    """
+    return load(FOLDER / "train.safetensors")

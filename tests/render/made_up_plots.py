@@ -92,7 +92,12 @@ def oracle():
         SimpleNamespace(start="q", iterations=steps[1:]),
     ]
     problem = SimpleNamespace(
-        passive=RUN, chosen=(2, 3), spans=(2, 3), seed=7, figures=SimpleNamespace(std=19.0)
+        passive=RUN,
+        chosen=(2, 3),
+        spans=(2, 3),
+        seed=7,
+        figures=SimpleNamespace(std=19.0),
+        settings=SimpleNamespace(pantographs=(), controlled=(1,)),
     )
     forces = RUN.contact_force, OTHER.contact_force
     found = SimpleNamespace(problem=problem, run=RUN, forces=forces, searches=searches, change=-0.123)
