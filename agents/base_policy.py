@@ -7,11 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.control.settings import RunSettings
 from panto_env.envs import PantographVectorEnv
-from panto_env.policies import errors_name, find_policy, wishes
+from panto_env.policies import errors_name, find_policy
 
 Array = NDArray[np.float64]
 
@@ -37,14 +34,3 @@ class PolicyLanes:
             pairs = zip(self._policies, observations.copy(), strict=True)
             actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
         return np.clip(actions, -1.0, 1.0)
-
-
-def check_wishes(name: str, settings: RunSettings) -> None:
-    """Raise InputError unless the policy exists and the environment has the observation that it requests."""
-    for key, requested in wishes(find_policy(name)).items():
-        offered = getattr(settings, key)
-        if requested != offered:
-            raise InputError(
-                f"the policy '{name}' needs {key} = {shown(requested)}, but the environment has "
-                f"{shown(offered)}; set it to what the policy needs"
-            )

@@ -20,10 +20,9 @@ from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
-from panto_env.policies import check_named
+from panto_env.policies import check_named, check_wishes
 
 from .algorithm import Algorithm
-from .base_policy import check_wishes
 from .cloning_settings import Cloning
 from .ppo import PPO
 from .ranges import Count, Share

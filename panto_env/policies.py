@@ -24,6 +24,7 @@ from .base.shown import shortly, shown
 from .control.action import numbers
 from .control.context import Context
 from .control.observation import OBSERVATION_SETTINGS
+from .control.settings import RunSettings
 
 MODELS = ".safetensors"
 """Suffix of model files that hold no code."""
@@ -116,6 +117,17 @@ def wishes(policy: Any) -> dict[str, Any]:
     requested = {name: getattr(policy, name, None) for name in OBSERVATION_SETTINGS}
     found = {name: value for name, value in requested.items() if value is not None}
     return found | {"washout": getattr(policy, "washout", 0.0)}
+
+
+def check_wishes(policy: Any, settings: RunSettings) -> None:
+    """Raise InputError, a clause, unless a policy exists and the settings have all that it requests."""
+    for key, requested in wishes(find_policy(policy)).items():
+        offered = getattr(settings, key)
+        if requested != offered:
+            raise InputError(
+                f"the policy '{policy}' needs {key} = {shown(requested)}, but the environment has "
+                f"{shown(offered)}; set it to what the policy needs"
+            )
 
 
 def with_parameters(source: str, parameters: str) -> str:

@@ -2,11 +2,12 @@
 
 import gymnasium
 
+from .driven import DrivenByPolicies
 from .ids import BARE, IDS
 from .single import PantographEnv
 from .vector import PantographVectorEnv
 
-__all__ = ["BARE", "IDS", "PantographEnv", "PantographVectorEnv", "register"]
+__all__ = ["BARE", "IDS", "DrivenByPolicies", "PantographEnv", "PantographVectorEnv", "register"]
 
 
 def register() -> None:

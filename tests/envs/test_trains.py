@@ -10,8 +10,11 @@ from gymnasium.utils.env_checker import check_env
 
 import panto_env
 from panto_env import InputError
+from panto_env.analysis.simulation import OFF_LINE
+from panto_env.envs import DrivenByPolicies
 from panto_env.envs.ids import IDS
 from panto_env.plant.state import Row
+from panto_env.policies import find_policy
 
 pettingzoo = pytest.importorskip("pettingzoo")
 TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0], "speed_kmh": (280.0, 320.0)}
@@ -204,3 +207,91 @@ def test_actions_of_agents_are_checked():
         view.step({"pantograph_1": one})
     with pytest.raises(InputError, match="must have the shape"):
         view.step({"pantograph_1": one, "pantograph_2": np.zeros(2)})
+
+
+@pytest.mark.parametrize(("driven", "own"), [(1, 1), (2, 0)])
+def test_a_policy_by_name_drives_the_others(driven, own):
+    """The records are those of a run in which each has its policy, which a constant action is here."""
+    given = BOTH | SHORT | {"washout": 0.0, "run_in": 0.0, "speed_kmh": 300.0, "line_condition": "smooth"}
+    given |= {"pantograph_scatter": 0.0, "window": None, "sensors": "ideal"}
+    env = DrivenByPolicies(make(**given), {driven: "pd"})
+    assert env.action_space.shape == (1,)
+    observation, info = env.reset(seed=3)
+    assert observation in env.observation_space
+    rewards, ended = [], False
+    while not ended:
+        on_line = info["pantographs"][own]["position"] >= -OFF_LINE  # a policy waits until then
+        action = np.array([0.2 * on_line], dtype=np.float32)
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert reward == info["pantographs"][own]["reward"]
+        rewards.append(reward)
+        ended = terminated or truncated
+    assert observation.shape == env.observation_space.shape
+    assert sum(rewards) < 0
+    policies = [Rounded(), Constant()] if driven == 1 else [Constant(), Rounded()]
+    settings = IDS["Pantograph-v0"] | given
+    alike = {name: settings[name] for name in ("actuator", "sensors", "line_condition", "window")}
+    alike |= {"pantographs": BOTH["pantographs"], "distances": BOTH["distances"], "controlled": [1, 2]}
+    alike["observation"] = "centred"
+    run = panto_env.simulate(**alike, speed_kmh=300.0, policy=policies, seed=3, distance=400.0)
+    for one, other in zip(env.unwrapped.trajectory.train, run.train, strict=True):
+        count = min(len(one.contact_force), len(other.contact_force))
+        assert count > 1000
+        np.testing.assert_array_equal(one.frame_force[:count], other.frame_force[:count])
+        np.testing.assert_array_equal(one.contact_force[:count], other.contact_force[:count])
+
+
+class Rounded:
+    """The policy pd, with actions as an environment takes them."""
+
+    def reset(self, context):
+        self.law = find_policy("pd")
+        self.law.reset(context)
+
+    def act(self, observation):
+        return self.law.act(observation).astype(np.float32)
+
+
+class Constant:
+    def reset(self, context):
+        pass
+
+    def act(self, observation):
+        return np.array([0.2], dtype=np.float32)
+
+
+def test_it_passes_gymnasium_s_check_and_continues_as_its_copy():
+    env = DrivenByPolicies(make(**BOTH, **SHORT, washout=0.0), {1: "repetitive"})
+    check_env(env.unwrapped if env.spec is None else env, skip_render_check=True)
+    env.reset(seed=1)
+    for _ in range(150):
+        env.step(np.array([0.1], dtype=np.float32))
+    twin = pickle.loads(pickle.dumps(env))
+    for _ in range(50):
+        one, other = (each.step(np.array([-0.1], dtype=np.float32)) for each in (env, twin))
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1] == other[1]
+
+
+@pytest.mark.parametrize(
+    ("settings", "policies", "says"),
+    [
+        (
+            BOTH,
+            {1: "pd"},
+            r"The policy 'pd' needs washout = 0.0, but the environment has 1.0; set it to what",
+        ),
+        (BOTH | {"washout": 0.0}, {1: "pf"}, "Unknown policy 'pf'"),
+        (
+            BOTH | {"washout": 0.0},
+            {},
+            "must drive some, and not all, of the controlled pantographs 1 and 2, not none",
+        ),
+        (BOTH | {"washout": 0.0}, {1: "pd", 2: "pd"}, "some, and not all, .* 1 and 2, not 1 and 2"),
+        (BOTH | {"washout": 0.0}, {3: "pd"}, "controlled pantographs 1 and 2, not 3"),
+        (TRAIN | {"controlled": 2, "washout": 0.0}, {1: "pd"}, "controlled pantographs 2, not 1"),
+    ],
+)
+def test_what_policies_cannot_drive_is_refused_in_a_sentence(settings, policies, says):
+    with pytest.raises(InputError, match=says):
+        DrivenByPolicies(make(**settings), policies)
