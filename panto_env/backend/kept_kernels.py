@@ -58,7 +58,9 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
         try:
             try:
                 super().save_overload(types, kernel)
-            except (pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError):  # a damaged index
+            except OSError:
+                raise
+            except Exception:  # a damaged index can lead to any error
                 self.flush()
                 super().save_overload(types, kernel)
         except OSError as error:

@@ -1,6 +1,7 @@
 """Compiled kernels on disk: damaged ones are compiled anew, another user's are not looked at."""
 
 import os
+import random
 import resource
 import shutil
 import stat
@@ -99,7 +100,8 @@ def files(folder, suffix):
 DAMAGES = {
     "empty": lambda data: b"",
     "half": lambda data: data[: len(data) // 2],
-    "garbage": lambda data: os.urandom(len(data)),
+    "garbage": lambda data: random.Random(0).randbytes(len(data)),
+    "text of any length": lambda data: b"\x8d" + 8 * b"\xff" + data,  # an OverflowError of pickle
     "bit": lambda data: (
         data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 4]) + data[len(data) // 2 + 1 :]
     ),
