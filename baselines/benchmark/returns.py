@@ -17,6 +17,7 @@ from panto_env.envs import IDS
 from panto_env.policies import errors_name, find_policy, wishes
 
 from .controls import control_of
+from .settings import Line
 
 INGREDIENTS: dict[str, dict[str, Any]] = {
     "all": {},
@@ -59,19 +60,22 @@ def returns(
     Actuator and sensors are those of the result. Speeds between would ask another question: gains fitted at
     the result's speeds are worth less there. result: as ``read_result`` gives it, of one line. Episodes have
     the seeds 0, 1, ... A policy that wants no washout has none. arguments: of the environment, instead of
-    those of its id. Raises InputError for a result of several lines, an id that does not exist, too many
-    episodes, and a policy that fails.
+    those of its id. Raises InputError for a result of several lines, an id that does not exist, several controlled pantographs,
+    too many episodes, and a policy that fails.
     """
     if identifier not in IDS:
         raise InputError(f"Unknown id '{identifier}': known are {', '.join(IDS)}.")
     lines = {(cell.catenary, cell.pantograph) for cell in result.cells}
     if len(lines) != 1:
         raise InputError(f"A result of one line is needed, not of {len(lines)}; take another one.")
-    ((catenary, pantograph),) = lines
+    (line,) = (Line.model_validate(each) for each in result.settings["lines"])
+    if len(line.controlled) > 1:
+        numbers = " and ".join(map(str, line.controlled))
+        raise InputError(f"A result of one controlled pantograph is needed, not of {numbers}.")
     standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     check_passes(episodes * len(standings), "This comparison")
     speeds = sorted({cell.speed_kmh for cell in result.cells})
-    place = {"catenary": catenary, "pantograph": pantograph}
+    place = {"catenary": line.catenary, **line.riding}
     place |= {name: result.settings[name] for name in ("actuator", "sensors")}
     given = [place | {"speed_kmh": speeds[k % len(speeds)]} | dict(arguments or {}) for k in range(episodes)]
     jobs = [

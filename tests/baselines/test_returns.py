@@ -141,3 +141,24 @@ def test_results_of_several_lines_and_unknown_ids_are_refused():
         returns(SimpleNamespace(cells=cells))
     with pytest.raises(InputError, match="Unknown id"):
         returns(SimpleNamespace(cells=cells[:1]), "Pantograph-v9")
+
+
+def result_of_train(controlled):
+    train = {"pantographs": ["dsa380", "en50318-2002"], "distances": [50.0], "controlled": controlled}
+    cells = [SimpleNamespace(catenary=LINE, pantograph="dsa380", speed_kmh=300.0)]
+    standings = [SimpleNamespace(policy="pd", trainings=(), change=-1.0, disqualified="")]
+    settings = {"lines": [train], "actuator": "ideal", "sensors": "ideal"}
+    return train, SimpleNamespace(cells=cells, standings=standings, settings=settings)
+
+
+def test_a_result_of_a_train_has_returns_of_its_controlled_pantograph():
+    at_one = SHORT | {"speed_kmh": 300.0}
+    train, result = result_of_train(2)
+    (found,) = returns(result, episodes=2, arguments=at_one, workers=1)
+    alike = {"actuator": "ideal", "sensors": "ideal"} | at_one
+    single = [one_return("Pantograph-v0", train | alike, "pd", seed) for seed in (0, 1)]
+    assert found.mean == pytest.approx(np.mean(single))
+    lone = [one_return("Pantograph-v0", {"pantograph": "dsa380"} | alike, "pd", seed) for seed in (0, 1)]
+    assert np.mean(lone) != pytest.approx(np.mean(single), rel=0.05)
+    with pytest.raises(InputError, match="one controlled pantograph is needed, not of 1 and 2"):
+        returns(result_of_train([1, 2])[1], episodes=2)
