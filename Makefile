@@ -42,7 +42,7 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 test: $(READY) lint
-	$(BIN)/pytest -n auto --dist worksteal -m 'not slow and not study'
+	$(BIN)/pytest -n auto --dist loadfile -m 'not slow and not study'
 
 # The documentation as a site, warnings as errors. `make proofs` builds it too, and follows every link within it.
 SITE := docs/_build/html
@@ -80,7 +80,8 @@ CASES := 2000
 proofs: $(READY)
 	CASES=$(CASES) $(BIN)/pytest -n auto --dist worksteal -m slow
 
-# Studies of minutes each: papers 1 and 2 against what the documents say of them, and learning from whole data sets.
+# Studies of minutes each: papers 1 and 2 against what the documents say of them, learning from whole data sets, and most
+# sections, trains and gusts beside finite elements.
 studies: $(READY)
 	$(BIN)/pytest -n auto --dist worksteal -m study
 

@@ -113,6 +113,8 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
             return Complaint(key, f"must be a list, such as [{given}]", "", False)
         case "too_long":
             return Complaint(key, f"must hold at most {problem['ctx']['max_length']} values", "", False)
+        case "too_short" if problem["ctx"]["min_length"] > 1:
+            return Complaint(key, f"must hold at least {problem['ctx']['min_length']} values", given, False)
         case other:
             words = WORDS.get(other, problem["msg"].replace("Input should be", "must be"))
             return Complaint(key, words, given, False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +147,10 @@ def test_what_is_wrong_is_said_of_the_variant(config, change, message):
 def test_an_unknown_one_is_refused():
     with pytest.raises(InputError, match="The ablation file nothing does not exist"):
         find("nothing", "ablation")
+
+
+def test_one_seed_is_too_few(config):
+    """The list is not empty, as the sentence had said."""
+    config.write_text(re.sub(r"^seeds = .*$", "seeds = [5]", config.read_text(), flags=re.MULTILINE))
+    with pytest.raises(InputError, match=r"key 'seeds' must hold at least 2 values \(given: \[5\]\)"):
+        load_ablation(config)

@@ -36,6 +36,7 @@ def test_offline_data_are_read_back_and_replayed(capsys):
     assert [line in load("offline_data").__doc__ for line in printed] == [True, True]
 
 
+@pytest.mark.slow
 def test_a_controller_is_cloned_from_a_few_episodes_at_one_speed(tmp_path):
     pytest.importorskip("torch")
     example = load("learn_from_data")

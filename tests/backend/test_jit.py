@@ -33,6 +33,7 @@ def run(root, cache):
     return int(hits), float(total)
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_kernel_s_source_is_seen_and_any_other_compiles_nothing(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "panto_env", ignore=shutil.ignore_patterns("__pycache__"))
     cache = tmp_path / "cache"

@@ -150,6 +150,7 @@ def one_pass(policy, asked):
     return run_pass(asked, line, covered, policy, speed, seed)
 
 
+@pytest.mark.slow
 def test_a_tape_is_worth_little_on_a_line_as_built():
     found = standings(GOOD, f"tape of {GOOD}")
     assert found[GOOD].change < -25
@@ -181,6 +182,7 @@ def arguments(asked):
 ENVIRONMENT = ("actuator", "sensors", "line_condition", "pantograph_scatter", "speed_drift")
 
 
+@pytest.mark.slow
 def test_one_that_holds_tapes_of_all_known_seeds_gains_only_without_a_salt(tmp_path):
     known = run(settings(GOOD))
     tapes = {
@@ -199,6 +201,7 @@ def test_one_that_holds_tapes_of_all_known_seeds_gains_only_without_a_salt(tmp_p
     assert salted[reader].change > unsalted + 20
 
 
+@pytest.mark.slow
 def test_shaking_at_50_hz_gains_nothing(tmp_path):
     shaker = cheat(tmp_path, "Shaker", SHAKER)
     policies = [f"{shaker}:force={force}" for force in (10, 50)]

@@ -222,6 +222,7 @@ def check_seeds_are_plausible(lines, seeds):
     return found
 
 
+@pytest.mark.slow
 @drawn
 def test_drawn_lines_are_plausible(source):
     """A sample; `make studies` tries a thousand."""
@@ -249,6 +250,7 @@ def test_a_thousand_drawn_lines_are_plausible_and_drawn_in_milliseconds():
     assert np.mean([one.draws for one in found]) < 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "band", "most"),
     [("family:high-speed", "[0.1, 0.45]", 0.2), ("section:main-line", "[0.05, 0.3]", 0.155)],

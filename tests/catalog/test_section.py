@@ -99,6 +99,7 @@ def test_drawn_lines_are_what_the_section_describes(name):
     assert with_ramps > 8 or bridges.lowering[1] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_gradients_are_legal_at_the_highest_speed(name):
     """By the check that `panto line` prints; and lines with ramps come near the limit."""

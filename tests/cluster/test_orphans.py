@@ -99,6 +99,7 @@ def test_workers_end_with_their_parent(number, tmp_path):
     assert status == -number
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_a_benchmark_s_workers_end_with_it(number, tmp_path):
     """And it says so, where it is left the time to."""

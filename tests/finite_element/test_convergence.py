@@ -5,7 +5,7 @@ import pytest
 from .figures import figures
 from .sections import sections
 
-IN_PROOFS = ("mixed", "stitched-330", "overlap-2002")
+IN_PROOFS = ("stitched-330",)
 CASES = [
     pytest.param(name, marks=pytest.mark.slow if name in IN_PROOFS else pytest.mark.study)
     for name in sections()

@@ -97,6 +97,7 @@ def half(span):
     return span.model_copy(update=halves)
 
 
+@pytest.mark.slow
 def test_two_coincident_half_lines_are_one_line():
     """Each with half of all, touched over the whole length by a spring and damper of half the strip's."""
     line = stitched(
@@ -149,6 +150,7 @@ def test_a_wire_high_above_is_none_and_the_second_is_none_until_it_is_touched():
     assert abs(both.contact_force[first:after] - alone.contact_force[first:after]).max() > 5.0
 
 
+@pytest.mark.slow
 def test_a_slow_strip_is_shared_as_springs_in_equilibrium_share_it():
     """Statics without steps in time: each wire's own yield, and the spring of the strip upon each."""
     line = overlapping("re330", 5, 2, [0.06, 0.3], 10.0)

@@ -206,6 +206,7 @@ def test_lengths_and_stiffnesses_of_droppers_hold_the_designed_shape():
     np.testing.assert_allclose(again.dropper_tension, shape.dropper_tension, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_energy_is_balanced_under_stitch_wires():
     section = sections()["some-stitched"]
     found = balance(section.line, [Collector(section.pantograph)], section.speed_kmh, distance=420.0)

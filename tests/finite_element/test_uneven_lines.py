@@ -119,6 +119,7 @@ def test_high_up_the_spring_to_ground_takes_k_h(climbing):
     assert -18.0 < force < -16.5
 
 
+@pytest.mark.slow
 def test_energy_is_balanced_under_a_bridge():
     section = SECTIONS["bridge"]
     found = balance(section.line, [Collector(section.pantograph)], section.speed_kmh, distance=500.0)

@@ -27,8 +27,8 @@ from .files import write_files, write_made_files
 from .lines import BY_HAND, USUAL, command_lines
 from .processes import End, run_all
 
-LIMIT = 60.0
-"""Seconds that a command line may take."""
+LIMIT = 120.0
+"""Seconds that a command line may take: processes that import PyTorch take one minute on two busy cores."""
 WARNING = "panto: warning: "
 BAD = "BAD: "
 

@@ -117,16 +117,18 @@ def test_finite_elements_agree_on_what_the_mean_wind_damps():
     assert damped.std < 0.99 * still.std
 
 
+@pytest.mark.slow
 def test_finite_elements_agree_where_spans_differ():
     agrees(MIXED, 0, 1.0, side_wind=WIND, turbulence=0.0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("line", "seed"),
     [
-        pytest.param(ALIKE, 2, marks=pytest.mark.slow),
-        pytest.param(ALIKE, STRONG, marks=pytest.mark.study),
-        pytest.param(MIXED, 3, marks=pytest.mark.study),
+        (ALIKE, 2),
+        (ALIKE, STRONG),
+        (MIXED, 3),
     ],
     ids=["alike", "alike, another seed", "unlike"],
 )

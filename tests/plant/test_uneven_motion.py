@@ -12,14 +12,19 @@ from ..finite_element.figures import figures
 from ..finite_element.sections import Section, sections
 
 SECTIONS = sections()
+IN_PROOFS = ("mixed", "bridge", "both", "stitched-330", "overlap-2002")
+"""One of each kind; others are compared in `make studies`, for all of them take ten minutes."""
+CASES = [
+    pytest.param(name, marks=pytest.mark.slow if name in IN_PROOFS else pytest.mark.study)
+    for name in SECTIONS
+]
 
 
 def test_contact_force_and_uplift_on_unlike_spans_are_those_of_finite_elements():
     agrees(SECTIONS["mixed"], element=1.0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SECTIONS)
+@pytest.mark.parametrize("name", CASES)
 def test_every_section_agrees_with_fine_finite_elements(name):
     agrees(SECTIONS[name], element=0.25)
 
