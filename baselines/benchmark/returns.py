@@ -60,8 +60,8 @@ def returns(
     Actuator and sensors are those of the result. Speeds between would ask another question: gains fitted at
     the result's speeds are worth less there. result: as ``read_result`` gives it, of one line. Episodes have
     the seeds 0, 1, ... A policy that wants no washout has none. arguments: of the environment, instead of
-    those of its id. Raises InputError for a result of several lines, an id that does not exist, several controlled pantographs,
-    too many episodes, and a policy that fails.
+    those of its id. Raises InputError for a result of several lines, an id that does not exist, several
+    controlled pantographs, too many episodes, and a policy that fails.
     """
     if identifier not in IDS:
         raise InputError(f"Unknown id '{identifier}': known are {', '.join(IDS)}.")
