@@ -155,7 +155,8 @@ def test_a_mean_return_has_the_standard_error_of_its_episodes(monkeypatch, episo
     cells = [
         SimpleNamespace(catenary="re250", pantograph="dsa250", speed_kmh=speed) for speed in (250.0, 200.0)
     ]
-    settings = {"actuator": "ideal", "sensors": "realistic", "seeds": 3}
+    line = {"catenary": "re250", "pantograph": "dsa250"}
+    settings = {"actuator": "ideal", "sensors": "realistic", "seeds": 3, "lines": [line]}
     monkeypatch.setattr(returns_of, "spread", spread)
     result = SimpleNamespace(standings=standings, cells=cells, settings=settings)
     found = returns_of.returns(result, episodes=episodes, arguments={"settle": 0.0})
