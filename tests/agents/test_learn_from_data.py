@@ -54,7 +54,7 @@ def test_a_controller_is_cloned_from_a_few_episodes_at_one_speed(tmp_path):
     assert own / teacher > 0.9
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_sigma_is_learnt_from_a_few_designs(tmp_path):
     pytest.importorskip("sklearn")
     settings = load_designs("dataset-designs").model_copy(update={"count": 320})

@@ -8,7 +8,7 @@ import pytest
 
 from panto_env.backend import JIT
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(not JIT, reason="plain Python checks indices by itself")]
+pytestmark = [pytest.mark.study, pytest.mark.skipif(not JIT, reason="plain Python checks indices by itself")]
 
 
 def run(code, tmp_path):

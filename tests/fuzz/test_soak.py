@@ -8,7 +8,7 @@ import pytest
 from panto_env.backend import JIT
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.skipif(
     not JIT or not sys.platform.startswith("linux"), reason="reads Linux's own account of memory"
 )

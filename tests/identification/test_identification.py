@@ -207,7 +207,7 @@ def test_missing_measured_value_is_named():
         fit_equation_error(clean_record(EXPERIMENTS[0], TRUTH, duration=1.0), {"k1T": 32992.0, "m2": 5.0})
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_true_parameters_lie_inside_their_intervals_in_90_per_cent_of_200_records():
     experiments = [(each, False) for each in EXPERIMENTS] + [(FREQUENCY_SWEEP, True)]
     found = run_trials(experiments, TRUTH, 200)

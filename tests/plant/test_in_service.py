@@ -183,7 +183,7 @@ def test_what_the_id_sets_are_settings():
     assert BARE["line_condition"] == "new"
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_with_the_term_of_the_mean_force_a_trained_agent_presses_less_hard(tmp_path):
     """Without it the same training moves the mean at least twice as far. Neither is within the 1.5 % that the
     benchmark allows: a quarter of a million steps are too few for that.

@@ -86,13 +86,13 @@ def outcome():
     return studies.find_study("paper1-identification")(lambda what, share: None)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_comparisons_agree_but_for_those_named(outcome):
     assert {each.quantity for each in outcome.comparisons if not each.agrees} == DIFFER
     assert all(each.note for each in outcome.comparisons if not each.agrees)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_numbers_are_those_of_the_document(outcome):
     ours = {each.quantity: each.ours for each in outcome.comparisons}
     for quantity, value, within in (
@@ -114,7 +114,7 @@ def test_numbers_are_those_of_the_document(outcome):
     assert errors[-1] < 0.5 < errors[-3]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_figures_and_numbers_are_written(outcome, tmp_path):
     files = {path.name for path in studies.write(outcome, tmp_path)}
     assert {f"figure-{k}.png" for k in range(6, 12)} < files
