@@ -25,6 +25,7 @@ from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train
 
+from ..finite_element.sections import line_of as line_with
 from .test_flexible import constants_of, travel, undamped
 
 SPANS, FIRST, LENGTH = 24, 11, 65.0
@@ -312,3 +313,19 @@ def test_a_uniform_line_has_no_overlaps():
             load_catenary("re330").model_dump(exclude={"sources"}, exclude_none=True)
             | {"overlaps": [{"first_span": 4, "rises": RISES}]}
         )
+
+
+@pytest.mark.parametrize("speed", [40.0, 100.0])
+def test_a_damper_of_the_contact_feels_no_wire_that_begins_far_above(speed):
+    """The height of the second wire falls there from that of no wire, which had been taken for its motion."""
+    overlap = {"first_span": 3, "rises": [0.1, 0.5]}
+    line = line_with("en50318-2002", {"sequence": [{}] * 10, "overlaps": [overlap]})
+    with_damper = load_pantograph("identified-2dof")
+    without = with_damper.model_copy(update={"contact_damping": 0.0})
+    assert with_damper.contact_damping > 0
+    damped, undamped = (
+        simulate(line, pantograph, speed, distance=300.0, record_droppers=False).summary("all")
+        for pantograph in (with_damper, without)
+    )
+    assert damped.std == pytest.approx(undamped.std, rel=0.02)
+    assert damped.max == pytest.approx(undamped.max, rel=0.02)

@@ -145,7 +145,10 @@ def _rise(line, wire, lane, contact, x0, x1):
     row_1, segment_1, weight_1 = locate(x1 - start, line.spacing, rows)
     before = deflection(u, d, row_0, segment_0, weight_0, 1.0)
     deflected = deflection(u, d, row_1, segment_1, weight_1, 1.0) - before
-    return unmoved_height(line, lane, pair, x1) - unmoved_height(line, lane, pair, x0) + deflected
+    rise = unmoved_height(line, lane, pair, x1) - unmoved_height(line, lane, pair, x0)
+    if line.pairs > 1 and abs(rise) > x1 - x0:
+        rise = 0.0  # no wire is so steep: this one begins or ends here, and does not come down on the head
+    return rise + deflected
 
 
 @implements(look_at_contact, FlexibleLine)
