@@ -20,7 +20,7 @@ from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
-from panto_env.policies import check_named, check_wishes
+from panto_env.policies import check_named, find_fitting_policy
 
 from .algorithm import Algorithm
 from .cloning_settings import Cloning
@@ -170,7 +170,7 @@ def _check_policies(training: Training) -> None:
     for name in (training.start_from, training.residual_of):
         if name is not None:
             check_named(name, "it")
-            check_wishes(name, settings)
+            find_fitting_policy(name, settings)
 
 
 def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:

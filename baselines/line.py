@@ -14,6 +14,8 @@ from panto_env.base.shown import shown
 from panto_env.control.settings import controlled_numbers, default, description
 
 T = TypeVar("T")
+OPTIONS = ("catenary", "pantograph", "distances", "controlled")
+"""Options of a command that say which train runs on which line."""
 
 
 def as_clause(read: Callable[[Any], T]) -> Callable[[Any], T]:

@@ -119,15 +119,20 @@ def wishes(policy: Any) -> dict[str, Any]:
     return found | {"washout": getattr(policy, "washout", 0.0)}
 
 
-def check_wishes(policy: Any, settings: RunSettings) -> None:
-    """Raise InputError, a clause, unless a policy exists and the settings have all that it requests."""
-    for key, requested in wishes(find_policy(policy)).items():
+def find_fitting_policy(source: Any, settings: RunSettings) -> Policy:
+    """Policy as ``find_policy`` gives it.
+
+    Raises InputError, a clause, unless the settings have all that it requests.
+    """
+    policy = find_policy(source)
+    for key, requested in wishes(policy).items():
         offered = getattr(settings, key)
         if requested != offered:
             raise InputError(
-                f"the policy '{policy}' needs {key} = {shown(requested)}, but the environment has "
+                f"the policy '{source}' needs {key} = {shown(requested)}, but the environment has "
                 f"{shown(offered)}; set it to what the policy needs"
             )
+    return policy
 
 
 def with_parameters(source: str, parameters: str) -> str:

@@ -23,30 +23,19 @@ from panto_env.terminal import (
     written_last,
 )
 
+from ..line import OPTIONS
 from .run import SUFFIXES, run
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
 
-PLACE = ("catenary", "pantograph", "pantographs", "distances", "controlled")
+PLACE = (*OPTIONS, "pantographs")
 """Options that say what runs on which line: they replace the lines of a file."""
 DRAW = "draw"
 """Salt that stands for one drawn at random."""
 
 
-@with_settings(
-    only=(
-        "catenary",
-        "pantograph",
-        "distances",
-        "controlled",
-        "actuator",
-        "sensors",
-        "line_condition",
-        "control_interval",
-    ),
-    defaults=False,
-)
+@with_settings(only=(*OPTIONS, "actuator", "sensors", "line_condition", "control_interval"), defaults=False)
 def benchmark(
     given: dict[str, Any],
     policies: Annotated[

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from panto_env import Trajectory, simulate
@@ -19,13 +18,11 @@ class PassiveFigures(NamedTuple):
 NONE = PassiveFigures(float("nan"), float("nan"))
 
 
-def passive_at_mean_of(
-    run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any], controlled: Sequence[int] = (1,)
-) -> PassiveFigures:
+def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
     """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
 
-    Of a train each has the mean force that it had, and the figures are those of the controlled one, by its
-    number, whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
+    Of a train each has the mean force that it had, and the figures are those of the controlled one
+    whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
     policy.
     """
     means = [own.summary(spans).mean for own in run.train]
@@ -38,6 +35,5 @@ def passive_at_mean_of(
         return NONE
     if passive.terminated:
         return NONE
-    each = [passive.train[number - 1].summary(spans) for number in controlled]
-    worst = max(each, key=lambda figures: figures.std)
+    worst = passive.worst_controlled(spans).summary(spans)
     return PassiveFigures(worst.std, worst.cost_function)

@@ -113,11 +113,7 @@ def run_pass(
     run, recorder = first.train[line.controlled[number] - 1], recorders[number]
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
-    several = len(line.controlled) if len(line.controlled) > 1 else 0
-    means: tuple[float, ...] = several * (float("nan"),)
     if not run.terminated:
-        if several:
-            means = tuple(first.train[number - 1].summary(spans).mean for number in line.controlled)
         figures = run.summary(spans)
         commands = _within(recorder.forces(), run, spans, settings.control_interval)
         changes = np.diff(commands, axis=0) / settings.control_interval
@@ -126,7 +122,7 @@ def run_pass(
         watts = run.mechanical_power(spans)
         if policy != REFERENCE:
             arguments = _arguments(settings, line, speed_kmh, seed)
-            at_same_mean = passive_at_mean_of(first, spans, arguments, line.controlled)
+            at_same_mean = passive_at_mean_of(first, spans, arguments)
         else:
             at_same_mean = PassiveFigures(figures.std, figures.cost_function)
     row = Row(
@@ -143,7 +139,7 @@ def run_pass(
         power=watts,
         pressed_std=at_same_mean.std,
         pressed_cost_function=at_same_mean.cost_function,
-        controlled_means=means,
+        controlled_means=_controlled_means(first, line, spans) if len(line.controlled) > 1 else (),
     )
     kept = traced and not run.terminated
     return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)
@@ -163,6 +159,13 @@ def drive(
     """
     run, recorders = _record(settings, line, policy, speed_kmh, seed, played)
     return run.controlled, recorders[0].forces()
+
+
+def _controlled_means(run: Trajectory, line: Line, spans: tuple[int, int]) -> tuple[float, ...]:
+    """Mean force of each controlled pantograph (N); nan if the run ended early."""
+    if run.terminated:
+        return len(line.controlled) * (float("nan"),)
+    return tuple(run.train[number - 1].summary(spans).mean for number in line.controlled)
 
 
 def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:

@@ -24,23 +24,14 @@ from panto_env.terminal import (
     written_last,
 )
 
+from ..line import OPTIONS
+
 if TYPE_CHECKING:
     from .search import Oracle
     from .solver import Iteration
 
 
-@with_settings(
-    only=(
-        "catenary",
-        "pantograph",
-        "distances",
-        "controlled",
-        "actuator",
-        "line_condition",
-        "control_interval",
-    ),
-    defaults=False,
-)
+@with_settings(only=(*OPTIONS, "actuator", "line_condition", "control_interval"), defaults=False)
 def oracle(
     given: dict[str, Any],
     config: Annotated[

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from panto_env import Trajectory, simulate
-from panto_env.analysis.simulation import OFF_LINE
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import passive_mean, trim_of_pass
@@ -63,8 +62,7 @@ class Problem:
         waited = round(passive.time[0] / passive.time_step - 0.5)
         """Plant steps before the controlled pantograph came onto the line."""
         inside = waited + np.flatnonzero(passive.inside(spans))
-        on_line = passive.position[0] - 0.5 * (passive.position[1] - passive.position[0]) >= -OFF_LINE
-        self.first_action = math.ceil((waited + (not on_line)) / self.steps)
+        self.first_action = math.ceil(passive.time_at(0.0) / self.interval - 1e-6)
         """Control step of a policy's first action, when the pantograph has come onto the line."""
         self.begin = max(self.first_action, int((start - LEAD) / self.interval + 1e-9))
         self.count = int(inside[-1]) // self.steps + 1 - self.begin

@@ -11,13 +11,12 @@ from panto_env.analysis.options import with_settings
 from panto_env.cluster import RayAddress
 from panto_env.terminal import Force, Json, counting_on, print_json, print_table, this_command, written_last
 
+from ..line import OPTIONS
+
 
 @with_settings(
     only=(
-        "catenary",
-        "pantograph",
-        "distances",
-        "controlled",
+        *OPTIONS,
         "pantograph_scatter",
         "speed_drift",
         "actuator",

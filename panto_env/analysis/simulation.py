@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.shown import shown
 from ..control import Task, passive_mean, trim_of_pass
@@ -129,12 +130,20 @@ def steps_of_policy(task: Task, policy: Policy | Sequence[Policy], name: str) ->
     while not (results.truncated[0] or results.terminated[0]):
         with errors_name(name, "act"):
             for row, driver in enumerate(drivers):
-                if results.values[row, Result.POSITION] < -OFF_LINE:
-                    continue  # it waits: nothing there is worth learning
-                # A copy: a policy may keep its observation.
-                actions[row] = checked_action(driver.act(results.observation[row].copy()), actions[row].shape)
+                let_act(task, row, driver, actions[row])
         task.step(actions)
         yield task.plant.of(0, Row.STEP) / task.end(0)
+
+
+def let_act(task: Task, row: int, driver: Policy, action: Array) -> None:
+    """Write a policy's next action into ``action``, (actions,), once its pantograph is on the line.
+
+    Before that it waits: nothing there is worth learning. Raises InputError as ``checked_action`` does.
+    """
+    if task.results.values[row, Result.POSITION] >= -OFF_LINE:
+        # A copy: a policy may keep its observation.
+        observation = task.results.observation[row].copy()
+        action[:] = checked_action(driver.act(observation), action.shape)
 
 
 def _explicit() -> inspect.Signature:

@@ -10,12 +10,11 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from ..analysis.simulation import OFF_LINE
+from ..analysis.simulation import let_act
 from ..base.errors import InputError
 from ..control.action import checked
 from ..control.observation import BOUND
-from ..control.state import Result
-from ..policies import check_wishes, checked_action, errors_name, find_policy
+from ..policies import errors_name, find_fitting_policy
 from .infos import REWARD
 from .single import PantographEnv
 
@@ -51,15 +50,14 @@ class DrivenByPolicies(
                 f"policies must drive some, and not all, of the controlled pantographs {controlled}, not "
                 f"{' and '.join(map(str, policies)) or 'none'}."
             )
-        for policy in policies.values():
-            try:
-                check_wishes(policy, train.task.settings)
-            except InputError as error:
-                clause = str(error).rstrip(".")
-                raise InputError(f"{clause[:1].upper()}{clause[1:]}.") from error
-        self._drivers = {
-            numbers.index(number): (find_policy(each), each) for number, each in policies.items()
-        }
+        try:
+            self._drivers = {
+                numbers.index(number): (find_fitting_policy(each, train.task.settings), each)
+                for number, each in policies.items()
+            }
+        except InputError as error:
+            clause = str(error).removesuffix(".")
+            raise InputError(f"{clause[:1].upper()}{clause[1:]}.") from error
         self._rows = [row for row in range(len(numbers)) if row not in self._drivers]
         self._places = len(train.task.actuator.places)
         entries = len(self._rows) * train.task.results.observation.shape[1]
@@ -87,10 +85,8 @@ class DrivenByPolicies(
         own = checked(action, self.action_space.shape or ())
         actions[self._rows] = own.reshape(len(self._rows), -1)
         for row, (driver, name) in self._drivers.items():
-            if task.results.values[row, Result.POSITION] >= -OFF_LINE:  # else it waits
-                with errors_name(name, "act"):
-                    observation = task.results.observation[row].copy()
-                    actions[row] = checked_action(driver.act(observation), actions[row].shape)
+            with errors_name(name, "act"):
+                let_act(task, row, driver, actions[row])
         _, _, terminated, truncated, info = self.env.step(actions.reshape(-1))
         reward = float(task.results.values[self._rows, REWARD].mean())
         return self._seen(), reward, terminated, truncated, info

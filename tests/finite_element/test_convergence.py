@@ -2,17 +2,12 @@
 
 import pytest
 
+from ..marks import some_in_proofs
 from .figures import figures
 from .sections import sections
 
-IN_PROOFS = ("stitched-330",)
-CASES = [
-    pytest.param(name, marks=pytest.mark.slow if name in IN_PROOFS else pytest.mark.study)
-    for name in sections()
-]
 
-
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", some_in_proofs(sections(), ["stitched-330"]))
 def test_half_of_element_and_step_change_the_figures_little(name):
     """Extremes by a share of the mean force: the minimum converges last."""
     section = sections()[name]

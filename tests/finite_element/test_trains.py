@@ -8,6 +8,7 @@ import pytest
 
 from panto_env.catalog import load_catenary, load_pantograph
 
+from ..marks import some_in_proofs
 from . import __main__ as comparison
 from .contacts import Collector
 from .energy import balance
@@ -28,8 +29,6 @@ SHORT = Case(
 )
 """Quick: a few spans, and little of what the first collector leaves behind."""
 CASES = cases()
-IN_PROOFS = ("four-250", "unlike-330")
-"""Others are compared in `make studies`."""
 
 
 @pytest.fixture(scope="module")
@@ -103,13 +102,7 @@ def test_contact_force_and_uplift_of_two_pantographs_are_those_of_finite_element
     agrees(SHORT)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow if name in IN_PROOFS else pytest.mark.study)
-        for name in CASES
-    ],
-)
+@pytest.mark.parametrize("name", some_in_proofs(CASES, ["four-250", "unlike-330"]))
 def test_every_train_agrees_with_finite_elements(name):
     agrees(CASES[name])
 

@@ -10,21 +10,18 @@ from panto_env.catalog import load_catenary, load_pantograph
 from ..finite_element import __main__ as comparison
 from ..finite_element.figures import figures
 from ..finite_element.sections import Section, sections
+from ..marks import some_in_proofs
 
 SECTIONS = sections()
 IN_PROOFS = ("mixed", "bridge", "both", "stitched-330", "overlap-2002")
 """One of each kind; others are compared in `make studies`, for all of them take ten minutes."""
-CASES = [
-    pytest.param(name, marks=pytest.mark.slow if name in IN_PROOFS else pytest.mark.study)
-    for name in SECTIONS
-]
 
 
 def test_contact_force_and_uplift_on_unlike_spans_are_those_of_finite_elements():
     agrees(SECTIONS["mixed"], element=1.0)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", some_in_proofs(SECTIONS, IN_PROOFS))
 def test_every_section_agrees_with_fine_finite_elements(name):
     agrees(SECTIONS[name], element=0.25)
 
