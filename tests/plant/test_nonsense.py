@@ -273,7 +273,7 @@ def test_random_runs_are_refused_or_right():
     first = int(os.environ.get("NONSENSE_FROM", FIRST))
     ways: Counter[str] = Counter()
     wrong = []
-    for seed in range(first, first + int(os.environ.get("NONSENSE", "50"))):
+    for seed in range(first, first + int(os.environ.get("NONSENSE", "100"))):
         try:
             ways[check(case_of(seed))] += 1
         except AssertionError as error:
