@@ -168,7 +168,7 @@ def check_case(case: LineCase) -> list[LineCheck]:
 def converged(line: FlexibleCatenaryData) -> Numerics:
     """The grid that is taken as converged, in double precision, with a step that is stable on it."""
     interval = RUNS.control_interval
-    spacing = line.span_length / nodes_per_span(line, GRID)
+    spacing = line.stride / nodes_per_span(line, GRID)
     steps = ceil(interval / LONGEST_STEP - 1e-9)
     while not stable(line, spacing, interval / steps):
         steps += 1
