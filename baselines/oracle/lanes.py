@@ -13,7 +13,7 @@ from panto_env.control import Task
 from panto_env.control.cost import arrays_of, check_record
 from panto_env.control.mean_force import Trim
 from panto_env.control.settings import RunSettings
-from panto_env.plant.state import SAMPLE_ROWS, Place, Row, Samples
+from panto_env.plant.state import SAMPLE_ROWS, Place, Row
 
 PUSHED = 48
 """Number of lanes of a group that compute responses to test forces."""
@@ -84,12 +84,9 @@ class _Group:
         rows = self._first + control_steps * task.length.control_steps + 1
         collectors = len(task.plant.train.collectors)
         self._controlled = settings.controlled[0] - 1
-        shape = (lanes, rows, collectors, SAMPLE_ROWS)
         check_record(8.0 * lanes * (rows - self._first) * collectors * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never written, so they take no memory.
-        self._samples = Samples(
-            rows=np.zeros(shape), uplift=np.zeros((lanes, rows, 0)), tension=np.zeros((lanes, rows, 0))
-        )
+        self._samples = task.plant.samples(rows)._replace(uplift=np.zeros((lanes, rows, 0)))
         # One that rides behind others begins where it comes onto the line.
         rest = self._first - int(task.plant.of(0, Row.STEP, self._controlled))
         self._plant.advance_passively(rest, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0))))

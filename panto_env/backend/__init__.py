@@ -11,7 +11,7 @@ With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 from .cache import cache_folder, source_hash
 from .compile import JIT, constants, inlined, kernel, python_function
 from .dispatch import implements, operation
-from .mathematics import NOT_NEGATIVE, any_of, choose, larger, root, smaller
+from .mathematics import NOT_NEGATIVE, any_of, choose, larger
 from .memory import CACHE_LINE, aligned_zeros, copy_whole
 from .packed import bind, open_packed, pack
 from .threads import LaneThreads
@@ -40,11 +40,9 @@ __all__ = [
     "operation",
     "pack",
     "python_function",
-    "root",
     "scatter_add",
     "shift_down",
     "shift_up",
-    "smaller",
     "source_hash",
     "store_row",
 ]

@@ -17,8 +17,6 @@ from .wind import SHORTEST_GUST
 
 SAMPLES_PER_WAVE = 8
 """Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
-WINDOW = {"full": 16, "fast": 8}
-"""Spans computed about the train, by accuracy; more about slow trains for full accuracy."""
 
 
 class Numerics(Settings):
@@ -27,7 +25,7 @@ class Numerics(Settings):
     accuracy: Literal["full", "fast"] = Field(
         "full",
         description='"full": grid and time step for which figures of a flexible line are within 1 % of '
-        'converged ones up to 70 % of the wave speed; "fast": coarser ones, three to twenty times as fast',
+        'converged ones up to 95 % of the wave speed; "fast": coarser ones, two to four times as fast',
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one for the accuracy"
@@ -40,9 +38,9 @@ class Numerics(Settings):
     window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
         description="spans of the flexible catenary computed about the train, with an even number one more "
-        f"ahead than behind; by default {WINDOW['full']}, or 24 about trains below 40 % of the "
-        f'faster wire\'s wave speed; with accuracy="fast" {WINDOW["fast"]}; several pantographs get as many '
-        "more as the train is long; 0: the whole line",
+        "ahead than behind; by default 4 to 40, as many as the slowest train needs for the waves that come "
+        'back to it, and 8 at most with accuracy="fast"; several pantographs get as many more as the train '
+        "is long; 0: the whole line",
     )
     precision: Literal["single", "double"] = Field(
         "single", description='precision of the flexible catenary: "single" or "double"; all else is double'

@@ -235,7 +235,7 @@ class Plant:
         return Samples(
             rows=np.zeros((self.lanes, rows, len(self.train.collectors), SAMPLE_ROWS)),
             uplift=np.zeros((self.lanes, rows, len(self.model.supports))),
-            tension=np.zeros((self.lanes, rows, droppers)),
+            tension=np.zeros((self.lanes, rows, droppers), dtype=np.float32),
         )
 
     def clear(self, samples: Samples, lanes: Array) -> None:

@@ -73,8 +73,9 @@ def meet(line, wire, pantographs, run, contact, lane):
     own = run.table[contact, lane]
     parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
     free_head = own[ROW.STATE + pantographs.sizes[contact]]
-    contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
+    contact_input = parts[PART.CONTACT_INPUT]
     x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
+    share = parts[PART.IMPLICIT_SHARE] if x > 0.0 else 0.0  # the anchor, at which one waits, does not yield
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, contact, own, lane)
@@ -84,7 +85,7 @@ def meet(line, wire, pantographs, run, contact, lane):
     middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.WIRE_MIDDLE]
     middle_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
     force = contact_force(
-        parts[PART.STRIP_COMPLIANCE] + spring,
+        max(parts[PART.STRIP_COMPLIANCE] + spring, 0.0),  # a grid may yield more at its nodes than a wire
         0.5 * (head + free_head) - (middle + irregular),
         free_head - head - (free_wire - before) - rise,
         parts[PART.STRIP_DAMPING],
@@ -97,12 +98,14 @@ def meet(line, wire, pantographs, run, contact, lane):
     if has_second_wire(line):
         law = contact_law(
             parts,
+            spring,
             0.5 * (head + free_head) - (middle + irregular),
             free_head - head - (free_wire - before) - rise,
             middle_yield,
             wire_yield,
         )
-        force = meet_second_wire(line, wire, parts, run, contact, lane, free_head, law, middle, middle_yield)
+        yielding = middle_yield + spring
+        force = meet_second_wire(line, wire, parts, run, contact, lane, free_head, law, middle, yielding)
         total = force + own[ROW.SECOND_FORCE]
     own[ROW.CONTACT_FORCE] = total
     own[ROW.FIRST_FORCE] = force
@@ -110,13 +113,14 @@ def meet(line, wire, pantographs, run, contact, lane):
 
 
 @inlined
-def contact_law(parts, gap, change, middle_yield, wire_yield):
-    """Numerator and denominator of ``contact_force`` with one of two wires (m, m/N)."""
-    damped, contact_input = (
-        parts[PART.STRIP_COMPLIANCE] * parts[PART.STRIP_DAMPING],
-        parts[PART.CONTACT_INPUT],
-    )
-    resisting = parts[PART.STRIP_COMPLIANCE] + middle_yield - 0.5 * contact_input
+def contact_law(parts, spring, gap, change, middle_yield, wire_yield):
+    """Numerator and denominator of ``contact_force`` with one of two wires (m, m/N).
+
+    spring: compliance in series with the contact's.
+    """
+    compliance, contact_input = max(parts[PART.STRIP_COMPLIANCE] + spring, 0.0), parts[PART.CONTACT_INPUT]
+    damped = compliance * parts[PART.STRIP_DAMPING]
+    resisting = compliance + middle_yield - 0.5 * contact_input
     return gap + damped * change, resisting + damped * (wire_yield - contact_input)
 
 
@@ -132,12 +136,13 @@ def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, mi
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, point, own, lane)
-    free_wire, wire_yield, early_yield, _ = look_at_contact(line, wire, lane, point, x)
+    free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, point, x)
     before, irregular, head = own[ROW.SECOND_BEFORE], own[ROW.IRREGULARITY], own[ROW.STATE]
     its_middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.SECOND_MIDDLE]
     its_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
     second = contact_law(
         parts,
+        spring,
         0.5 * (head + free_head) - (its_middle + irregular),
         free_head - head - (free_wire - before) - rise,
         its_yield,
@@ -145,7 +150,7 @@ def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, mi
     )
     damped = parts[PART.STRIP_COMPLIANCE] * parts[PART.STRIP_DAMPING]
     force, other = shared_forces(first, second, -(0.5 + damped) * parts[PART.CONTACT_INPUT])
-    height, its_height = middle + middle_yield * force, its_middle + its_yield * other
+    height, its_height = middle + middle_yield * force, its_middle + (its_yield + spring) * other
     # Of two wires that are touched, the one that carries more counts; of two that are not, the lower one.
     lower = its_height < height if force + other == 0.0 else other > force
     own[ROW.WIRE_HEIGHT] = irregular + (its_height if lower else height)

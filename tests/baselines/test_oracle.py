@@ -287,8 +287,10 @@ def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkey
     assert found.best.std == min(each.std for each in found.searches)
     for hop in (1, 2):
         before = min(found.searches[:hop], key=lambda each: each.std)
-        shaken = np.sqrt(np.mean((begun[hop] - before.knots) ** 2))
-        assert 0.5 * search.HOP_FORCE < shaken < 3 * search.HOP_FORCE  # more, where limits shrink the whole
+        share = np.vdot(begun[hop], before.knots) / np.vdot(before.knots, before.knots)
+        shaken = np.sqrt(np.mean((begun[hop] / share - before.knots) ** 2))
+        assert 0.3 < share < 1.1  # limits shrink the whole
+        assert 0.5 * search.HOP_FORCE < shaken < 1.5 * search.HOP_FORCE
 
 
 def test_what_repeats_from_span_to_span_does(short: Problem):

@@ -35,7 +35,7 @@ def quickly():
     [
         (
             {"speed_kmh": 0.001},
-            r"32,832,000,000 time steps .* of memory, and to compute it about \d+ days; take",
+            r"18,878,400,000 time steps .* of memory, and to compute it about \d+ days; take",
         ),
         ({"speed_kmh": 1e-6}, r"GB, but this machine has .* about [\d,]+ years; take a shorter distance"),
         ({"speed_kmh": 1e-300}, "The speed must lie above 0"),

@@ -38,6 +38,7 @@ class RailWire(NamedTuple):
 class ConductorRail:
     massless = True
     contact_gain = 0.0
+    contact_share = 0.0
     grid = {}  # noqa: RUF012 - nothing is added to it
     wave_speed = np.inf
     length = np.inf

@@ -6,7 +6,7 @@ import pytest
 from panto_env import simulate
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.build import constants
-from panto_env.plant.catenary.flexible.grid import missing_yield, stencil_weights
+from panto_env.plant.catenary.flexible.grid import missing_between, missing_yield, stencil_weights
 from panto_env.plant.catenary.flexible.on_grid import STIFFEST
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import solve
@@ -16,30 +16,36 @@ from panto_env.plant.numerics import Numerics, Runs
 LINE = load_catenary("en50318-2002")
 
 
-def yield_of_beam(wire, length, at):
-    """A tensioned beam between hinges, under 1 N: its deflection there (m), in closed form."""
+def yield_of_beam(wire, length, at, read=None):
+    """A tensioned beam between hinges, under 1 N: its deflection there, or at read, (m), in closed form."""
     kappa = np.sqrt(wire.tension / wire.bending_stiffness)
-    left, right = at, length - at
+    read = at if read is None else read
+    left, right = min(at, read), length - max(at, read)
     bend = np.sinh(kappa * left) * np.sinh(kappa * right) / (kappa * np.sinh(kappa * length))
     return (left * right / length - bend) / wire.tension
 
 
-def yield_of_grid(wire, length, at, dx, step):
-    """The same on a grid: its own stencil, the force on four nodes, and read there."""
-    near, far = stencil_weights(wire, dx, step) * wire.mass * dx / step**2
+def yield_of_grid(wire, length, at, dx, step, read=None):
+    """The same on a grid: its own stencil, the force on four nodes, and read there, or at ``read``."""
+    weights = stencil_weights(wire, dx, step, LINE.damping.beta) * wire.mass * dx / step**2
     nodes = round(length / dx) + 1
     stiffness = np.zeros((nodes, nodes))
-    for offset, weight in ((0, 2 * near + 2 * far), (1, -near), (2, -far)):
-        stiffness += weight * (np.eye(nodes, k=offset) + (np.eye(nodes, k=-offset) if offset else 0))
-    for end in (1, -2):  # odd continuation beyond a hinge
-        stiffness[end, end] += far
+    for node in range(nodes):
+        for reach, weight in enumerate(weights, start=1):
+            stiffness[node, node] += 2 * weight
+            for other in (node - reach, node + reach):
+                if 0 <= other < nodes:
+                    stiffness[node, other] -= weight
+                else:  # odd continuation beyond a hinge
+                    stiffness[node, -other if other < 0 else 2 * (nodes - 1) - other] += weight
     inner = slice(1, -1)
-    first, weights = stencil([at], dx)
-    load = np.zeros(nodes)
-    load[first[0] : first[0] + 4] = weights[0]
+    loads = np.zeros((2, nodes))
+    for load, place in zip(loads, (at, at if read is None else read), strict=True):
+        first, four = stencil([place], dx)
+        load[first[0] : first[0] + 4] = four[0]
     moved = np.zeros(nodes)
-    moved[inner] = np.linalg.solve(stiffness[inner, inner], load[inner])
-    return float(load @ moved)
+    moved[inner] = np.linalg.solve(stiffness[inner, inner], loads[0, inner])
+    return float(loads[1] @ moved)
 
 
 @pytest.mark.parametrize("wire", [LINE.contact_wire, LINE.messenger_wire], ids=["contact", "messenger"])
@@ -49,21 +55,36 @@ def test_grid_and_what_is_missing_yield_as_the_closed_form(wire, dx, step):
     for fraction in (0.0, 0.25, 0.4, 0.5, 0.8):
         at = dx * (round(11.0 / dx) + fraction)
         _, weights = stencil([at], dx)
-        missing.append(missing_yield(wire, dx, step, weights)[0])
+        missing.append(missing_yield(wire, dx, step, LINE.damping.beta, weights)[0])
         exact, ours = yield_of_beam(wire, length, at), yield_of_grid(wire, length, at, dx, step)
         assert ours + missing[-1] == pytest.approx(exact, abs=0.01 * max(map(abs, missing)))
     # It changes from point to point by more than a tenth of what a dropper of 100 kN/m yields, 0.5 m apart.
     assert np.ptp(missing) > 0.2e-6 * dx / 0.125
 
 
+@pytest.mark.parametrize(("dx", "step"), [(0.3, 1.25e-3), (0.125, 3e-4)])
+def test_what_two_points_lack_of_each_other_is_that_of_the_closed_form(dx, step):
+    """On both sides, within a cell and two cells on."""
+    wire, parts = LINE.contact_wire, np.linspace(0.0, 1.0, 5)
+    table = missing_between(wire, dx, step, LINE.damping.beta, parts, 3)
+    length, start = dx * round(30.0 / dx), dx * round(15.0 / dx)
+    for cells, i, k in ((0, 2, 2), (0, 1, 3), (1, 0, 2), (-2, 3, 1)):
+        at, read = start + dx * parts[k], start + dx * (cells + parts[i])
+        exact = yield_of_beam(wire, length, at, read)
+        lacking = exact - yield_of_grid(wire, length, at, dx, step, read)
+        assert table[cells + 3, i, k] == pytest.approx(lacking, abs=0.01 * np.abs(table).max())
+
+
 def test_links_yield_what_the_wires_do_not():
-    numerics = Numerics(spacing=0.5, time_step=2e-3)
-    line = constants(LINE, solve(LINE), 20, numerics, resolution(LINE, numerics, Runs()))
-    stiffness = line.link_stiffness[line.link_set, line.link_segment]
+    numerics, step = Numerics(spacing=0.3, time_step=1.25e-3), 1.25e-3
+    undamped = LINE.model_copy(update={"damping": LINE.damping.model_copy(update={"beta": 0.0})})
+    line = constants(undamped, solve(undamped), 20, numerics, resolution(undamped, numerics, Runs()))
+    pull = line.link_pull[line.link_set, :, line.link_segment]
+    assert not pull[:, [0, 2]].any()  # by the extension at mid-step alone
     _, weights = stencil(LINE.droppers.positions, line.spacing)
     wires = LINE.contact_wire, LINE.messenger_wire
-    missing = sum(missing_yield(wire, line.spacing, 2e-3, weights) for wire in wires)
-    np.testing.assert_allclose(1 / stiffness[:9], 1e-5 + missing, rtol=1e-5)
+    missing = sum(missing_yield(wire, line.spacing, step, 0.0, weights) for wire in wires)
+    np.testing.assert_allclose(1 / pull[:9, 1], 1e-5 + missing, rtol=1e-5)
 
 
 @pytest.mark.filterwarnings("ignore:A grid of")

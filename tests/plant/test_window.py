@@ -29,7 +29,7 @@ def wait(line, wire, x, steps):
         end_step(line, wire, 0)
 
 
-STEP = 2.5e-3
+STEP = 2e-3
 
 
 def swinging(line, wire):
@@ -126,7 +126,7 @@ def test_slow_trains_get_a_wider_window():
     windows_by_speed = {
         kmh: resolution(line, Numerics(), Runs((kmh / 3.6, kmh / 3.6))).window for kmh in (30, 200, 250, 350)
     }
-    assert windows_by_speed == {30: 24, 200: 24, 250: 16, 350: 16}
+    assert windows_by_speed == {30: 32, 200: 24, 250: 16, 350: 16}
     assert resolution(line, Numerics(accuracy="fast"), Runs((10.0, 10.0))).window == 8
 
 

@@ -14,6 +14,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.resolution import HARD_SPOT_GRID
 from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wire_defects import RAMP, worn_depth
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
@@ -162,8 +163,8 @@ def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
         simulate(speed_kmh=250.0, line_condition=condition, distance=300.0, spans=8, **how)
         for condition, how in (
             (spot, {"accuracy": accuracy}),
-            (spot, {"spacing": 0.1, "time_step": 2.5e-4}),
-            ("new", {"spacing": 0.1, "time_step": 2.5e-4, "window": 0}),
+            (spot, {"spacing": 0.1, "time_step": 2e-4}),
+            ("new", {"spacing": 0.1, "time_step": 2e-4, "window": 0}),
         )
     ]
     at = np.linspace(200, 280, 1000)
@@ -182,7 +183,8 @@ def test_a_defect_of_no_size_changes_nothing(defects):
         else 0.0
         for key, value in defects.items()
     }
-    intact, same = (simulate(line_condition=c, distance=300.0, window=0) for c in ("new", none))
+    given = {"distance": 300.0, "window": 0, "spacing": HARD_SPOT_GRID}
+    intact, same = (simulate(line_condition=c, **given) for c in ("new", none))
     np.testing.assert_allclose(intact.contact_force, same.contact_force, atol=0.02)
 
 

@@ -50,6 +50,9 @@ class CatenaryModel(Protocol):
     massless: bool  # whether the contact wire has no mass of its own
     wires_per_collector: int  # maximum number of contact wires that a collector touches at a time
     contact_gain: float  # inverse of the stiffness at which an explicit contact law is unstable (m/N)
+    contact_share: (
+        float  # least share that the wire's heights before and after a step have in the contact law
+    )
     grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # maximum distance of a run (m)

@@ -11,11 +11,11 @@ from ...backend import kernel
 from ...backend.vectors import row_access
 
 # Adds and multiplies of one step, counted in panto_env/plant/catenary/flexible/wires.py and links.py.
-FLOPS_PER_NODE = 12  # lagging displacement 2, differences 2, stencil 4, increment 3, displacement 1
-FLOPS_PER_DROPPER = 60  # two differences 2 x 11, extension and tension 14, eight nodes moved 8 x 3
-# Numbers that the leapfrog moves to or from the nearest cache for each node: u and d read two nodes ahead and
-# at the node, and written.
-NUMBERS_PER_NODE = 6
+FLOPS_PER_NODE = 15  # displacement 1, lagging displacement 2, differences 2, stencil 8, increment 2
+FLOPS_PER_DROPPER = 46  # two differences 2 x 11, extension and tension 8, eight nodes moved 8 x 2
+# Numbers that the leapfrog moves to or from the nearest cache for each node: u and d read three nodes ahead,
+# u written there, and d read and written at the node.
+NUMBERS_PER_NODE = 5
 CHAIN = 32
 WIDE = 16
 """Numbers of the vectors of the small loops: as many in single precision as the widest register has."""

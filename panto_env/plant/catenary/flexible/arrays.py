@@ -12,18 +12,35 @@ position of the window (``FlexibleLine``). Where spans differ, each dropper and 
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
+from ....backend import constants
 from ....base.arrays import Array, Index
 from ...alignment import AlignmentArrays
 from .blown_arrays import Air, Gusts
+from .near_arrays import Near
 from .scattered_arrays import Scattered, ScatteredWindow
 
-PAD = 2  # rows beyond each end of the segments, for the five-point stencil
+PAD = 3  # rows beyond each end of the segments, for the seven-point stencil
 CONTACT, MESSENGER = 0, 1
 """Indices of the wires; the pantograph touches the first."""
 LOWER, UPPER = 0, 1
 """The two ends of a link."""
+
+
+class StencilRow(IntEnum):
+    """Constants of a wire's leapfrog."""
+
+    HERE = 0  # weights of second differences: at the node itself (-)
+    NEXT = 1  # at both neighbours
+    BEYOND = 2  # at the nodes beyond them
+    KEEP = 3  # b: share of the increment that damping in proportion to the mass leaves (-)
+    LAG = 4  # steps by which damping in proportion to the stiffness lets the wire lag
+    QUIET = 5  # a tiny load on every node (m)
+
+
+STENCIL = constants(StencilRow)
 
 
 class Beside(NamedTuple):
@@ -60,7 +77,7 @@ class FlexibleLine(NamedTuple):
     rise: Array  # (rows, pieces, 5): its change by defects: a, b, c, d, e of each piece of the line
     rise_breaks: Array  # (pieces of a span + 1,): where pieces begin and end (m)
     rise_decay: Array  # (rows,): kappa: of exponentials along a piece (1/m)
-    stencil: Array  # (rows, wires, 5): weights of nearest and second nearest nodes; b; lag; tiny load (m)
+    stencil: Array  # (rows, wires, 6): see ``StencilRow``
     absorbing: Array  # (rows, wires): (C - 1) / (C + 1) of the absorbing ends, C the Courant number
     inertia: Array  # (wires, rows, WIDTH): of the first window, as ``FlexibleWire`` has it
     mobility: Array  # (wires, rows + 2 PAD, WIDTH): likewise
@@ -75,9 +92,7 @@ class FlexibleLine(NamedTuple):
     link_row: Index  # (sets,): first of four rows; links hang straight down, both ends are in the same ones
     link_weight: Array  # (sets, 4, WIDTH): of the four nodes
     link_move: Array  # (sets, ends times 4, WIDTH): displacement of the nodes in a step by 1 N (m/N)
-    link_linear: Array  # (sets, 2, WIDTH): change of tension by mean extension before and after (N/m)
-    link_yield: Array  # (sets, WIDTH): mean relative displacement of the ends over a step by 1 N (m/N)
-    link_stiffness: Array  # (sets, WIDTH): in tension, with the grid's missing compliance (N/m)
+    link_pull: Array  # (sets, 3, WIDTH): change of tension by extension at three times, newest first (N/m)
     link_room: (
         Array  # (sets, WIDTH): designed distance of its ends; the wires touch once they approach by it (m)
     )
@@ -88,13 +103,15 @@ class FlexibleLine(NamedTuple):
     scattered: Scattered  # what has rows of its own, of the whole line
     pairs: int  # of wires: 2 where wires overlap
     beside: Beside
+    near: Near
     air: Air
 
 
 class FlexibleWire(NamedTuple):
     """State of the wires in all lanes."""
 
-    displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, about the static shape (m)
+    # About the static shape. A step changes the increments; the next one begins by adding them.
+    displacement: Array  # (lanes, wires, rows + 2 PAD, WIDTH): u, before the last step (m)
     increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
     travelled: Index  # (lanes,): strides that the window has travelled
     # Of the window's nodes; one for all lanes where the window's masses are the same all along the line.
@@ -106,13 +123,18 @@ class FlexibleWire(NamedTuple):
     contact_row: Index  # (lanes, contacts): row of the first of the four nodes about a contact point
     contact_segment: Index  # (lanes, contacts): its segment
     contact_weight: Array  # (lanes, contacts, 4): of the four
+    contact_missing: Array  # (lanes, contacts): compliance that the wire lacks there on the grid (m/N)
     unmoved_height: Array  # (lanes, contacts): of the contact wire at rest at the contact points (m)
+    pressed: Array  # (lanes, contacts): force there in the last step (N)
+    near_missing: Array  # (lanes, contacts): what both lack of each other (m/N)
+    near_set: Index  # (lanes, contacts): set of the dropper that a contact point is near; -1: none
+    near_segment: Index  # (lanes, contacts): its segment
+    near_gap: Array  # (lanes, contacts): its own gap (m)
     spring_past: Array  # (lanes, sets, WIDTH): increment before the step, scratch (m)
     # Links in equal rows come first, then scattered ones. Extensions are relative to the static ones, minus
     # the gap of a link that is slack there.
-    past_extension: Array  # (lanes, sets, WIDTH): before the step (m)
-    extension: Array  # (lanes, sets, WIDTH): at its start (m)
-    change: Array  # (lanes, sets, WIDTH): tension minus the static one, mean over the last step (N)
+    extension: Array  # (lanes, sets, WIDTH): before the last step (m)
+    change: Array  # (lanes, sets, WIDTH): tension minus the static one in the last step (N)
     static: Array  # (lanes, sets, WIDTH): ``link_static`` of the window's links (N)
     gap: Array  # (lanes, sets, WIDTH): ``link_gap`` of the window's links (m)
     scattered: ScatteredWindow

@@ -18,7 +18,7 @@ from ...side_wind import SHORTEST_WAVE, SIDE_ROWS
 from ...trigonometry import cosine_of_turns, sine_of_turns
 from ..protocol import advance_wire, end_step
 from ..schema import Wire
-from .arrays import PAD, FlexibleLine, FlexibleWire
+from .arrays import PAD, STENCIL, FlexibleLine, FlexibleWire
 from .blown_arrays import Air, Gusts
 
 AIR_DENSITY = 1.225
@@ -82,7 +82,7 @@ def start_wind(line: FlexibleLine, wire: FlexibleWire, lane: int, rows: Array) -
     gusts.past[lane] = gusts.coming[lane] = 0.0
     steps = 0
     if rows[1:].any():
-        keep = float(line.stencil[0, 0, 2])
+        keep = float(line.stencil[0, 0, STENCIL.KEEP])
         slowest = (1 - keep) / 2 + float(line.air.drag.min()) * rows[0] / 2
         steps = math.ceil(SETTLED / slowest / every) * every
     # In the first interval the wind rises to its gusts.
@@ -122,11 +122,8 @@ def find_gusts(line, gusts, lane, steps):
 
 
 @inlined
-def blow(line, gusts, lane, u, d, inertia):
-    """Change all wires' increments by the wind of one step; their damping by air is implicit in it.
-
-    u: displacements that follow at once, or none of the wires', (0, ...).
-    """
+def blow(line, gusts, lane, d, inertia):
+    """Change all wires' increments by the wind of one step; their damping by air is implicit in it."""
     if gusts.table.shape[1] > 0:
         air, past, coming = line.air, gusts.past[lane], gusts.coming[lane]
         since = gusts.step[lane] % air.every
@@ -150,5 +147,3 @@ def blow(line, gusts, lane, u, d, inertia):
                     if its_inertia.shape[0] > 0:
                         step = load_row(its_inertia, i) * step
                     store_row(its_d, i + PAD, load_row(its_d, i + PAD) + step)
-                    if u.shape[0] > 0:
-                        store_row(u[w], i + PAD, load_row(u[w], i + PAD) + step)

@@ -15,7 +15,8 @@ from ...valid_range import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .attached import joined_springs, links_of, springs_of
 from .blown import NO_AIR, still
-from .grid import nodes_per_span, stencil_weights
+from .grid import nodes_per_span, second_differences, stencil_weights
+from .near_build import near_droppers
 from .on_grid import in_equal_rows, on_grid
 from .overlaps import heights_of_pair, pairs_of, tension_lengths
 from .resolution import Resolution
@@ -114,6 +115,7 @@ def constants(
         scattered=scattered(grid if differ else None, real),
         pairs=pairs_of(data),
         beside=Beside(tensioned.beside[None], np.zeros((1, 0, 5)), np.zeros(0)),
+        near=near_droppers(data, grid, dx, resolution.time_step, per_stride, strides if differ else 0),
         air=NO_AIR,
         **in_equal_rows(grid, differ, rows, real),
     )
@@ -124,7 +126,7 @@ class Tensioned(NamedTuple):
 
     shape: Array  # (n,)
     beside: Array  # (n,), or none: of the second pair
-    stencil: Array  # (wires, 5)
+    stencil: Array  # (wires, 6)
     absorbing: Array  # (wires,)
 
 
@@ -134,7 +136,13 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
     settle = 1.0 + damping.alpha * step / 2
     keep = (1.0 - damping.alpha * step / 2) / settle
     stencil = [
-        [*stencil_weights(wire, dx, step) / settle, keep, damping.beta / step, QUIET] for wire in wires
+        [
+            *second_differences(stencil_weights(wire, dx, step, damping.beta)) / settle,
+            keep,
+            damping.beta / step,
+            QUIET,
+        ]
+        for wire in wires
     ]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
     table = np.linspace(0, data.period, int(np.ceil(data.period / SHAPE_SPACING)) + 1)
@@ -168,9 +176,14 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
         contact_row=np.zeros((lanes, contacts), dtype=np.int64),
         contact_segment=np.zeros((lanes, contacts), dtype=np.int64),
         contact_weight=np.zeros((lanes, contacts, 4)),
+        contact_missing=np.zeros((lanes, contacts)),
         unmoved_height=np.zeros((lanes, contacts)),
+        pressed=np.zeros((lanes, contacts)),
+        near_missing=np.zeros((lanes, contacts)),
+        near_set=np.full((lanes, contacts), -1),
+        near_segment=np.zeros((lanes, contacts), dtype=np.int64),
+        near_gap=np.zeros((lanes, contacts), dtype=real),
         spring_past=np.zeros((lanes, springs, WIDTH), dtype=real),
-        past_extension=of_links(0.0),
         extension=of_links(0.0),
         change=of_links(0.0),
         static=of_links(1.0),  # where there is no link, none is ever slack
@@ -188,6 +201,8 @@ def settle(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
     for array in (wire.displacement, wire.increment, wire.change):
         array[lane] = 0.0
     wire.travelled[lane] = 0
+    wire.pressed[lane] = 0.0
+    wire.near_set[lane] = -1
     row, links = min(lane, len(line.link_static) - 1), len(line.link_set)
     wire.static[lane, line.link_set, line.link_segment] = line.link_static[row, :links]
     wire.gap[lane, line.link_set, line.link_segment] = line.link_gap[row, :links]

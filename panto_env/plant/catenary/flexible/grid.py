@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ....backend import WIDTH
+from ....backend import WIDTH, python_function
 from ....base.arrays import Array
-from ...interpolation import stencil
+from ...interpolation import cubic_weights, stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
+
+BEARABLE = 0.5
+"""Share of the stiffness at which one spring is unstable that springs have at most; others are near."""
+
+FITTED = 1.6
+"""Angle from node to node up to which waves are fitted: four nodes per wave."""
+TURNED = 1.3
+"""Maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor."""
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
@@ -22,36 +32,52 @@ def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
 def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> bool:
     """Whether the leapfrog is stable: 0 <= omega^2 dt^2 and omega^2 dt^2 (1 + 2 beta/dt) <= 4.
 
-    dx: spacing (m). step: s. lightest: mass of the most worn contact wire, as a share of a new one's.
+    And whether its waves turn in a step by at most ``TURNED``. dx: spacing (m). step: s. lightest: mass of
+    the most worn contact wire, as a share of a new one's.
     """
     angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
+    beta = data.damping.beta
     for wire, share in ((data.contact_wire, lightest), (data.messenger_wire, 1.0)):
-        squared = _response(stencil_weights(wire, dx, step), angle) / share
-        if squared.min() < -1e-9 or squared.max() * (1 + 2 * data.damping.beta / step) > 4 + 1e-9:
+        if _frequency(wire, FITTED / dx) * step > TURNED:
+            return False
+        squared = _response(stencil_weights(wire, dx, step, beta), angle) / share
+        if squared.min() < -1e-9 or squared.max() * (1 + 2 * beta / step) > 4 + 1e-9:
             return False
     return True
 
 
-def contact_gain(data: FlexibleCatenaryData, dx: float, step: float, lightest: float = 1.0) -> float:
-    """Inverse of the stiffness (m/N) from which a contact law that reads the wire at mid-step is unstable.
+def point_gain(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1.0) -> float:
+    """Inverse of the stiffness (m/N) from which a force that reads a wire at mid-step is unstable.
 
     With a force k w at one point the leapfrog is stable while 4 M - dt^2 K stays above dt^2 k W W'. At the
     limit the maximum of k dt^2 W' (4 M - dt^2 K)^-1 W over all places between two nodes is 1; it is an
-    integral over the waves of the grid. Infinite where the grid is at its own limit. lightest: as in
-    ``stable``.
+    integral over the waves of the grid. Infinite where the grid is at its own limit. beta: damping in
+    proportion to the stiffness (s). lightest: as in ``stable``.
     """
     angle = np.linspace(0.0, np.pi, 721)  # of a wave from node to node
-    squared = _response(stencil_weights(data.contact_wire, dx, step), angle) / lightest
-    room = 4 - squared * (1 + 2 * data.damping.beta / step)
+    squared = _response(stencil_weights(wire, dx, step, beta), angle) / lightest
+    room = 4 - squared * (1 + 2 * beta / step)
     if room.min() <= 0:
         return float(np.inf)
     _, weights = stencil(dx * np.linspace(0.0, 0.95, 20), dx)
     seen = _seen(weights, angle)
     largest = float(np.trapezoid(seen / room, angle, axis=1).max()) / np.pi
-    return step**2 / (lightest * data.contact_wire.mass * dx) * largest
+    return step**2 / (lightest * wire.mass * dx) * largest
 
 
-def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:
+def implicit_share(stiffness: Array, gain: Array) -> Array:
+    """Least share of the newest extension in the forces of springs with which they are stable.
+
+    A spring (N/m) of which a share s is taken from the newest and as much from the oldest extension is, for
+    the leapfrog, one of 1 - 4 s times its stiffness that reads the wire at mid-step. gain: as ``point_gain``,
+    of both ends in sum (m/N).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        explicit = np.nan_to_num(BEARABLE / (stiffness * gain), nan=0.0, posinf=1.0)
+    return np.maximum((1 - explicit) / 4, 0.0)
+
+
+def missing_yield(wire: Wire, dx: float, step: float, beta: float, weights: Array) -> Array:
     """Missing compliance (m/N), (points,), of a wire on a grid at points between its nodes.
 
     weights: (points, 4), with which a force at a point acts on the four nodes, and with which the wire is
@@ -59,20 +85,51 @@ def missing_yield(wire: Wire, dx: float, step: float, weights: Array) -> Array:
     1 / (2 pi (T k^2 + EI k^4)) over all wavenumbers k, the grid's that of W W* / (2 pi K) over the waves that
     it resolves. The difference is of first order in the spacing and depends on the place between two nodes.
     """
+    angle, stiffness, yielding, shorter = _waves(wire, dx, step, beta)
+    return np.asarray((yielding - _seen(weights, angle) / stiffness).mean(axis=1) + shorter)
+
+
+def missing_between(wire: Wire, dx: float, step: float, beta: float, parts: Array, reach: int) -> Array:
+    """Missing compliance (m/N), (2 reach + 1, parts, parts), of a wire on a grid between two of its points.
+
+    The displacement at the first by a force at the second, as in ``missing_yield``. parts: places between two
+    nodes, 0 to 1. The first axis counts the cells by which the first point is further along the wire.
+    """
+    angle, stiffness, yielding, shorter = _waves(wire, dx, step, beta)
+    weights = np.stack([python_function(cubic_weights)(part) for part in parts.tolist()])
+    seen = weights @ np.exp(1j * np.outer(np.arange(-1, 3), angle))
+    cells = np.arange(-reach, reach + 1)
+    turned = seen[None] * np.exp(1j * np.outer(cells, angle))[:, None]
+    on_grid = np.einsum("mct,dt->mcd", turned / stiffness, seen.conj()).real / len(angle)
+    width = np.sqrt(wire.bending_stiffness / wire.tension)
+    # From one point to another a wire's displacement falls as that of a string whose kink bending rounds.
+    apart = np.abs(cells[:, None, None] + parts[:, None] - parts) * dx
+    rounded = width * np.exp(-apart / width) - width if width > 0 else 0.0
+    return np.asarray(yielding.mean() + shorter - on_grid - (apart + rounded) / (2 * wire.tension))
+
+
+def _waves(wire: Wire, dx: float, step: float, beta: float) -> tuple[Array, Array, Array, float]:
+    """Waves that a grid carries: angle from node to node, and a wire's stiffness on it against each (N/m).
+
+    Then what the real wire yields to each (m/N), and to all shorter ones in sum.
+    """
     count = 512
-    angle = (np.arange(count) + 0.5) * np.pi / count  # of a wave from node to node
-    stiffness = _response(stencil_weights(wire, dx, step) * wire.mass * dx / step**2, angle)
+    angle = (np.arange(count) + 0.5) * np.pi / count
+    stiffness = _response(stencil_weights(wire, dx, step, beta) * wire.mass * dx / step**2, angle)
     second, fourth = wire.tension / dx, wire.bending_stiffness / dx**3
-    carried = (1 / (second * angle**2 + fourth * angle**4) - _seen(weights, angle) / stiffness).mean(axis=1)
     ratio = np.sqrt(fourth / second)
     shorter = (1 / np.pi - ratio * (np.pi / 2 - np.arctan(np.pi * ratio))) / (np.pi * second)
-    return np.asarray(carried + shorter)
+    return angle, stiffness, 1 / (second * angle**2 + fourth * angle**4), float(shorter)
 
 
 def _response(weights: Array, angle: Array) -> Array:
     """Response of a stencil to a wave of amplitude 1, by the wave's angle from node to node."""
-    near, far = weights
-    return np.asarray(2 * near * (1 - np.cos(angle)) + 2 * far * (1 - np.cos(2 * angle)))
+    return np.asarray(weights @ _differences(angle))
+
+
+def _differences(angle: Array) -> Array:
+    """Minus the symmetric differences over one, two and three nodes of waves of amplitude 1: (3, waves)."""
+    return np.asarray(2 - 2 * np.cos(np.outer((1, 2, 3), angle)))
 
 
 def _seen(weights: Array, angle: Array) -> Array:
@@ -80,16 +137,54 @@ def _seen(weights: Array, angle: Array) -> Array:
     return np.asarray(np.abs(weights @ np.exp(1j * np.outer(np.arange(4), angle))) ** 2)
 
 
-def spring_levels(stiffness: float, damping: float, step: float) -> Array:
-    """Weights of a spring (N/m) and damper (N s/m) on three time levels, newest first (N/m)."""
-    mean = stiffness * np.array([0.25, 0.5, 0.25])
-    return np.asarray(mean + damping / (2 * step) * np.array([1.0, 0.0, -1.0]))
+def spring_levels(stiffness: Any, damping: Any, step: float, share: Any = 0.25) -> Array:
+    """Weights of springs (N/m) and dampers (N s/m) on three time levels, newest first (N/m), (..., 3).
+
+    share: of the newest and of the oldest displacement in a spring's force. With a quarter it is stable for
+    any stiffness.
+    """
+    mean = np.stack([share, 1 - 2 * np.asarray(share), share], axis=-1)
+    change = np.multiply.outer(damping, np.array([1.0, 0.0, -1.0])) / (2 * step)
+    return np.asarray(np.asarray(stiffness)[..., None] * mean + change)
 
 
-def stencil_weights(wire: Wire, dx: float, step: float) -> Array:
-    """Weights of the nearest and second nearest nodes in the wire's force, as a displacement in a step."""
-    courant = np.sqrt(wire.tension / wire.mass) * step / dx
-    second = wire.tension / dx**2
-    fourth = -second * (1 - courant**2) / 12 - wire.bending_stiffness / dx**4
-    weights = np.array([second - 4 * fourth, fourth])
-    return np.asarray(step**2 / wire.mass * weights)
+def stencil_weights(wire: Wire, dx: float, step: float, beta: float) -> Array:
+    """Weights of the three nearest nodes on either side in the wire's force, as a displacement in a step.
+
+    Exact for long waves, and by least squares nearest to ``exact_answer`` for waves of up to ``FITTED`` from
+    node to node: so the errors of the step, of tension, of bending and of damping cancel. beta: damping in
+    proportion to the stiffness (s).
+    """
+    courant = wire.tension / wire.mass * (step / dx) ** 2
+    angle = (np.arange(64) + 0.5) / 64 * FITTED
+    # On a fine grid damping lets no short wave swing that need be fitted.
+    swinging = beta * _frequency(wire, angle / dx) < 1
+    angle *= max(float(angle[swinging].max(initial=angle[0])) / angle[-1], 0.1)
+    wanted = exact_answer(_frequency(wire, angle / dx), step, beta)
+    # Relative to what is wanted, so that long and short waves count alike.
+    one, two, three = _differences(angle) / wanted
+    far, *_ = np.linalg.lstsq(np.stack([two - 4 * one, three - 9 * one], axis=1), 1 - courant * one)
+    return np.array([courant - 4 * far[0] - 9 * far[1], *far])
+
+
+def _frequency(wire: Wire, number: Any) -> Any:
+    """Frequency (rad/s) of a wire's free waves of a wavenumber (rad/m)."""
+    return np.sqrt((wire.tension * number**2 + wire.bending_stiffness * number**4) / wire.mass)
+
+
+def exact_answer(frequency: Array, step: float, beta: float) -> Array:
+    """Response of a stencil to waves with which the leapfrog moves each at its own frequency (rad/s).
+
+    Its damping takes the increment of the step before, so that a wave turns in a step by the angle a with
+    2 sqrt(1 - lag g) cos a = 2 - (1 + lag) g, with the response g and lag = beta / dt.
+    """
+    lag = beta / step
+    turned = frequency * np.sqrt(np.maximum(1 - (beta * frequency / 2) ** 2, 0.75)) * step
+    sine = np.sin(turned) ** 2
+    root = np.cos(turned) * np.sqrt(np.maximum(1 - lag**2 * sine, 0.0))
+    return np.asarray(2 * (1 + lag * sine - root) / (1 + lag) ** 2)
+
+
+def second_differences(weights: Array) -> Array:
+    """The same stencil by second differences at a node, at its neighbours, and at those beyond them."""
+    return np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 2.0], [0.0, 0.0, 1.0]]) @ weights

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....backend import NOT_NEGATIVE, any_of, choose, inlined, larger, load_row, root, smaller, store_row
+from ....backend import NOT_NEGATIVE, inlined, larger, load_row, store_row
 from ...state import own_row
 from .arrays import LOWER, UPPER
 from .segments import move, read
@@ -25,75 +25,35 @@ def difference(lower, upper, row, weight, rows):
 
 
 @inlined
-def measure_extensions(line, wire, lane):
-    """Store extensions (m) of the previous step, and compute those at the step's start."""
-    u, past, now, gap = (
-        wire.displacement[lane],
-        wire.past_extension[lane],
-        wire.extension[lane],
-        wire.gap[lane],
-    )
-    for s in range(line.link_row.size):
-        lower, upper = u[line.link_wire[s, LOWER] & NOT_NEGATIVE], u[line.link_wire[s, UPPER] & NOT_NEGATIVE]
-        apart = difference(lower, upper, line.link_row[s], line.link_weight[s], line.rows)
-        store_row(past, s, load_row(now, s))
-        store_row(now, s, apart - load_row(gap, s))
+def pull_of(static, past, now, step, levels, first):
+    """Change of the links' tension in a step (N), from N and m; the tension is never negative.
 
-
-@inlined
-def slackening(stiffness, static, past, free, yielding):
-    """Change of tension (N) of links that are slack before or after the step.
-
-    Their extension, averaged over a step, goes from ``past`` to ``free - yielding * change`` (m). The
-    force is the change of the spring's energy over the change of extension (a discrete gradient), so
-    that going slack and taut again conserves energy.
+    past, now: extension before the step before, and before this one. step: by how much the ends move apart
+    in it without the links. first: of three rows of ``levels``, newest extension first (N/m).
     """
-    slack = static / stiffness  # extensions below -slack carry no tension
-    a, b = past + slack, free + slack + yielding * static  # b: were the tension 0
-    # from taut to slack: T = k a^2 / (2 (a - b + yielding T))
-    fall = a - b
-    falling = (root(fall * fall + 2.0 * yielding * stiffness * a * a) - fall) / (2.0 * yielding)
-    # from slack to taut, at the extension e > 0: k e^2 = 2 T (e - a), e = b - yielding T
-    stiff = 1.0 + 0.5 * stiffness * yielding
-    e = (a + b + root((a + b) * (a + b) - 4.0 * stiff * a * b)) / (2.0 * stiff)
-    rising = choose(b > 0.0, (b - e) / yielding, 0.0 * b)
-    return choose(a < 0.0, rising, falling) - static
-
-
-@inlined
-def pull_of(link, past, now, static, step, linear, early, stiffness, yielding):
-    """Change of the links' tension (N), the mean over a step; the tension is never negative.
-
-    link: their set in ``past`` and ``now``, extension before the step and at its start (m), and in ``static``
-    (N). step: displacement in the step of the upper ends relative to the lower ones, without the links (m).
-    early: the first of two rows of ``linear``, change of tension by mean extension before and after (N/m).
-    """
-    before = 0.5 * (load_row(past, link) + load_row(now, link))
-    free, minimum = load_row(now, link) + 0.5 * step, -load_row(static, link)
-    taut = load_row(linear, early) * before + load_row(linear, early + 1) * free  # the mean spring force
-    pull = larger(taut, minimum)
-    slack = stiffness * smaller(before, free - yielding * taut) < minimum
-    if any_of(slack):
-        pull = choose(slack, slackening(stiffness, load_row(static, link), before, free, yielding), pull)
-    return pull
+    taut = load_row(levels, first) * (now + step)
+    taut += load_row(levels, first + 1) * now + load_row(levels, first + 2) * past
+    return larger(taut, -static)
 
 
 @inlined
 def pull_links(line, wire, lane):
-    """Apply the links: a scalar equation for the tension of each."""
+    """Apply the links in equal rows: a scalar equation for the tension of each."""
     rows, u, d = line.rows, wire.displacement[lane], wire.increment[lane]
-    past, now = wire.past_extension[lane], wire.extension[lane]
-    static, change = wire.static[lane], wire.change[lane]
+    extension, change = wire.extension[lane], wire.change[lane]
+    static, gap = wire.static[lane], wire.gap[lane]
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
-        row, move_by, linear = line.link_row[s], line.link_move[s], line.link_linear[s]
-        step = difference(d[lower], d[upper], row, line.link_weight[s], rows)
-        stiffness, yielding = load_row(line.link_stiffness, s), load_row(line.link_yield, s)
-        pull = pull_of(s, past, now, static, step, linear, 0, stiffness, yielding)
+        row, weight, move_by = line.link_row[s], line.link_weight[s], line.link_move[s]
+        past = load_row(extension, s)
+        now = difference(u[lower], u[upper], row, weight, rows) - load_row(gap, s)
+        step = difference(d[lower], d[upper], row, weight, rows)
+        pull = pull_of(load_row(static, s), past, now, step, line.link_pull[s], 0)
+        store_row(extension, s, now)
         store_row(change, s, pull)
         for k in range(4):
-            move(u[lower], d[lower], row + k, rows, load_row(move_by, k) * pull)
-            move(u[upper], d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))
+            move(d[lower], row + k, rows, load_row(move_by, k) * pull)
+            move(d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))
 
 
 @inlined

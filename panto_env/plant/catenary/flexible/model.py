@@ -20,7 +20,7 @@ from .build import at_rest, constants, of_tension, settle
 from .defective_parts import DefectiveParts
 from .defects import DefectiveLine
 from .fixed_wires import tensions_of_fixed
-from .grid import contact_gain
+from .grid import point_gain
 from .loaded import check_loaded
 from .overlaps import tension_lengths
 from .resolution import resolution, spans_of_train
@@ -38,6 +38,9 @@ class FlexibleCatenary:
     """Two tensioned beams with droppers between them; a run starts at the line's first anchor."""
 
     massless = False
+    contact_share = (
+        0.5  # the wire's mean over a step is then as far from its height at mid-step as the head's
+    )
 
     def __init__(
         self,
@@ -78,7 +81,8 @@ class FlexibleCatenary:
         self.line = constants(data, shape, spans, numerics, chosen, own)._replace(lead=lead)
         self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
         self.wires_per_collector = self.line.pairs
-        self.contact_gain = contact_gain(tightest, self.line.spacing, self.time_step, own.lightest)
+        touched, beta = tightest.contact_wire, data.damping.beta
+        self.contact_gain = point_gain(touched, self.line.spacing, self.time_step, beta, own.lightest)
         about_one = self.line.window - spans_of_train(data, runs)
         window = about_one if about_one >= FEWEST_SPANS else 0
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": window}

@@ -12,7 +12,7 @@ from ....backend import WIDTH
 from ....base.arrays import Array, Index
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .attached import Links, Nodes, Springs
-from .grid import missing_yield
+from .grid import implicit_share, missing_yield, point_gain, spring_levels
 from .overlaps import TensionLength, pairs_of, tension_lengths
 from .schema import FlexibleCatenaryData
 from .segments import places
@@ -36,12 +36,17 @@ class OnGrid(NamedTuple):
     links: Links
     at_links: Nodes
     move: Array  # (links, 2, 4): displacement of the nodes of both ends in a step by 1 N (m/N)
-    linear: Array  # (links, 2): change of tension by mean extension before and after a step (N/m)
-    link_yield: Array  # (links,): mean relative displacement of the ends over a step by 1 N (m/N)
-    stiffness: Array  # (links,): in tension, with the grid's missing compliance (N/m)
+    pull: Array  # (links, 3): change of tension by extension at three times, newest first (N/m)
     room: Array  # (links,): designed distance of the ends (m)
     slope_mobility: Array  # (wires, 1): displacement of a bare node in a step by a tension, per slope (1/N)
     ropes: StitchGrid
+
+    @property
+    def along(self) -> tuple[Index, Index]:
+        """Links in their order along the line: those on the messenger, and those on stitch wires."""
+        order = np.argsort(self.at_links.first, kind="stable")
+        hung = self.links.stitch[order] >= 0
+        return order[~hung], order[hung]
 
 
 def on_grid(
@@ -86,20 +91,26 @@ def on_grid(
     weights = at_links.weights
     ends = [((links.wires == w) & ~(on[:, None] & [False, True])).sum(axis=1) for w in range(len(wires))]
     missing = sum(
-        count * missing_yield(wire, dx, step, weights) for wire, count in zip(wires, ends, strict=True)
+        count * missing_yield(wire, dx, step, damping.beta, weights)
+        for wire, count in zip(wires, ends, strict=True)
     )
     missing = missing + ropes.missing_yield
     stiffness = 1 / np.maximum(1 / links.stiffness + missing, 1 / STIFFEST)
     move = np.stack(
         [mobility[links.wires[:, end, None], at_links.four] * weights for end in (LOWER, UPPER)], axis=1
     )
-    relative = 0.5 * (weights * move.sum(axis=1)).sum(axis=1)
+    apart = (weights * move.sum(axis=1)).sum(axis=1)
     move[on, UPPER] = 0.0
     two = ropes.mobility[links.stitch[on, None], ropes.node[on, None] + [0, 1]]
     move[on, UPPER, :2] = two * ropes.shares[on]
-    relative[on] = 0.5 * (weights * move[:, LOWER])[on].sum(axis=1)
-    relative[on] += 0.5 * (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
-    early, late = (0.5 + sign * damping.beta / step for sign in (-1, 1))
+    apart[on] = (weights * move[:, LOWER])[on].sum(axis=1)
+    apart[on] += (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
+    lightest = [min(defects.lightest for defects in own), 1.0] * pairs_of(data)
+    gains = [
+        point_gain(wire, dx, step, damping.beta, light) for wire, light in zip(wires, lightest, strict=True)
+    ]
+    gain = sum(count * each for count, each in zip(ends, gains, strict=True)) + ropes.gain(damping.beta, step)
+    levels = spring_levels(stiffness, stiffness * damping.beta, step, implicit_share(stiffness, gain))
     moved = mobility[springs.wire[:, None], at_springs.four]
     return OnGrid(
         inertia=np.where(held, 0.0, bare / mass),
@@ -110,9 +121,7 @@ def on_grid(
         links=links,
         at_links=at_links,
         move=move,
-        linear=np.outer(stiffness, (early, late)) / (1 + late * stiffness * relative)[:, None],
-        link_yield=relative,
-        stiffness=stiffness,
+        pull=levels / (1 + levels[:, 0] * apart)[:, None],
         room=room,
         slope_mobility=step**2 / bare / (1.0 + damping.alpha * step / 2) / dx,
         ropes=ropes,
@@ -179,9 +188,7 @@ def in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str,
         "link_row": joined.row,
         "link_weight": of_links(grid.at_links.weights),
         "link_move": of_links(grid.move.reshape(len(grid.move), -1)),
-        "link_linear": of_links(grid.linear),
-        "link_yield": of_links(grid.link_yield, 1.0),
-        "link_stiffness": of_links(grid.stiffness, 1.0),
+        "link_pull": of_links(grid.pull),
         "link_room": of_links(grid.room, 1.0),
         "link_set": joined.number,
         "link_segment": joined.segment,

@@ -86,7 +86,7 @@ def record_scattered(line, wire, lane, uplift, tension):
     sets = masts.node.shape[1]
     for s in range(sets if uplift.size > 0 else 0):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        moved = displacement_at(u, node, table) - 0.5 * displacement_at(d, node, table)
+        moved = displacement_at(u, node, table) + 0.5 * displacement_at(d, node, table)
         store_row(past, s, moved)
         for j in range(WIDTH):
             n = masts.number[lane, j * sets + s]
@@ -251,6 +251,15 @@ def _enter(along, held, lane, n, start, rows):
         for r in range(along.empty.size):
             held.constants[lane, s, r, j] = along.constants[n, r]
     return new
+
+
+@inlined
+def slot_of(held, lane, n):
+    """Set and segment of thing n; -1 where it is not in the window."""
+    sets, slot = held.node.shape[1], n % held.number.shape[1]
+    if held.number[lane, slot & NOT_NEGATIVE] != n:
+        return -1, 0
+    return slot % sets, slot // sets
 
 
 @inlined

@@ -19,15 +19,12 @@ class LinkRow(IntEnum):
 
     WEIGHT = 0  # of its four nodes, the same on both wires
     MOVE = 4  # displacement of the lower wire's four nodes in a step by 1 N, then of the upper wire's (m/N)
-    EARLY = 12  # change of tension by the mean extension before a step (N/m)
-    LATE = 13  # and after it
-    YIELD = 14  # mean relative displacement of the ends over a step by 1 N (m/N)
-    STIFFNESS = 15  # in tension, with the grid's missing compliance (N/m)
-    ROOM = 16  # designed distance of its ends (m)
+    PULL = 12  # change of its tension by extension at three times, newest first (N/m)
+    ROOM = 15  # designed distance of its ends (m)
 
 
 class HungRow(IntEnum):
-    """Constants of a dropper on a stitch wire; from ``LinkRow.EARLY`` on as those of any dropper."""
+    """Constants of a dropper on a stitch wire; from ``LinkRow.PULL`` on as those of any dropper."""
 
     WEIGHT = 0  # of the four nodes on the contact wire
     UPPER = 4  # of the two nodes on the stitch wire
@@ -62,7 +59,7 @@ class SpringRow(IntEnum):
 
 LINK, MAST, SPRING = constants(LinkRow), constants(MastRow), constants(SpringRow)
 HUNG, STITCH = constants(HungRow), constants(StitchRow)
-LINK_ROWS, MAST_ROWS = 17, 18
+LINK_ROWS, MAST_ROWS = 16, 18
 
 
 class AlongLine(NamedTuple):
@@ -114,6 +111,6 @@ class ScatteredWindow(NamedTuple):
     deficit: Array  # (lanes, pairs of wires, rows + 2 PAD, WIDTH): of messengers, as ``Scattered`` has it; no
     # rows without stitch wires
     # Nodes of stitch wires, from clamp to clamp, those of set after set.
-    displacement: Array  # (lanes, sets times nodes, WIDTH): m
-    increment: Array  # (lanes, sets times nodes, WIDTH): m
+    displacement: Array  # (lanes, sets times nodes, WIDTH): before the last step (m)
+    increment: Array  # (lanes, sets times nodes, WIDTH): over it (m)
     clamp_force: Array  # (lanes, 2 sets, WIDTH): up on the messenger, scratch (N)

@@ -32,7 +32,7 @@ HUNG_NODES = NODES + 2
 def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     """What is attached along a whole line on its grid; None where spans are alike: nothing is scattered."""
     masts, links = np.zeros(MAST_ROWS, real), np.zeros(LINK_ROWS, real)
-    links[[LINK.YIELD, LINK.STIFFNESS, LINK.ROOM]] = 1.0  # a slot without a link has none that could be slack
+    links[LINK.ROOM] = 1.0  # a slot without a link has none that could be slack
     if grid is None:
         none, bare = np.zeros(0, dtype=np.int64), np.zeros((2, 0))
         without = [
@@ -56,8 +56,8 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         [
             at_links.weights,
             grid.move.reshape(-1, 2 * NODES),
-            grid.linear,
-            np.stack([grid.link_yield, grid.stiffness, grid.room], axis=1),
+            grid.pull,
+            grid.room[:, None],
         ],
         axis=1,
     )
@@ -72,15 +72,11 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     supports[: springs.masts] = of_springs[1 : 2 * springs.masts : 2]
     of_masts = np.concatenate([weights[arms], of_springs[arms], supports], axis=1)
     in_order = np.argsort(first[arms], kind="stable")
-    ropes, hung = grid.ropes, np.flatnonzero(grid.links.stitch >= 0)
-    on_messenger = np.flatnonzero(grid.links.stitch < 0)
-    hung, on_messenger = (
-        each[np.argsort(at_links.first[each], kind="stable")] for each in (hung, on_messenger)
-    )
+    ropes, (on_messenger, hung) = grid.ropes, grid.along
     carrying = grid.links.stitch[hung]
     stitches = _stitches(grid, real)
     of_links[hung, HUNG.UPPER : HUNG.MOVE] = ropes.shares[hung]
-    of_links[hung, HUNG.MOVE : LINK.EARLY] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
+    of_links[hung, HUNG.MOVE : LINK.PULL] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
     at_hung = at_links.first[hung]
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
@@ -238,7 +234,7 @@ def rope_nodes(line: FlexibleLine, wire: FlexibleWire, lane: int) -> Iterator[tu
     """Number of each stitch wire in a lane's window, and displacements of its nodes (m); 0 at its clamps."""
     own = wire.scattered
     sets = own.stitches.node.shape[1]
-    moved = own.displacement[lane] - 0.5 * own.increment[lane]
+    moved = own.displacement[lane] + 0.5 * own.increment[lane]
     for slot in np.flatnonzero(own.stitches.number[lane] >= 0).tolist():
         nodes = len(moved) // sets
         number = int(own.stitches.number[lane, slot])

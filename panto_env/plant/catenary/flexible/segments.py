@@ -1,7 +1,7 @@
 """Layout of the nodes of a wire: row r holds node r of each of the window's segments.
 
-Nodes are numbered from 0 at the window's start to rows * WIDTH at its end, both included; two further ones
-lie before its start and one beyond its end. A node's row counts from ``PAD`` at a segment's start.
+Nodes are numbered from 0 at the window's start to rows * WIDTH at its end, both included; three further
+ones lie before its start and two beyond its end. A node's row counts from ``PAD`` at a segment's start.
 """
 
 from __future__ import annotations
@@ -63,13 +63,12 @@ def read(x, row, rows):
 
 
 @inlined
-def move(u, d, row, rows, step):
+def move(x, row, rows, step):
     """Add a step to a row of nodes, numbered as in ``read``; beyond the window's end nothing moves."""
     if row >= rows + PAD:
         row -= rows
         step = shift_up(step, 0.0 * step)
-    store_row(u, row, load_row(u, row) + step)
-    store_row(d, row, load_row(d, row) + step)
+    store_row(x, row, load_row(x, row) + step)
 
 
 @inlined

@@ -1,11 +1,12 @@
 """The step of a flexible catenary: the wires and everything attached to them.
 
-The state of a wire is its displacement u and its increment over the last step d. A step is
-d <- b d + S (u + lag d), u <- u + d: the leapfrog, with the stencil S, damping b in proportion to the
-mass and lag in proportion to the stiffness. Forces at points then change u and d by mobility times force.
+The state of a wire is its displacement u before the last step and its increment over it d. A step is
+u <- u + d, d <- b d + S (u + lag d): the leapfrog, with the stencil S, damping b in proportion to the
+mass and lag in proportion to the stiffness. Forces at points then change d by mobility times force, and u
+not: so each force is written once.
 
-u is known at the middle of the pantograph's time steps, where the contact force, constant over such a step,
-acts on it. So the wire's displacement at the ends of a step is the mean of u before and after, u - d / 2.
+The wire is known at the middle of the pantograph's time steps, where the contact force, constant over such a
+step, acts on it. So the wire's displacement at the ends of a step is the mean of before and after, u + d / 2.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .arrays import CONTACT, LOWER, UPPER, FlexibleLine
+from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
 from .blown import blow
-from .links import difference, follow_links, measure_extensions, pull_links
+from .links import difference, follow_links, pull_links
+from .near import come_near_dropper, leave_droppers, rise_by_dropper
 from .scattered import (
     at_line_end,
     displacement_at,
@@ -37,14 +39,16 @@ from .scattered import (
 from .scattered_arrays import LINK
 from .segments import shift_nodes
 from .stitched import stretch_of_hung
-from .uneven import advance_uneven
+from .uneven import begin_uneven, pull_uneven
 from .wires import (
+    about,
     apply_springs,
+    cell_of,
     deflection,
     end_wire,
     keep_spring_past,
     leapfrog,
-    locate,
+    leapfrog_weakened,
     move_place,
     rise_by_defects,
     static_height,
@@ -106,34 +110,42 @@ def _has_second_wire(line):
 @implements(place_contact, FlexibleLine)
 def _place(line, wire, lane, contact, x):
     if contact == 0:
+        leave_droppers(wire, lane)
         follow(line, wire, lane, x)
     pair = pair_of(line, wire, contact)
     u, d = wire.displacement[lane, 2 * pair], wire.increment[lane, 2 * pair]
-    row, segment, weight = locate(x - window_start(line, wire, lane), line.spacing, line.rows)
+    cell, part = cell_of(x - window_start(line, wire, lane), line.spacing, line.rows)
+    row, segment, weight = about(cell, part, line.rows)
     wire.contact_row[lane, contact], wire.contact_segment[lane, contact] = row, segment
     for k in range(4):
         wire.contact_weight[lane, contact, k] = weight[k]
     height = unmoved_height(line, lane, pair, x)
     wire.unmoved_height[lane, contact] = height
+    come_near_dropper(line, wire, lane, contact, pair, cell, part)
+    height += rise_by_dropper(wire, lane, contact)
     before = height + deflection(u, d, row, segment, weight, 0.5)
-    return before, height + deflection(u, d, row, segment, weight, 0.0)
+    return before, height + deflection(u, d, row, segment, weight, 1.0)
 
 
 @implements(advance_wire, FlexibleLine)
 def _advance(line, wire, lane):
-    if line.scattered.mobility.shape[1] > 0:
-        advance_uneven(line, wire, lane)
-    else:
-        u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
-        keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
-        measure_extensions(line, wire, lane)
-        stencil = line.stencil[own_row(line.stencil, lane)]
-        inertia = wire.inertia[own_row(wire.inertia, lane)]
-        for w in range(u.shape[0]):
-            leapfrog(u[w], d[w], inertia[w], stencil[w])
-        blow(line, wire.gusts, lane, u, d, inertia)
-        apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
-        pull_links(line, wire, lane)
+    u, d, spring_past = wire.displacement[lane], wire.increment[lane], wire.spring_past[lane]
+    stencil = line.stencil[own_row(line.stencil, lane)]
+    inertia = wire.inertia[own_row(wire.inertia, lane)]
+    differ, deficit = line.scattered.mobility.shape[1] > 0, wire.scattered.deficit[lane]
+    if differ:
+        begin_uneven(line, wire, lane, stencil)
+    keep_spring_past(line.spring_wire, line.spring_row, d, spring_past)
+    for w in range(u.shape[0]):
+        if w % 2 == MESSENGER and deficit.shape[1] > 0:
+            leapfrog_weakened(u[w], d[w], inertia[w], deficit[w // 2], stencil[w])
+        else:
+            leapfrog(u[w], d[w], inertia[w], deficit[w // 2], stencil[w])
+    blow(line, wire.gusts, lane, d, inertia)
+    if differ:
+        pull_uneven(line, wire, lane)
+    apply_springs(line.spring_wire, line.spring_row, line.spring_pull, u, d, spring_past)
+    pull_links(line, wire, lane)
 
 
 @implements(rise_at_contact, FlexibleLine)
@@ -141,10 +153,12 @@ def _rise(line, wire, lane, contact, x0, x1):
     pair = pair_of(line, wire, contact)
     u, d = wire.displacement[lane, 2 * pair], wire.increment[lane, 2 * pair]
     start, rows = window_start(line, wire, lane), line.rows
-    row_0, segment_0, weight_0 = locate(x0 - start, line.spacing, rows)
-    row_1, segment_1, weight_1 = locate(x1 - start, line.spacing, rows)
-    before = deflection(u, d, row_0, segment_0, weight_0, 1.0)
-    deflected = deflection(u, d, row_1, segment_1, weight_1, 1.0) - before
+    cell_0, part_0 = cell_of(x0 - start, line.spacing, rows)
+    cell_1, part_1 = cell_of(x1 - start, line.spacing, rows)
+    row_0, segment_0, weight_0 = about(cell_0, part_0, rows)
+    row_1, segment_1, weight_1 = about(cell_1, part_1, rows)
+    before = deflection(u, d, row_0, segment_0, weight_0, 0.0)
+    deflected = deflection(u, d, row_1, segment_1, weight_1, 0.0) - before
     rise = unmoved_height(line, lane, pair, x1) - unmoved_height(line, lane, pair, x0)
     if line.pairs > 1 and abs(rise) > x1 - x0:
         rise = 0.0  # no wire is so steep: this one begins or ends here, and does not come down on the head
@@ -160,17 +174,18 @@ def _look(line, wire, lane, contact, x):
     mobility = wire.mobility[own_row(wire.mobility, lane), contact_wire]
     compliance = 0.5 * yield_of_place(mobility, row, segment, weight)
     height = wire.unmoved_height[lane, contact] + deflection(u, d, row, segment, weight, 0.5)
-    return height, compliance, 0.0, 0.0
+    height += rise_by_dropper(wire, lane, contact)
+    return height, compliance, 0.0, wire.contact_missing[lane, contact]
 
 
 @implements(apply_force, FlexibleLine)
 def _apply(line, wire, lane, contact, x, force):
     contact_wire = 2 * pair_of(line, wire, contact)
-    u, d = wire.displacement[lane, contact_wire], wire.increment[lane, contact_wire]
     row, segment = wire.contact_row[lane, contact], wire.contact_segment[lane, contact]
     weight = wire.contact_weight[lane, contact]
+    wire.pressed[lane, contact] = force
     mobility = wire.mobility[own_row(wire.mobility, lane), contact_wire]
-    move_place(u, d, mobility, row, segment, weight, force)
+    move_place(wire.increment[lane, contact_wire], mobility, row, segment, weight, force)
 
 
 @implements(end_step, FlexibleLine)
@@ -188,41 +203,40 @@ def _ending(line, wire, lane):
     u, d = wire.displacement[lane], wire.increment[lane]
     for s in range(line.mast_row.size):
         i, j = line.mast_row[s] & NOT_NEGATIVE, line.mast_segment[s] & NOT_NEGATIVE
-        if u[CONTACT, i, j] > line.free_uplift:
+        if u[CONTACT, i, j] + d[CONTACT, i, j] > line.free_uplift:
             return ENDING.STOP if abs(d[CONTACT, i, j]) < line.largest_move else ENDING.DIVERGED
     masts, links = wire.scattered.masts, wire.scattered.links
     for s in range(masts.node.shape[1]):
         node, table = masts.node[lane, s], masts.constants[lane, s]
-        over = displacement_at(u, node, table) > line.free_uplift
+        moving = displacement_at(d, node, table)
+        over = displacement_at(u, node, table) + moving > line.free_uplift
         if any_of(over):
-            moving = displacement_at(d, node, table)
             quickest = choose(over, larger(moving, -moving), 0.0 * moving)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.STOP
     # The wires are nearest to each other at a dropper: between two, the contact wire sags.
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
         row, weight = line.link_row[s], line.link_weight[s]
-        apart = difference(u[lower], u[upper], row, weight, line.rows)
+        closing = difference(d[lower], d[upper], row, weight, line.rows)
+        apart = difference(u[lower], u[upper], row, weight, line.rows) + closing
         touching = apart < -load_row(line.link_room, s)
         if any_of(touching):
-            closing = difference(d[lower], d[upper], row, weight, line.rows)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     for s in range(links.node.shape[1]):
         node, table = links.node[lane, s], links.constants[lane, s]
-        touching = stretch_at(u, node, table) < -load_row(table, LINK.ROOM)
+        closing = stretch_at(d, node, table)
+        touching = stretch_at(u, node, table) + closing < -load_row(table, LINK.ROOM)
         if any_of(touching):
-            closing = stretch_at(d, node, table)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     hung = wire.scattered.hung
     for s in range(hung.node.shape[1]):
         node, table = hung.node[lane, s], hung.constants[lane, s]
-        touching = stretch_of_hung(u, wire.scattered.displacement[lane], node, table) < -load_row(
-            table, LINK.ROOM
-        )
+        closing = stretch_of_hung(d, wire.scattered.increment[lane], node, table)
+        apart = stretch_of_hung(u, wire.scattered.displacement[lane], node, table) + closing
+        touching = apart < -load_row(table, LINK.ROOM)
         if any_of(touching):
-            closing = stretch_of_hung(d, wire.scattered.increment[lane], node, table)
             quickest = choose(touching, larger(closing, -closing), 0.0 * closing)
             return ENDING.DIVERGED if any_of(line.largest_move < quickest) else ENDING.WIRES
     return ENDING.NONE
@@ -235,11 +249,12 @@ def _record(line, wire, lane, uplift, tension):
         if travelled + s < uplift.size:
             i, j = line.mast_row[s], line.mast_segment[s]
             u, d = wire.displacement[lane, CONTACT, i, j], wire.increment[lane, CONTACT, i, j]
-            uplift[travelled + s] = u - 0.5 * d
+            uplift[travelled + s] = u + 0.5 * d
     if tension.size > 0:
+        static, change = wire.static[lane], wire.change[lane]
         links = line.link_set.size
         first = travelled * (links // line.window)
         for k in range(links):
-            i, j = line.link_set[k], line.link_segment[k]
-            tension[first + k] = wire.static[lane, i, j] + wire.change[lane, i, j]
+            i, j = line.link_set[k] & NOT_NEGATIVE, line.link_segment[k] & NOT_NEGATIVE
+            tension[(first + k) & NOT_NEGATIVE] = static[i, j] + change[i, j]
     record_scattered(line, wire, lane, uplift, tension)

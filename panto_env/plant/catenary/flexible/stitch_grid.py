@@ -49,6 +49,18 @@ class StitchGrid(NamedTuple):
         lacking[on] = (self.share * (1 - self.share))[on] * self.spacing[k] / self.stitches.tension[k]
         return lacking
 
+    def gain(self, beta: float, step: float) -> Array:
+        """Of links on stitch wires as ``grid.point_gain`` (m/N), (links,), at a node; others 0.
+
+        A string's integral over its waves in closed form. beta, step: s.
+        """
+        on, found = self.node >= 0, np.zeros(len(self.node))
+        k = self.stitches.carrying[on]
+        squared = self.stitches.tension[k] / self.stitches.mass[k] * (step / self.spacing[k]) ** 2
+        room = 1 - squared * (1 + 2 * beta / step)
+        found[on] = self.bare_mobility[k] / 4 / np.sqrt(room)
+        return found
+
 
 def stitch_grid(
     data: FlexibleCatenaryData, stitches: Stitches, links: Links, x: Array, step: float

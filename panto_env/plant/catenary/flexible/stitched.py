@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from ....backend import gather, inlined, load_row, scatter_add, store_row
-from .arrays import MESSENGER
+from .arrays import MESSENGER, STENCIL
 from .scattered import displacement_at, move_nodes
 from .scattered_arrays import HUNG, STITCH
+from .wires import move_on
 
 
 @inlined
@@ -26,20 +27,20 @@ def advance_stitches(held, lane, u, d, stencil):
     stitches = held.stitches
     sets = stitches.node.shape[1]
     intervals = stitches.constants.shape[2] - STITCH.INERTIA - 1
-    keep, lag, quiet = stencil[2], stencil[3], stencil[4]
+    keep, lag, quiet = stencil[STENCIL.KEEP], stencil[STENCIL.LAG], stencil[STENCIL.QUIET]
     its_u, its_d, forces = held.displacement[lane], held.increment[lane], held.clamp_force[lane]
     for s in range(sets):
         node, table, first = stitches.node[lane, s], stitches.constants[lane, s], s * (intervals + 1)
         near, pull = load_row(table, STITCH.NEAR), load_row(table, STITCH.PULL)
         above, its = u[MESSENGER:], d[MESSENGER:]
-        before = _at_clamp(above, node, table, 0) + lag * _at_clamp(its, node, table, 0)
-        beyond = _at_clamp(above, node, table, 1) + lag * _at_clamp(its, node, table, 1)
-        here = load_row(its_u, first + 1) + lag * load_row(its_d, first + 1)
+        before = _at_clamp(above, node, table, 0) + (1.0 + lag) * _at_clamp(its, node, table, 0)
+        beyond = _at_clamp(above, node, table, 1) + (1.0 + lag) * _at_clamp(its, node, table, 1)
+        here = move_on(its_u, its_d, first + 1, lag)
         store_row(forces, 2 * s, pull * (here - before))
         slope = here - before
         for k in range(1, intervals):
             i = first + k
-            after = load_row(its_u, i + 1) + lag * load_row(its_d, i + 1)
+            after = move_on(its_u, its_d, i + 1, lag)
             if k == intervals - 1:
                 after = beyond
             slope_ahead = after - here

@@ -32,7 +32,7 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
     effect of defective droppers and supports. In overlaps both are those of the wires in use.
     """
     line, wire, data = model.line, model.wire, model.data
-    moved = along(wire.displacement[lane] - 0.5 * wire.increment[lane])[:, PAD:-PAD]
+    moved = along(wire.displacement[lane] + 0.5 * wire.increment[lane])[:, PAD:-PAD]
     x = wire.travelled[lane] * line.stride + line.spacing * np.arange(moved.shape[1])
     inside = (x >= begin) & (x <= end)
     x, moved = x[inside], moved[:, inside]

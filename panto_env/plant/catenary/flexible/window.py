@@ -13,26 +13,31 @@ import warnings
 
 from ....base.errors import AccuracyWarning, InputError
 from ....base.units import to_kmh
-from ...numerics import WINDOW, Numerics, Runs
+from ...numerics import Numerics, Runs
 from ..schema import CLEAR, MOST_SPANS, Wire
 
-ENOUGH = ((0.4, 24), (0.65, 16), (1.0, 8))
+ENOUGH = ((0.25, 32), (0.4, 24), (0.66, 16), (0.82, 8), (1.0, 4))
 """Up to a share of the faster wire's wave speed: spans about the train that make figures as of an endless
 line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (docs/validation.md)."""
+FAST = 8
+"""Maximum number of spans about a train for ``accuracy="fast"``."""
 WITH_OVERLAPS = 10
 """Minimum number of spans about a train that passes overlaps, whose anchors send waves back: with 5 or 8 of
 them sigma there is wrong by up to 13 or 6 %, with 10 by less than 1 %."""
 STITCHED = 40
-"""Spans about a train on a line with stitch wires, past whose supports waves travel far."""
+"""Spans about a slow train on a line with stitch wires, past whose supports waves travel far."""
 STITCHED_SHARE, STITCHED_ERROR = 0.45, 4
-"""Share of the faster wire's wave speed below which even so many leave an error in sigma; the error (%)."""
+"""Share of the faster wire's wave speed below which a train there is slow, and even so many spans leave an
+error in sigma; the error (%)."""
 ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
 """From a number of spans on: error (%) of figures where more are needed."""
 
 
-def enough_spans(wires: tuple[Wire, Wire], runs: Runs) -> int:
+def enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False) -> int:
     """Spans about the slowest train that are enough for figures of an endless line."""
     share = runs.speeds[0] / max(wire.wave_speed for wire in wires)
+    if stitched and share < STITCHED_SHARE:
+        return STITCHED
     return next((spans for limit, spans in ENOUGH if share <= limit), ENOUGH[-1][1])
 
 
@@ -51,10 +56,10 @@ def window_of(
         )
     if numerics.window is not None or whole:
         return numerics.window or 0
-    usual = max(WINDOW[numerics.accuracy], WITH_OVERLAPS if overlaps else 0)
+    enough = enough_spans(wires, runs, stitched)
     if numerics.accuracy != "full":
-        return usual
-    return max(usual, enough_spans(wires, runs), STITCHED if stitched else 0)
+        enough = min(enough, FAST)
+    return max(enough, WITH_OVERLAPS if overlaps else 0)
 
 
 def clear_spans(

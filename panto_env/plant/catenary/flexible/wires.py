@@ -6,7 +6,7 @@ import math
 
 from ....backend import NOT_NEGATIVE, WIDTH, inlined, load_row, store_row
 from ...interpolation import cubic_weights
-from .arrays import PAD
+from .arrays import PAD, STENCIL
 from .segments import node_after, row_of, segment_of, share_ends
 
 
@@ -41,32 +41,36 @@ def rise_by_defects(pieces, breaks, decay, x):
 
 
 @inlined
-def locate(x, spacing, rows):
-    """Row and segment of the first of four nodes around x (m from the window's start), and their weights."""
+def cell_of(x, spacing, rows):
+    """Cell between two nodes, by its first node, at x (m from the window's start), and the place in it."""
     ratio = x / spacing
-    left = min(max(int(math.floor(ratio)), 0), rows * WIDTH - 1)  # noqa: RUF046  # on a GPU it is a float
-    segment = segment_of(left - 1, rows)
-    return row_of(left - 1, segment, rows), segment, cubic_weights(ratio - left)
+    cell = min(max(int(math.floor(ratio)), 0), rows * WIDTH - 1)  # noqa: RUF046  # on a GPU it is a float
+    return cell, ratio - cell
 
 
 @inlined
-def deflection(u, d, row, segment, weight, ago):
-    """Displacement (m) of a wire at a place among four nodes; ago: how long ago (steps, 0 to 1)."""
+def about(cell, part, rows):
+    """Row and segment of the first of four nodes about a place in a cell, and their weights."""
+    segment = segment_of(cell - 1, rows)
+    return row_of(cell - 1, segment, rows), segment, cubic_weights(part)
+
+
+@inlined
+def deflection(u, d, row, segment, weight, part):
+    """Displacement (m) of a wire at a place among four nodes, after a part of the last step."""
     total = 0.0
     for k in range(4):
         i, j = node_after(row, segment, k, u.shape[0])
-        total += weight[k] * (u[i, j] - ago * d[i, j])
+        total += weight[k] * (u[i, j] + part * d[i, j])
     return total
 
 
 @inlined
-def move_place(u, d, mobility, row, segment, weight, force):
+def move_place(d, mobility, row, segment, weight, force):
     """Apply a force (N) to a wire at a place among four nodes."""
     for k in range(4):
-        i, j = node_after(row, segment, k, u.shape[0])
-        step = mobility[i, j] * weight[k] * force
-        d[i, j] += step
-        u[i, j] += step
+        i, j = node_after(row, segment, k, d.shape[0])
+        d[i, j] += mobility[i, j] * weight[k] * force
 
 
 @inlined
@@ -80,65 +84,62 @@ def yield_of_place(mobility, row, segment, weight):
 
 
 @inlined
-def leapfrog(u, d, inertia, stencil):
-    """One step of one bare wire: d <- keep d + S (u + lag d), u <- u + d, with the stencil S.
+def move_on(u, d, row, lag):
+    """Move a row of nodes by its last increment; returns its displacement by which the wire pulls."""
+    increment = load_row(d, row)
+    new = load_row(u, row) + increment
+    store_row(u, row, new)
+    return new + lag * increment
 
-    S is near (second difference) + far (difference over two nodes), written in second differences: weights
-    that only nearly add up to 0 would be a spring, in single precision.
+
+def leapfrog_of(weakened):
+    """Kernel function for one step of one bare wire; weakened: whether stitch wires take tension from it.
+
+    A test of it in the loop would slow all wires by an eighth.
     """
-    near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
-    # A tiny load on every node keeps wires at rest away from subnormal numbers, which are slow.
-    quiet, middle = stencil[4], near + far + far
-    before = load_row(u, 1) + lag * load_row(d, 1)
-    here = load_row(u, 2) + lag * load_row(d, 2)
-    after = load_row(u, 3) + lag * load_row(d, 3)
-    slope = after - here
-    bend_before = (here - before) - (before - (load_row(u, 0) + lag * load_row(d, 0)))
-    bend = slope - (here - before)
-    for i in range(PAD, u.shape[0] - PAD):
-        ahead = load_row(u, i + 2) + lag * load_row(d, i + 2)
-        slope_ahead = ahead - after
-        bend_after = slope_ahead - slope
-        force = middle * bend + far * (bend_before + bend_after)
-        if inertia.shape[0] > 0:
-            force = load_row(inertia, i - PAD) * force
-        step = (keep * load_row(d, i) - quiet) + force
-        store_row(d, i, step)
-        store_row(u, i, load_row(u, i) + step)
-        after, slope, bend_before, bend = ahead, slope_ahead, bend, bend_after
+
+    @inlined
+    def leapfrog(u, d, inertia, deficit, stencil):
+        """One step, u <- u + d, d <- keep d + S (u + lag d), with the stencil S.
+
+        deficit: as ``ScatteredWindow`` has it.
+
+        S is written in second differences: weights that only nearly add up to 0 would be a spring, in single
+        precision.
+        """
+        at_node, beside, beyond = stencil[STENCIL.HERE], stencil[STENCIL.NEXT], stencil[STENCIL.BEYOND]
+        # A tiny load on every node keeps wires at rest away from subnormal numbers, which are slow.
+        keep, lag, quiet = stencil[STENCIL.KEEP], stencil[STENCIL.LAG], stencil[STENCIL.QUIET]
+        third_before, second_before = move_on(u, d, 0, lag), move_on(u, d, 1, lag)
+        before, here = move_on(u, d, 2, lag), move_on(u, d, 3, lag)
+        after, second_after = move_on(u, d, 4, lag), move_on(u, d, 5, lag)
+        slope_before, slope, slope_ahead = here - before, after - here, second_after - after
+        bend_2 = (before - second_before) - (second_before - third_before)  # two nodes before
+        bend_1 = slope_before - (before - second_before)
+        bend, bend_ahead = slope - slope_before, slope_ahead - slope
+        missing = 0.0 * slope
+        if weakened:
+            missing = load_row(deficit, PAD) * slope_before
+        for i in range(PAD, u.shape[0] - PAD):
+            furthest = move_on(u, d, i + 3, lag)
+            slope_beyond = furthest - second_after
+            bend_beyond = slope_beyond - slope_ahead
+            force = (at_node * bend - quiet) + beside * (bend_1 + bend_ahead)
+            force += beyond * (bend_2 + bend_beyond)
+            if weakened:
+                missing_ahead = load_row(deficit, i + 1) * slope
+                force += missing - missing_ahead
+                missing = missing_ahead
+            if inertia.shape[0] > 0:
+                force = load_row(inertia, i - PAD) * force
+            store_row(d, i, keep * load_row(d, i) + force)
+            second_after, slope, slope_ahead = furthest, slope_ahead, slope_beyond
+            bend_2, bend_1, bend, bend_ahead = bend_1, bend, bend_ahead, bend_beyond
+
+    return leapfrog
 
 
-@inlined
-def find_increments(u, d, inertia, deficit, stencil):
-    """Increments of one bare wire, as ``leapfrog`` finds them; its displacements stay as they were.
-
-    deficit: as ``ScatteredWindow`` has it; no rows without stitch wires. A branch for it in ``leapfrog``
-    would change how multiply and add are fused there, and so the bits of lines with equal spans.
-    """
-    near, far, keep, lag = stencil[0], stencil[1], stencil[2], stencil[3]
-    quiet, middle = stencil[4], near + far + far
-    before = load_row(u, 1) + lag * load_row(d, 1)
-    here = load_row(u, 2) + lag * load_row(d, 2)
-    after = load_row(u, 3) + lag * load_row(d, 3)
-    slope = after - here
-    bend_before = (here - before) - (before - (load_row(u, 0) + lag * load_row(d, 0)))
-    bend = slope - (here - before)
-    missing = 0.0 * slope
-    if deficit.shape[0] > 0:
-        missing = load_row(deficit, PAD) * (here - before)
-    for i in range(PAD, u.shape[0] - PAD):
-        ahead = load_row(u, i + 2) + lag * load_row(d, i + 2)
-        slope_ahead = ahead - after
-        bend_after = slope_ahead - slope
-        force = middle * bend + far * (bend_before + bend_after)
-        if deficit.shape[0] > 0:
-            missing_ahead = load_row(deficit, i + 1) * slope
-            force += missing - missing_ahead
-            missing = missing_ahead
-        if inertia.shape[0] > 0:
-            force = load_row(inertia, i - PAD) * force
-        store_row(d, i, (keep * load_row(d, i) - quiet) + force)
-        after, slope, bend_before, bend = ahead, slope_ahead, bend, bend_after
+leapfrog, leapfrog_weakened = leapfrog_of(False), leapfrog_of(True)
 
 
 @inlined
@@ -153,16 +154,14 @@ def apply_springs(wire, row, pull, u, d, past):
     """Springs and dampers to the ground (messenger supports, steady arms), each implicit at its node."""
     for s in range(row.size):
         i, its_u, its_d = row[s], u[wire[s] & NOT_NEGATIVE], d[wire[s] & NOT_NEGATIVE]
-        new, increment = load_row(its_u, i), load_row(its_d, i)
-        now = new - increment
+        now, increment = load_row(its_u, i), load_row(its_d, i)
         by_time = pull[s]
         step = (
-            load_row(by_time, 0) * new
+            load_row(by_time, 0) * (now + increment)
             + load_row(by_time, 1) * now
             + load_row(by_time, 2) * (now - load_row(past, s))
         )
         store_row(its_d, i, increment - step)
-        store_row(its_u, i, new - step)
 
 
 @inlined
@@ -178,10 +177,8 @@ def absorb(u, d, absorbing, row, segment, inward):
     """Let waves leave at one end of a wire: Mur's one-way wave equation, from this row on outward."""
     for k in range(PAD):
         i = row - k * inward
-        inner, inner_step = u[i + inward, segment], d[i + inward, segment]  # already at the new time
-        step = (1.0 + absorbing) * (inner - inner_step - u[i, segment]) + absorbing * inner_step
-        d[i, segment] = step
-        u[i, segment] += step
+        ahead = u[i + inward, segment] - u[i, segment]  # both before the step
+        d[i, segment] = (1.0 + absorbing) * ahead + absorbing * d[i + inward, segment]
 
 
 @inlined
@@ -189,14 +186,13 @@ def end_wire(u, d, absorbing, at_start, at_end):
     """Anchor a wire where the window is at the line's start or end; let waves leave elsewhere."""
     start, end, last = PAD, u.shape[0] - PAD, WIDTH - 1
     if at_start:
-        anchor(u, start, 0, 1, 2)
-        anchor(d, start, 0, 1, 2)
+        anchor(u, start, 0, 1, PAD)
+        anchor(d, start, 0, 1, PAD)
     else:
         absorb(u, d, absorbing, start - 1, 0, 1)
     if at_end:
-        anchor(u, end, last, -1, 1)
-        anchor(d, end, last, -1, 1)
+        anchor(u, end, last, -1, PAD - 1)
+        anchor(d, end, last, -1, PAD - 1)
     else:
         absorb(u, d, absorbing, end, last, -1)
-    share_ends(u, u.shape[0] - 2 * PAD)
     share_ends(d, u.shape[0] - 2 * PAD)

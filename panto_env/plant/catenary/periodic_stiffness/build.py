@@ -25,6 +25,7 @@ class PeriodicStiffness:
     massless: bool = True
     wires_per_collector: int = 1
     contact_gain: float = 0.0
+    contact_share: float = 0.0
     grid: Mapping[str, float] = {}
     wave_speed: float = np.inf  # no wave runs along a spring
     length: float = np.inf  # the line has no end

@@ -47,6 +47,7 @@ class Rig:
 
     massless = False
     wires_per_collector = 1
+    contact_share = 0.0
     contact_gain = 0.0  # the cylinder does not respond to the force within a step
 
     def __init__(

@@ -29,6 +29,7 @@ class ThreeSpan:
 
     massless: bool = False
     wires_per_collector: int = 1
+    contact_share: float = 0.0  # its height at mid-step is exact
     grid: Mapping[str, float] = {}
     length: float = np.inf  # the line has no end
 
