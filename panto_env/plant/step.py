@@ -73,9 +73,8 @@ def meet(line, wire, pantographs, run, contact, lane):
     own = run.table[contact, lane]
     parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
     free_head = own[ROW.STATE + pantographs.sizes[contact]]
-    contact_input = parts[PART.CONTACT_INPUT]
+    contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
     x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
-    share = parts[PART.IMPLICIT_SHARE] if x > 0.0 else 0.0  # the anchor, at which one waits, does not yield
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, contact, own, lane)

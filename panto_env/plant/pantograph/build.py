@@ -65,7 +65,7 @@ def parts(
     stiffness = pantograph.contact_stiffness
     compliance = rigid if stiffness == "rigid" else 1 / stiffness
     bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
-    share = catenary.contact_share if bearable >= gain else max(1.0 - bearable / gain, catenary.contact_share)
+    share = max(catenary.contact_share, 1.0 - bearable / gain if gain else 0.0)
     damping = pantograph.contact_damping / time_step
     scalars = [compliance, damping, share, pantograph.frame_friction]
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])

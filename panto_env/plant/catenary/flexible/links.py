@@ -25,32 +25,33 @@ def difference(lower, upper, row, weight, rows):
 
 
 @inlined
-def pull_of(static, past, now, step, levels, first):
-    """Change of the links' tension in a step (N), from N and m; the tension is never negative.
+def pull_of(wire, lane, s, apart, step, levels, first):
+    """Change of the tension of set s of links in a step (N); the tension is never negative.
 
-    past, now: extension before the step before, and before this one. step: by how much the ends move apart
-    in it without the links. first: of three rows of ``levels``, newest extension first (N/m).
+    Stores it, and the extension before the step. apart: by how much the upper ends are displaced from the
+    lower ones before the step (m). step: by how much they move apart in it without the links (m). first: of
+    three rows of ``levels``, newest extension first (N/m).
     """
+    extension = wire.extension[lane]
+    past, now = load_row(extension, s), apart - load_row(wire.gap[lane], s)
     taut = load_row(levels, first) * (now + step)
     taut += load_row(levels, first + 1) * now + load_row(levels, first + 2) * past
-    return larger(taut, -static)
+    pull = larger(taut, -load_row(wire.static[lane], s))
+    store_row(extension, s, now)
+    store_row(wire.change[lane], s, pull)
+    return pull
 
 
 @inlined
 def pull_links(line, wire, lane):
     """Apply the links in equal rows: a scalar equation for the tension of each."""
     rows, u, d = line.rows, wire.displacement[lane], wire.increment[lane]
-    extension, change = wire.extension[lane], wire.change[lane]
-    static, gap = wire.static[lane], wire.gap[lane]
     for s in range(line.link_row.size):
         lower, upper = line.link_wire[s, LOWER] & NOT_NEGATIVE, line.link_wire[s, UPPER] & NOT_NEGATIVE
         row, weight, move_by = line.link_row[s], line.link_weight[s], line.link_move[s]
-        past = load_row(extension, s)
-        now = difference(u[lower], u[upper], row, weight, rows) - load_row(gap, s)
+        apart = difference(u[lower], u[upper], row, weight, rows)
         step = difference(d[lower], d[upper], row, weight, rows)
-        pull = pull_of(load_row(static, s), past, now, step, line.link_pull[s], 0)
-        store_row(extension, s, now)
-        store_row(change, s, pull)
+        pull = pull_of(wire, lane, s, apart, step, line.link_pull[s], 0)
         for k in range(4):
             move(d[lower], row + k, rows, load_row(move_by, k) * pull)
             move(d[upper], row + k, rows, -(load_row(move_by, 4 + k) * pull))

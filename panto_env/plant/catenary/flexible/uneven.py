@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....backend import inlined, load_row, store_row
+from ....backend import inlined
 from .arrays import MESSENGER
 from .links import pull_of
 from .scattered import apply_masts, keep_past_of_masts, move_nodes, stretch_at
@@ -24,23 +24,16 @@ def pull_uneven(line, wire, lane):
     u, d, held = wire.displacement[lane], wire.increment[lane], wire.scattered
     pull_clamps(held, lane, d)
     apply_masts(line.scattered, held.masts, lane, u, d, wire.spring_past[lane])
-    links, hung, extension = held.links, held.hung, wire.extension[lane]
-    static, gap, change = wire.static[lane], wire.gap[lane], wire.change[lane]
+    links, hung = held.links, held.hung
     for s in range(links.node.shape[1]):
-        node, table, past = links.node[lane, s], links.constants[lane, s], load_row(extension, s)
-        now, step = stretch_at(u, node, table) - load_row(gap, s), stretch_at(d, node, table)
-        pull = pull_of(load_row(static, s), past, now, step, table, LINK.PULL)
-        store_row(extension, s, now)
-        store_row(change, s, pull)
+        node, table = links.node[lane, s], links.constants[lane, s]
+        apart, step = stretch_at(u, node, table), stretch_at(d, node, table)
+        pull = pull_of(wire, lane, s, apart, step, table, LINK.PULL)
         move_nodes(d, node, table, LINK.MOVE, pull)
         move_nodes(d[MESSENGER:], node, table, LINK.MOVE + 4, -pull)
     first, its_u, its_d = links.node.shape[1], held.displacement[lane], held.increment[lane]
     for s in range(hung.node.shape[1]):
-        node, table, number = hung.node[lane, s], hung.constants[lane, s], first + s
-        past = load_row(extension, number)
-        now = stretch_of_hung(u, its_u, node, table) - load_row(gap, number)
-        step = stretch_of_hung(d, its_d, node, table)
-        pull = pull_of(load_row(static, number), past, now, step, table, LINK.PULL)
-        store_row(extension, number, now)
-        store_row(change, number, pull)
+        node, table = hung.node[lane, s], hung.constants[lane, s]
+        apart, step = stretch_of_hung(u, its_u, node, table), stretch_of_hung(d, its_d, node, table)
+        pull = pull_of(wire, lane, first + s, apart, step, table, LINK.PULL)
         move_hung(d, its_d, node, table, pull)
