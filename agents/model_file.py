@@ -34,6 +34,8 @@ class Needs(Settings):
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps that are observed
     front: tuple[float, ...] = ()  # places ahead whose contact force the pantograph in front measured (m)
+    memory: tuple[float, ...] = ()  # times until places of which earlier spans are remembered (s)
+    memory_spans: int = 1  # number of these spans
     line_values: bool = False  # whether the line's are observed
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
     entries: tuple[tuple[str, float, float], ...]  # name, centre and scale of each observation
@@ -62,6 +64,8 @@ class Needs(Settings):
             harmonics=layout.harmonics,
             history=layout.history,
             front=layout.front,
+            memory=layout.memory,
+            memory_spans=layout.memory_spans,
             line_values=layout.line_values,
             normalise=layout.normalise,
             entries=tuple(

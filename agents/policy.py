@@ -32,9 +32,8 @@ class TrainedPolicy:
         self.path, self.facts = path, facts
         self._policy = policy_of(actor, facts)
         needs = facts.needs
-        self.observation, self.harmonics, self.history = needs.observation, needs.harmonics, needs.history
-        self.front, self.line_values = needs.front, needs.line_values
-        self.normalise, self.washout = needs.normalise, needs.washout
+        for name in (*OBSERVATION_SETTINGS, "washout"):
+            setattr(self, name, getattr(needs, name))
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""

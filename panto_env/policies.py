@@ -37,9 +37,9 @@ class PolicyError(InputError):
 class Policy(Protocol):
     """Any object with these two methods. It gets observations, never the environment.
 
-    It may have attributes ``observation``, ``harmonics``, ``history``, ``front``, ``line_values`` and
-    ``normalise``, settings of its observation, and ``washout``, 0 unless it has one: a run takes these
-    unless it is given others.
+    It may have attributes ``observation``, ``harmonics``, ``history``, ``front``, ``memory``,
+    ``memory_spans``, ``line_values`` and ``normalise``, settings of its observation, and ``washout``, 0
+    unless it has one: a run takes these unless it is given others.
     """
 
     def reset(self, context: Context) -> None:

@@ -34,6 +34,7 @@ CENTRES = {
     "speed": (76.0, 12.0),
     "nominal force": (120.0, 30.0),
     "front force": (120.0, 30.0),
+    "remembered force": (120.0, 30.0),
     **LINE_CENTRES,
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
@@ -75,6 +76,8 @@ class EntryOptions(NamedTuple):
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
     front: tuple[float, ...] = ()  # places ahead whose contact force the one in front measured (m)
+    memory: tuple[float, ...] = ()  # times until places of which earlier spans are remembered (s)
+    memory_spans: int = 1  # number of these spans
     line_values: bool = False  # whether the line's are among them
 
 
@@ -182,6 +185,25 @@ def _front_force(episode, own, task, now, number):
     return now[NOW_ROWS + number]
 
 
+def _memory(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+    """Force and actions of earlier spans at places ahead; number: row beyond ``Now``'s named ones."""
+    kinds = [
+        ("force", 100.0, "N"),
+        *((f"{name} action", 1.0, "-") for name in _place_names(options.actuator)),
+    ]
+    spans = [f"{k} span{'s' if k > 1 else ''} ago" for k in range(1, options.memory_spans + 1)]
+    places = [(kind, span, time) for kind in kinds for span in spans for time in options.memory]
+    return [
+        (f"remembered {name}, {span}, {time:g} s ahead", scale, unit, len(options.front) + number)
+        for number, ((name, scale, unit), span, time) in enumerate(places)
+    ]
+
+
+@entries(MEASURED, _memory)
+def _remembered_value(episode, own, task, now, number):
+    return now[NOW_ROWS + number]
+
+
 @entries(MEASURED, lambda options: [(*SPAN_LENGTH, 0)] if options.line_values else [])
 def _span_length(episode, own, task, now, number):
     return episode.alignment.mean_length / mean_over_own_length(episode.alignment, now[NOW.SPANS])
@@ -211,7 +233,11 @@ def _actions(options: EntryOptions) -> list[tuple[str, float, str, int]]:
 
 
 def _action_names(actuator: ActuatorSettings) -> list[str]:
-    return [f"last {place.name.lower()} action" for place in actuator.places]
+    return [f"last {name} action" for name in _place_names(actuator)]
+
+
+def _place_names(actuator: ActuatorSettings) -> list[str]:
+    return [place.name.lower() for place in actuator.places]
 
 
 @entries(MEASURED, _actions)

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from ..backend import aligned_zeros
 from ..base.arrays import Array, Index
+from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
 from .front import FrontArrays, front_arrays
 from .line_values import line_values
+from .memory import MemoryArrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
@@ -51,6 +53,7 @@ class Episode(NamedTuple):
     time_step: float  # s
     control_steps: int  # plant steps in a control step
     front: FrontArrays
+    memory: MemoryArrays
     mean_share: float  # weight of a control step in the running mean of the force
     washout_share: float  # weight of a control step in the washout's average; 0: there is no washout
     loss_limit: int  # plant steps without contact that end an episode
@@ -64,13 +67,19 @@ def new_episode(
     """Arrays for the episodes of all lanes of a plant; control_steps: plant steps in a control step."""
     lanes, actuator, controlled = plant.lanes, settings.actuator, plant.train.driven
     actions, rows = len(actuator.places), lanes * len(controlled)
+    if layout.memory and not odometer.sight:
+        raise InputError(
+            "memory is looked up by the place within the span, which these sensors do not measure; leave it "
+            "out, or take other sensors."
+        )
+    remembered = len(layout.memory) * layout.memory_spans * (1 + actions)
     return Episode(
         controlled=controlled,
         action=np.zeros((rows, actions)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,
         table=aligned_zeros((rows, TaskRow.ACTION + actions + layout.history * (READINGS + actions))),
-        now=aligned_zeros((rows, NOW_ROWS + len(layout.front))),
+        now=aligned_zeros((rows, NOW_ROWS + len(layout.front) + remembered)),
         weights=settings.reward.weights,
         cost_weights=settings.cost.weights,
         idle=np.zeros(lanes, dtype=np.bool_),
@@ -87,6 +96,14 @@ def new_episode(
         control_steps=control_steps,
         front=front_arrays(
             layout.front, plant.train, lanes, settings.runs.speeds[0] * plant.time_step * control_steps
+        ),
+        memory=memory_arrays(
+            layout.memory,
+            layout.memory_spans,
+            plant.alignment,
+            (rows, actions),
+            settings.runs.speeds,
+            settings.control_interval,
         ),
         mean_share=_share(settings.control_interval, MEAN_TIME),
         washout_share=_share(settings.control_interval, settings.washout),

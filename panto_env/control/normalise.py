@@ -16,6 +16,7 @@ from .observation import Layout
 from .passive_run import PassiveRun
 
 _ROWS = {name: row for row, (name, _, _) in enumerate(READING_ENTRIES)}
+_ROWS["remembered force"] = _ROWS["contact force"]
 
 
 def normalised(layout: Layout, run: PassiveRun, speed_kmh: tuple[float, float]) -> Layout:

@@ -19,6 +19,7 @@ from ..plant.state import ROW
 from ..plant.train import place_on_line, stride
 from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, EntryOptions, earlier, entries_of
 from .front import force_in_front
+from .memory import keep_and_recall
 from .state import NOW, NOW_ROWS, TASK_ROW
 
 READINGS = len(Reading)
@@ -35,6 +36,8 @@ class Layout:
     harmonics: int = 1  # of the position within the span
     history: int = 0  # earlier control steps
     front: tuple[float, ...] = ()  # places ahead whose contact force the one in front measured (m)
+    memory: tuple[float, ...] = ()  # times until places of which earlier spans are remembered (s)
+    memory_spans: int = 1  # number of these spans
     line_values: bool = False  # whether the line's are among the entries
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
 
@@ -89,7 +92,16 @@ class Layout:
         return entry.centre + shift + float(observation[place]) * entry.scale
 
 
-OBSERVATION_SETTINGS = ("observation", "harmonics", "history", "front", "line_values", "normalise")
+OBSERVATION_SETTINGS = (
+    "observation",
+    "harmonics",
+    "history",
+    "front",
+    "memory",
+    "memory_spans",
+    "line_values",
+    "normalise",
+)
 """Settings of a run that determine only the observation."""
 OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 """Kinds of observation."""
@@ -98,7 +110,7 @@ OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
 def layout(kind: str, options: EntryOptions) -> Layout:
     """Layout of an observation; kind: one of OBSERVATIONS."""
     entries = tuple(entries_of(kind, options))
-    return Layout(kind, entries, options.harmonics, options.history, options.front, options.line_values)
+    return Layout(kind, entries, *options[2:])
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
@@ -149,6 +161,8 @@ def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
         spans, speed = read_odometer(episode.odometer, episode.alignment, now[NOW.SPANS], now[NOW.SPEED], row)
         now[NOW.SPANS] = spans
         now[NOW.SPEED] = speed
+    if episode.memory.ahead.size > 0:
+        keep_and_recall(episode, own, episode.table[row], now, row)
 
 
 @inlined

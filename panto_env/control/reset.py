@@ -13,6 +13,7 @@ from ..base.units import to_kmh
 from ..plant.state import SAMPLE_ROWS, Row
 from ..plant.valid_range import Ending
 from .episode import Results
+from .memory import forget
 from .record import ending
 from .running_figures import no_figures
 from .safety import limits
@@ -126,6 +127,8 @@ def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array,
     if task.episode.front.ahead.size and not start[:, Row.STEP].any():
         in_front = task.plant.run.table[task.episode.front.collector[agent], lanes]
         task.episode.front.kept[rows] = in_front[:, Row.CONTACT_FORCE, None]  # at rest
+    if task.episode.memory.ahead.size and not start[:, Row.STEP].any():
+        forget(task.episode.memory, rows, start[:, Row.CONTACT_FORCE])
     task.running.peak[rows] = -np.inf
 
 

@@ -41,6 +41,8 @@ from .safety import CostWeights
 R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9
 """Maximum distance (m), longer than any line."""
+LATEST = 1.0
+"""Maximum time ahead (s) of what is remembered of earlier spans."""
 _Speed = Annotated[float, Field(allow_inf_nan=True)]  # the line checks which speeds are possible
 # Ranges of settings that tables of benchmarks and oracles share.
 PantographScatter = Annotated[float, Between(0, 0.3)]
@@ -106,10 +108,19 @@ def _distances(value: Any) -> tuple[float, ...]:
 
 
 def _front(value: Any) -> tuple[float, ...]:
+    return _increasing(value, FARTHEST, "front must be increasing distances from 0 m up")
+
+
+def _memory(value: Any) -> tuple[float, ...]:
+    return _increasing(value, LATEST, f"memory must be increasing times from 0 to {LATEST:g} s")
+
+
+def _increasing(value: Any, most: float, rule: str) -> tuple[float, ...]:
+    """Increasing numbers from 0 to ``most``. Raises InputError, which begins with the rule, for others."""
     numbers = _several(value, int | float)
     rising = numbers is not None and all(before < after for before, after in pairwise(numbers))
-    if numbers is None or not rising or not all(0 <= each <= FARTHEST for each in numbers):
-        raise InputError(f"front must be increasing distances from 0 m up, not {shown(value)}.")
+    if numbers is None or not rising or not all(0 <= each <= most for each in numbers):
+        raise InputError(f"{rule}, not {shown(value)}.")
     return tuple(float(each) for each in numbers)
 
 
@@ -270,6 +281,12 @@ class RunSettings(Numerics):
         description="distances ahead (m) at which a controlled pantograph also observes the contact force "
         "that the one in front of it measured there",
     )
+    memory: Annotated[tuple[float, ...], BeforeValidator(_memory)] = Field(
+        (),
+        description="times (s) until places ahead; a policy also observes the contact force that its "
+        "pantograph measured, and the actions, at the same share of earlier spans",
+    )
+    memory_spans: Annotated[int, Between(1, 3)] = Field(1, description="number of these earlier spans (-)")
     line_values: bool = Field(
         False,
         description="whether a policy also observes what the line is: span, wave speed, tensions and masses "
