@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -13,6 +14,7 @@ from panto_env.envs import PantographVectorEnv
 from .base_policy import PolicyLanes
 from .residual import ResidualVecEnv
 from .settings import Training
+from .side_by_side import SideBySide
 from .vec_env import PantographVecEnv
 from .washout import WashoutVecEnv
 
@@ -20,12 +22,23 @@ from .washout import WashoutVecEnv
 def make_lanes(training: Training) -> Any:
     """``VecEnv`` of the training's lanes; if the training has a base policy, it acts there too.
 
-    Raises InputError if the environment's arguments are not valid.
+    Where the algorithm learns from whole passes they stand for lanes. Raises InputError if the environment's
+    arguments are not valid.
     """
-    arguments = {key: value for key, value in training.environment.items() if key != "id"}
+    if not training.hyperparameters.steps_lanes:
+        from .pass_lanes import PassLanes
+
+        return PassLanes(training)
+    parts = [_part(training, changes) for changes in training.variants or ({},)]
+    return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
+
+
+def _part(training: Training, changes: Mapping[str, Any]) -> Any:
+    """Lanes of one variant."""
+    arguments = {key: value for key, value in {**training.environment, **changes}.items() if key != "id"}
     native = gymnasium.make_vec(
         training.environment["id"],
-        num_envs=training.lanes,
+        num_envs=training.lanes // max(1, len(training.variants)),
         lines=training.lines,
         episodes_per_line=training.episodes_per_line,
         autoreset_mode="SameStep",
@@ -38,7 +51,7 @@ def make_lanes(training: Training) -> Any:
         lanes = ResidualVecEnv(lanes, base, training.residual_share)
     if training.washout is not None:
         lanes = WashoutVecEnv(lanes, native.context(0), training.washout)
-    return VecMonitor(lanes)
+    return lanes
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:

@@ -23,12 +23,13 @@ from panto_env.envs import IDS
 from panto_env.policies import check_named, find_fitting_policy
 
 from .algorithm import Algorithm
+from .apg import APG
 from .cloning_settings import Cloning
 from .ppo import PPO
 from .ranges import Count, Share
 from .sac import SAC
 
-ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC}
+ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC, "apg": APG}
 
 
 MOST_LANES = 65_536
@@ -70,6 +71,11 @@ class Training(Settings):
     )
     checkpoint_steps: Count = Field(description="training steps between checkpoints")
     environment: dict[str, Any] = Field(description="id and arguments of PantographEnv")
+    variants: tuple[dict[str, Any], ...] = Field(
+        (),
+        description="changes of the environment's arguments, such as one pantograph of several; each has an "
+        "equal share of the lanes and is evaluated",
+    )
     evaluation: Evaluation
     start_from: str | None = Field(
         None, description="policy whose actions the agent learns before it learns from rewards"
@@ -88,6 +94,11 @@ class Training(Settings):
     def arguments(self) -> dict[str, Any]:
         """Arguments of the environment, including those that its id sets."""
         return arguments(self.environment)
+
+    @property
+    def environments(self) -> tuple[dict[str, Any], ...]:
+        """Arguments of each variant's environment, or of the only one."""
+        return tuple(arguments(self.environment | changes) for changes in self.variants or ({},))
 
     @property
     def speeds_kmh(self) -> tuple[float, ...]:
@@ -155,10 +166,17 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
 
 
 def _check_environment(training: Training) -> None:
+    if training.lanes % max(1, len(training.variants)):
+        raise InputError(
+            f"{training.lanes} lanes cannot be shared equally by {len(training.variants)} variants"
+        )
     try:
-        given = training.arguments
-        for speed in (given.get("speed_kmh", default("speed_kmh")), *(training.evaluation.speeds_kmh or ())):
-            Task(on_example(run_settings(given | {"speed_kmh": speed})))
+        for given in training.environments:
+            for speed in (
+                given.get("speed_kmh", default("speed_kmh")),
+                *(training.evaluation.speeds_kmh or ()),
+            ):
+                Task(on_example(run_settings(given | {"speed_kmh": speed})))
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
 
@@ -166,6 +184,13 @@ def _check_environment(training: Training) -> None:
 def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
+    if not training.hyperparameters.steps_lanes and (training.start_from or training.residual_of):
+        raise InputError(
+            f"{training.algorithm} starts from nothing and adds to nothing; leave out start_from "
+            "and residual_of, or take ppo or sac"
+        )
+    if training.start_from is not None and training.variants:
+        raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)
     for name in (training.start_from, training.residual_of):
         if name is not None:

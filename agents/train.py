@@ -78,7 +78,9 @@ class Run:
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
         check_seeds(chosen_by, "selection")
-        self._comparison = Comparison(training.arguments, training.speeds_kmh, chosen_by)
+        self._comparisons = [
+            Comparison(each, training.speeds_kmh, chosen_by) for each in training.environments
+        ]
         self._seed_lanes()
 
     def restore(self) -> None:
@@ -143,7 +145,7 @@ class Run:
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        self.pairs = self._comparison.run(self._policy())
+        self.pairs = [pair for each in self._comparisons for pair in each.run(self._policy())]
         self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)

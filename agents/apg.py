@@ -1,0 +1,55 @@
+"""Analytic policy gradient: a network trained through linear models of whole passes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
+
+from panto_env.base.errors import InputError
+from panto_env.base.settings import NonNegative
+
+from .actor import Actor
+from .algorithm import Algorithm
+from .ranges import Count
+
+if TYPE_CHECKING:
+    from .cloning_settings import Cloning, CloningError
+    from .demonstrations import Demonstrations
+
+
+class APG(Algorithm):
+    """Hyperparameters of the analytic policy gradient.
+
+    Each round measures new passes of the present policy, as many as there are lanes, as exact linear models
+    (``linear_pass``), and then descends the mean of the contact force's variance, relative to passive, through
+    the passes of the latest rounds. It takes lines, speeds and the observation from the environment, not the
+    reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
+    """
+
+    steps_lanes: ClassVar[bool] = False
+
+    updates: Count = Field(100, description="steps of the optimiser in a round")
+    rounds_kept: Count = Field(4, description="rounds whose passes are learnt from")
+    rate_weight: NonNegative = Field(
+        1.0, description="weight of the mean square of a control step's change of the action beyond rate_free"
+    )
+    rate_free: NonNegative = Field(
+        0.25, description="change of the action in a control step that costs nothing: the actuator's limit"
+    )
+    max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
+    batch_size: Count = Field(16, description="passes in a step of the optimiser")
+
+    def make_learner(self, lanes: Any, seed: int) -> Any:
+        """Learner that takes its passes from the lanes' environments."""
+        from .apg_learner import APGLearner
+
+        return APGLearner(self, lanes, seed)
+
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+        """Refused. Raises InputError."""
+        raise InputError("apg starts from no policy; leave out start_from.")
+
+    def actor(self, model: Any) -> Actor:
+        """Deterministic policy: the network's output, squashed by tanh."""
+        return self.actor_from_layers(model.network).squash()

@@ -1,0 +1,117 @@
+"""The learner of the analytic policy gradient, in the form of a learner of Stable-Baselines3."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.logger import Logger
+from torch import nn
+
+if TYPE_CHECKING:
+    from .apg import APG
+    from .pass_lanes import PassLanes
+
+MOST = 4.0
+"""Maximum ratio of variances that has a gradient."""
+FIRST = 0.01
+"""Factor on the last layer's initial weights: the first passes are nearly passive."""
+
+
+class APGLearner:
+    """Measures passes in rounds, and descends the variance of the contact force through the latest ones."""
+
+    ep_info_buffer = None  # there are no episodes to average
+
+    def __init__(self, settings: APG, lanes: PassLanes, seed: int) -> None:
+        """lanes: where passes are measured. seed: of network and minibatches."""
+        self._settings, self._lanes = settings, lanes
+        self.num_timesteps, self._n_updates = 0, 0
+        self.set_random_seed(seed)
+        torch.manual_seed(seed)
+        kwargs = settings.policy_kwargs()
+        widths = [lanes.entries, *kwargs["net_arch"]]
+        hidden = [
+            part
+            for wide, narrow in pairwise(widths)
+            for part in (nn.Linear(wide, narrow), kwargs["activation_fn"]())
+        ]
+        last = nn.Linear(widths[-1], 1)
+        with torch.no_grad():
+            last.weight *= FIRST
+            last.bias.zero_()
+        self.network = nn.Sequential(*hidden, last)
+        self._optimiser = torch.optim.Adam(self.network.parameters())
+        self.logger: Logger
+        self._rounds: deque[list[Any]] = deque(maxlen=settings.rounds_kept)
+
+    def get_env(self) -> PassLanes:
+        """Where passes are measured."""
+        return self._lanes
+
+    def set_logger(self, logger: Logger) -> None:
+        """Where figures of the training go."""
+        self.logger = logger
+
+    def set_random_seed(self, seed: int) -> None:
+        """Seed of the minibatches."""
+        self._random = np.random.default_rng(seed)
+
+    def get_parameters(self) -> dict[str, Any]:
+        """State of network and optimiser."""
+        return {"network": self.network.state_dict(), "optimiser": self._optimiser.state_dict()}
+
+    def set_parameters(self, parameters: dict[str, Any]) -> None:
+        """Restore what ``get_parameters`` gave."""
+        self.network.load_state_dict(parameters["network"])
+        self._optimiser.load_state_dict(parameters["optimiser"])
+
+    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
+        return ["network", "optimiser"], []
+
+    def learn(self, total_timesteps: int, callback: Any, **_: Any) -> None:
+        """Learn for so many environment steps in whole rounds."""
+        end = self.num_timesteps + total_timesteps
+        schedule = self._settings.learning_rate_schedule()
+        callback.init_callback(self)
+        callback.on_training_start({"infos": []}, {})
+        while self.num_timesteps < end:
+            callback.on_rollout_start()
+            passes, steps = self._lanes.measure(self._settings.actor(self))
+            self._rounds.append(passes)
+            self.num_timesteps += steps
+            callback.update_locals({"infos": []})
+            callback.on_step()
+            callback.on_rollout_end()
+            left = max(0.0, 1 - self.num_timesteps / end)
+            rate = schedule(left) if callable(schedule) else schedule
+            ratios = [self._update(rate) for _ in range(self._settings.updates)]
+            self.logger.record("train/std_ratio", float(np.mean(ratios)))
+            self.logger.record("train/learning_rate", rate)
+            self.logger.dump(self.num_timesteps)
+            callback.on_step()
+        callback.on_training_end()
+
+    def _update(self, rate: float) -> float:
+        """One step of the optimiser; mean ratio of sigma to passive in its minibatch."""
+        settings = self._settings
+        known = [each for own in self._rounds for each in own]
+        chosen = self._random.permutation(len(known))[: settings.batch_size]
+        ratios, actions = self._lanes.rollout([known[each] for each in chosen.tolist()])(self._act)
+        beyond = torch.relu(actions.diff(dim=0).abs() - settings.rate_free)
+        # A pass worse than without control is learnt from, but does not outweigh all others.
+        loss = ratios.clamp(max=MOST).mean() + settings.rate_weight * beyond.square().mean()
+        for group in self._optimiser.param_groups:
+            group["lr"] = rate
+        self._optimiser.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), settings.max_grad_norm)
+        self._optimiser.step()
+        self._n_updates += 1
+        return float(ratios.detach().sqrt().mean())
+
+    def _act(self, observations: torch.Tensor) -> torch.Tensor:
+        return torch.tanh(self.network(observations))

@@ -1,0 +1,67 @@
+"""Passes to learn from, in place of lanes of a vector environment: each on a line of its own."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from panto_baselines.benchmark.seeds import TRAINING
+from panto_env.base.errors import InputError
+from panto_env.control import Task
+from panto_env.control.lines import on_example
+from panto_env.control.settings import run_settings
+from panto_env.policies import Policy
+
+from .actor import Actor
+from .linear_pass import LENGTH, LinearPass, columns_of, measure
+from .linear_rollout import Rollout
+from .settings import Training
+from .washout_policy import WashedOut
+
+MOST_FAILURES = 20
+"""Passes in a row that may end early, under the policy or a pulse, before the training does."""
+
+
+class PassLanes:
+    """Measures passes of a policy in a training's environments, by turns."""
+
+    def __init__(self, training: Training) -> None:
+        """Raises InputError for an observation that cannot be learnt from."""
+        self._settings = [run_settings(own) for own in training.environments]
+        context = Task(on_example(self._settings[0])).context(0)
+        self.columns = columns_of(context.layout)
+        self.entries, self.count = len(context.layout.entries), training.lanes
+        self._interval, self._limit = context.control_interval, context.force_limit
+        self._washout = training.washout
+        self.seconds, self.unwrapped = 0.0, self  # spent in the plant so far
+
+    def seed(self, seed: int) -> None:
+        """Draw the passes' seeds, which are for training, from this one on."""
+        self._random = np.random.default_rng(seed)
+
+    def measure(self, actor: Actor) -> tuple[list[LinearPass], int]:
+        """One round of passes under a network, and the environment steps that they took.
+
+        Raises InputError where pass after pass ends early.
+        """
+        policy: Policy = actor if self._washout is None else WashedOut(actor, self._washout)
+        start, passes, failures = time.perf_counter(), list[LinearPass](), 0
+        while len(passes) < self.count:
+            seed = TRAINING[int(self._random.integers(len(TRAINING)))]
+            try:
+                passes.append(measure(self._settings[len(passes) % len(self._settings)], policy, seed))
+                failures = 0
+            except InputError:
+                failures += 1
+                if failures == MOST_FAILURES:
+                    raise
+        self.seconds += time.perf_counter() - start
+        return passes, (LENGTH + 2) * sum(len(each.actions) for each in passes)
+
+    def rollout(self, passes: list[LinearPass]) -> Rollout:
+        """These passes side by side, for a network in torch."""
+        return Rollout(passes, self.columns, self._interval, self._limit, self._washout)
+
+    def close(self) -> None:
+        """Do nothing: nothing is open."""

@@ -1,0 +1,96 @@
+"""The observation's memory of earlier spans."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from panto_env.base.errors import InputError
+from panto_env.control.state import Now
+
+AHEAD = (0.0, 0.05, 0.2)
+RUN = {
+    "speed_kmh": 275,
+    "memory": AHEAD,
+    "memory_spans": 2,
+    "distance": 400,
+    "observation": "measured",
+    "washout": 0,
+}
+
+
+def run(env, seed=3, gain=0.3):
+    """Observations, actions and places as read of an episode under random actions."""
+    random = np.random.default_rng(seed)
+    observation, _ = env.reset(seed=seed)
+    task, rows, ended = env.unwrapped.task, [], False
+    now = task.episode.now[0]
+    rows.append((observation, 0.0, now[Now.SPANS], now[Now.SPEED]))
+    while not ended:
+        action = gain * random.uniform(-1, 1, 1).astype(np.float32)
+        observation, _, terminated, truncated, _ = env.step(action)
+        now = task.episode.now[0]
+        rows.append((observation, float(action[0]), now[Now.SPANS], now[Now.SPEED]))
+        ended = terminated or truncated
+    return task, *(np.array(each) for each in zip(*rows, strict=True))
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "realistic"])
+@pytest.mark.parametrize("catenary", ["en50318-2002", "section:fast-line"])
+def test_memory_is_what_was_read_and_done_at_the_same_share_of_earlier_spans(catenary, sensors):
+    """Beside linear interpolation of the whole episode by place, on equal and on unequal spans."""
+    env = gymnasium.make("Pantograph-v0", catenary=catenary, sensors=sensors, **RUN)
+    task, seen, actions, places, speeds = run(env)
+    layout = task.layout
+    force = seen[:, layout.index("contact force")]
+    per_step = speeds * 0.01 / task.plant.alignment.mean_length
+    for span, words in ((1, "1 span ago"), (2, "2 spans ago")):
+        for time in AHEAD:
+            sought = places + per_step * time / 0.01 - span
+            known = sought > places[0]
+            assert known.sum() > 100
+            for name, values, first in (("force", force, force[0]), ("frame action", actions, 0.0)):
+                told = seen[:, layout.index(f"remembered {name}, {words}, {time:g} s ahead")]
+                # Where a mast corrects the odometer, places as read may go back: left out.
+                steady = known & np.isin(np.searchsorted(places, sought), _rising(places))
+                np.testing.assert_allclose(told[steady], np.interp(sought[steady], places, values), atol=2e-5)
+                np.testing.assert_allclose(told[sought < places[0]], first, atol=1e-6)
+
+
+def _rising(places):
+    """Indices of the steps beside which places rise."""
+    rises = np.diff(places, prepend=-1.0) > 0
+    low, high = np.maximum.accumulate(places), np.minimum.accumulate(places[::-1])[::-1]
+    return np.flatnonzero(rises & (low == places) & (high == places))
+
+
+def test_lanes_remember_as_single_environments_do():
+    vector = gymnasium.make_vec("Pantograph-v0", num_envs=3, memory=AHEAD, distance=200)
+    first, _ = vector.reset(seed=[5, 6, 7])
+    random = np.random.default_rng(1)
+    actions = random.uniform(-1, 1, (150, 3, 1)).astype(np.float32)
+    lanes = [first] + [vector.step(each)[0] for each in actions]
+    env = gymnasium.make("Pantograph-v0", memory=AHEAD, distance=200)
+    single, _ = env.reset(seed=6)
+    alone = [single] + [env.step(each[1])[0] for each in actions]
+    np.testing.assert_array_equal(np.array(lanes)[:, 1], np.array(alone))
+
+
+def test_a_second_episode_remembers_nothing_of_the_first():
+    env = gymnasium.make("Pantograph-v0", **RUN)
+    first = [run(env, seed)[1] for seed in (3, 4, 3)]
+    np.testing.assert_array_equal(first[0], first[2])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"memory": (0.2, 0.1)}, "memory must be increasing times from 0 to 1 s"),
+        ({"memory": (0.0, 1.5)}, "memory must be increasing times from 0 to 1 s"),
+        ({"memory": (0.8,), "speed_kmh": 300}, "memory must be at most 0.72 s.*shortest span, 60 m"),
+        ({"memory": AHEAD, "sensors": "blind"}, "which these sensors do not measure"),
+        ({"memory": AHEAD, "memory_spans": 0}, "memory_spans"),
+    ],
+)
+def test_a_memory_that_cannot_be_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        gymnasium.make("Pantograph-v0", catenary="en50318-2002", **given)
