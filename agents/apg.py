@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class APG(Algorithm):
     """Hyperparameters of the analytic policy gradient.
 
-    Each round measures new passes of the present policy, as many as there are lanes, as exact linear models
-    (``linear_pass``), and then descends the mean of the contact force's variance, relative to passive, through
+    Each round measures new passes of the present policy, as many as there are lanes, as exact linear
+    models (``linear_pass``), and then descends the mean of the contact force's variance, relative to passive, through
     the passes of the latest rounds. It takes lines, speeds and the observation from the environment, not the
     reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
     """

@@ -51,8 +51,8 @@ class LinearPass(NamedTuple):
     observations: Numbers  # (times + 1, entries)
     actions: Numbers  # (times,): after a washout
     force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
-    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, LENGTH, readings + 1): of the scaled readings and
-    # of the force (N).
+    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, LENGTH, readings + 1): of the scaled readings,
+    # and of the force (N).
     response: NDArray[np.float16]
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
     passive_variance: float  # of the force without control, where it counts (N^2)

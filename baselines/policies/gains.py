@@ -25,6 +25,8 @@ from panto_env.plant.state import Place
 
 Source = str | Sequence[float]
 GAINS_FOLDER = FOLDER / "policies"
+MANY_LINES = ("family:", "section:")
+"""How the names begin of what lines are drawn from."""
 REACH = 12.5
 """Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
 
@@ -62,11 +64,14 @@ class Tuning(Settings):
 
     def is_for(self, catenary: CatenaryData, pantograph: PantographData, place: str) -> bool:
         """Whether it was made for this line and pantograph, by their values, and place of the actuator."""
-        return (
-            place == self.place
-            and is_entry(catenary, self.catenary, self.catenary_sha256)
-            and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
-        )
+        return self._is_of(pantograph, place) and is_entry(catenary, self.catenary, self.catenary_sha256)
+
+    def is_for_any_line(self, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made on many lines, drawn from a family or a section, for this pantograph."""
+        return self._is_of(pantograph, place) and self.catenary.startswith(MANY_LINES)
+
+    def _is_of(self, pantograph: PantographData, place: str) -> bool:
+        return place == self.place and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
 
 
 class GainFile(Settings):
@@ -99,7 +104,8 @@ def place_of(channels: Sequence[int]) -> str:
 def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
     """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
 
-    Stored ones are found by the values of line and pantograph, whatever their names. Raises InputError if
+    Stored ones are found by the values of line and pantograph, whatever their names; those that were made on
+    many lines, drawn from a family, are for any line that has none of its own. Raises InputError if
     there are none for them, for the place of the actuator, and for the speed.
     """
     if not isinstance(source, str):
@@ -108,9 +114,10 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
         return np.array(source, dtype=float)
     path = gain_file(source)
     place, tunings = place_of(context.channels), load_gains(path).tunings
-    for tuning in tunings:
-        if tuning.is_for(context.catenary, context.pantograph, place):
-            return _at_speed(tuning, names, to_kmh(context.speed), path)
+    own = [each for each in tunings if each.is_for(context.catenary, context.pantograph, place)]
+    others = [each for each in tunings if each.is_for_any_line(context.pantograph, place)]
+    for tuning in (*own, *others):
+        return _at_speed(tuning, names, to_kmh(context.speed), path)
     line, pantograph = context.catenary.name, context.pantograph.name
     named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
     raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context
+from panto_env.control.lines import draws_line, on_drawn_line
 from panto_env.control.settings import RunSettings, far_enough
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.spans import chosen_spans
@@ -44,12 +46,29 @@ class Forces(NamedTuple):
 def run_batch(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Forces:
     """Run each law under each seed, at the settings' single speed.
 
-    Passes of a law that cannot begin count as ended early. Raises InputError if no law can begin.
+    Where the line is drawn from a family or a section, each seed draws its own. Passes of a law that cannot
+    begin count as ended early. Raises InputError if no law can begin.
     """
+    if draws_line(settings):
+        lines = [on_drawn_line(settings, partial(np.random.default_rng, seed)) for seed in seeds]
+        values = _one_length([_in_parts(own, laws, [seed]) for own, seed in zip(lines, seeds, strict=True)])
+    else:
+        values = _in_parts(settings, laws, seeds)
+    return Forces(values, values.mean(axis=2), values.std(axis=2))
+
+
+def _in_parts(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Array:
+    """Forces on one line, (laws, seeds, samples)."""
     at_once = max(1, MOST_LANES // len(seeds))
     parts = [_run(settings, laws[first : first + at_once], seeds) for first in range(0, len(laws), at_once)]
-    values = np.concatenate(parts)
-    return Forces(values, values.mean(axis=2), values.std(axis=2))
+    return np.concatenate(parts)
+
+
+def _one_length(forces: Sequence[Array]) -> Array:
+    """Forces of lines of different lengths, each (laws, 1, samples), thinned to the fewest samples."""
+    count = min(each.shape[2] for each in forces)
+    kept = [each[..., np.rint(np.linspace(0, each.shape[2] - 1, count)).astype(int)] for each in forces]
+    return np.concatenate(kept, axis=1)
 
 
 def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Array:

@@ -12,6 +12,8 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import content_unless_catalogue
+from panto_env.catalog.drawn_lines import DrawnLines
+from panto_env.control.lines import draws_line
 from panto_env.control.settings import RunSettings
 
 from ..policies.gains import GainFile, Tuning, load_gains
@@ -30,9 +32,9 @@ def make_tuning(
     ]
     pantograph = settings.controlled_pantograph
     return Tuning(
-        catenary=settings.line.name,
+        catenary=line_name(settings),
         pantograph=pantograph.name,
-        catenary_sha256=content_unless_catalogue(settings.line),
+        catenary_sha256=None if draws_line(settings) else content_unless_catalogue(settings.line),
         pantograph_sha256=content_unless_catalogue(pantograph),
         place=settings.actuator.place,
         names=tuple(names),
@@ -62,10 +64,14 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
     pantograph = settings.controlled_pantograph
-    case = settings.line, pantograph, settings.actuator.place
-    if not force and any(each.is_for(*case) for each in file.tunings):
+    place = settings.actuator.place
+    if draws_line(settings):
+        held = any(each.is_for_any_line(pantograph, place) for each in file.tunings)
+    else:
+        held = any(each.is_for(settings.line, pantograph, place) for each in file.tunings)
+    if held and not force:
         raise InputError(
-            f"{path} already holds gains for {pantograph.name} on {settings.line.name}, "
+            f"{path} already holds gains for {pantograph.name} on {line_name(settings)}, "
             f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
         )
 
@@ -88,6 +94,15 @@ def as_toml(file: GainFile) -> str:
                 continue
             lines.append(f"{key} = {_value(value)}")
     return "\n".join(lines) + "\n"
+
+
+def line_name(settings: RunSettings) -> str:
+    """Name of a tuning's line, or of the family or section that its lines are drawn from.
+
+    Raises InputError for a list of lines.
+    """
+    lines = settings.catenary
+    return lines.full_name if isinstance(lines, DrawnLines) else settings.line.name
 
 
 def _case(tuning: Tuning) -> tuple[str | None, ...]:
