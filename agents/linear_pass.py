@@ -23,7 +23,7 @@ from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.state import Row
 from panto_env.policies import Policy
 
-LENGTH = 120
+LENGTH = 180
 """Control steps after which the response to an action is over."""
 PULSE = 0.2
 """Pulse of an action: large beside rounding, small beside the actuator's limit."""
@@ -38,11 +38,6 @@ class Columns(NamedTuple):
     force: NDArray[np.int64]  # (spans, times): of the remembered contact force
     acted: NDArray[np.int64]  # (spans, times): likewise of actions
     of_force: int  # place of the contact force among the readings
-
-    @property
-    def depth(self) -> int:
-        """Control steps that are observed, the present one included."""
-        return len(self.actions)
 
 
 class LinearPass(NamedTuple):

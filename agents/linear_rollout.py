@@ -53,11 +53,9 @@ class Rollout:
 
         network: actions, (passes, 1), for observations, (passes, entries).
         """
-        lanes, depth = self._actions.shape[1], self._columns.depth
+        lanes, depth = self._actions.shape[1], len(self._columns.actions)
         changes = torch.zeros(lanes, LENGTH)  # of the actions 1, 2, .. steps ago
-        read = torch.zeros(
-            lanes, depth * len(self._columns.readings)
-        )  # changes of readings, the latest first
+        read = torch.zeros(lanes, self._columns.readings.size)  # changes of readings, the latest first
         forces: list[torch.Tensor] = []  # changes of the read force
         acted = [torch.zeros(lanes)]  # of actions, of the step before
         moved, taken = [], []
@@ -76,7 +74,7 @@ class Rollout:
                 acted.append(action - self._actions[step])
                 changes = torch.cat([acted[-1][:, None], changes[:, :-1]], dim=1)
         force = (self._force + torch.stack(moved)).T
-        counted = [own[start + 1 :].var() for own, start in zip(force, self._counted_from, strict=True)]
+        counted = [own[start + 1 :].var(correction=0) for own, start in zip(force, self._counted_from, strict=True)]
         return torch.stack(counted) / self._passive, torch.stack(taken)
 
     def _remembered(

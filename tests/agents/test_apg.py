@@ -1,0 +1,188 @@
+"""The analytic policy gradient: its linear passes beside the plant, and trainings with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+import torch
+
+from panto_agents.apg_learner import APGLearner
+from panto_agents.linear_pass import measure
+from panto_agents.linear_rollout import _Washout
+from panto_agents.pass_lanes import PassLanes
+from panto_agents.policy import load
+from panto_agents.settings import Training, parse_training
+from panto_agents.train import train
+from panto_agents.washout_policy import WashedOut
+from panto_baselines.benchmark.seeds import TRAINING
+from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_env import InputError, simulate
+
+MEMORY = {"history": 2, "memory": [0.0, 0.05, 0.1], "memory_spans": 2, "harmonics": 2}
+
+
+def settings(**changes: Any) -> Training:
+    environment = {
+        "id": "Pantograph-v0",
+        "accuracy": "fast",
+        "washout": 0,
+        "settle": 2,
+        "distance": 150.0,
+        "speed_kmh": 300,
+        "line_condition": "as-built",
+        "actuator": "realistic",
+        "sensors": "realistic",
+        "observation": "measured",
+        "normalise": 300,
+        **MEMORY,
+        **changes.pop("environment", {}),
+    }
+    table = {
+        "algorithm": "apg",
+        "total_steps": 80_000,
+        "lanes": 2,
+        "checkpoint_steps": 40_000,
+        "washout": {},
+        "environment": environment,
+        "evaluation": {"interval_steps": 80_000},
+        "hyperparameters": {"updates": 2, "batch_size": 2, "net_arch": [16], "learning_rate": 1e-2},
+    }
+    return parse_training(table | changes, "the test")
+
+
+def learner(training: Training) -> APGLearner:
+    """A learner with a network that acts, by more than 5 N rms."""
+    made = APGLearner(training.hyperparameters, PassLanes(training), training.seed)
+    with torch.no_grad():
+        made.network[-1].weight *= 60
+    return made
+
+
+def ratio(made: APGLearner, training: Training, seed: int) -> float:
+    """Variance of the force over the passive one in the plant."""
+    policy = WashedOut(training.hyperparameters.actor(made), training.washout)
+    own = measure(made.get_env()._settings[0], policy, seed)
+    return float(own.force[own.counted_from + 1 :].astype(float).var() / own.passive_variance)
+
+
+@pytest.fixture(scope="module", params=["en50318-2002", "family:high-speed"])
+def case(request):
+    training = settings(environment={"catenary": request.param, "normalise": 270, "speed_kmh": 270})
+    made, seed = learner(training), TRAINING[7]
+    policy = WashedOut(training.hyperparameters.actor(made), training.washout)
+    return training, made, seed, measure(made.get_env()._settings[0], policy, seed)
+
+
+def test_a_network_repeats_its_own_pass(case):
+    """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
+    _, made, _, own = case
+    with torch.no_grad():
+        ratios, actions = made.get_env().rollout([own])(made._act)
+    assert np.sqrt(np.mean(own.actions**2)) > 0.05
+    np.testing.assert_allclose(actions[:, 0].numpy(), own.actions, atol=1e-5)
+    expected = own.force[own.counted_from + 1 : -1].astype(float).var() / own.passive_variance
+    assert float(ratios[0]) == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_gradient_is_that_of_the_plant(case):
+    """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
+    training, made, seed, own = case
+    parameters = list(made.network.parameters())
+    ratios, _ = made.get_env().rollout([own])(made._act)
+    slopes = torch.autograd.grad(ratios[0], parameters)
+    torch.manual_seed(3)
+    for direction in (slopes, [torch.randn_like(each) for each in parameters]):
+        length = float(torch.sqrt(sum((each**2).sum() for each in direction)))
+        expected = float(sum((a * b).sum() for a, b in zip(slopes, direction, strict=True))) / length
+        step, reached = 0.005, []
+        for sign in (1, -2, 1):  # back at the start in the end
+            with torch.no_grad():
+                for each, along in zip(parameters, direction, strict=True):
+                    each += sign * step * along / length
+            reached.append(ratio(made, training, seed))
+        assert (reached[0] - reached[1]) / (2 * step) == pytest.approx(expected, rel=0.1, abs=0.02)
+
+
+def test_responses_are_those_of_single_pulses():
+    """A command pulse in the plant moves force and readings as the column of its step says."""
+    training = settings()
+    lanes = PassLanes(training)
+    own = measure(lanes._settings[0], _Script({}), TRAINING[0])
+    other = measure(lanes._settings[0], _Script({60: 0.1}), TRAINING[0])
+    moved, after = other.force - own.force, np.arange(61, 61 + 60)
+    np.testing.assert_allclose(moved[:61], 0.0, atol=1e-9)
+    told = 0.1 * own.response[after, after - 61, -1].astype(float)
+    assert told.std() > 0.3
+    np.testing.assert_allclose(moved[after], told, atol=0.15 * np.abs(told).max())
+
+
+class _Script:
+    """Actions by control step; zero at all others."""
+
+    def __init__(self, actions: dict[int, float]) -> None:
+        self._actions = actions
+
+    def reset(self, context: Any) -> None:
+        self._step = -1
+
+    def act(self, observation: Any) -> Any:
+        self._step += 1
+        return np.array([self._actions.get(self._step, 0.0)])
+
+
+def test_the_washout_in_torch_is_that_of_the_policies():
+    random, given = np.random.default_rng(0), WashoutSettings(time_constant=0.3)
+    requested = np.cumsum(random.normal(0, 0.3, (200, 3)), axis=0).clip(-1, 1)
+    own, known = _Washout(given, 0.01, 100.0, 3), Washout(given, 0.01, 100.0, (3,))
+    for each in requested:
+        np.testing.assert_allclose(own(torch.tensor(each)).numpy(), known(100 * each) / 100, atol=1e-6)
+
+
+def test_a_training_lowers_sigma_and_its_model_runs_as_a_policy(tmp_path):
+    training = settings(
+        total_steps=300_000,
+        environment={"line_condition": "smooth", "distance": 250.0},
+        hyperparameters={"updates": 15, "batch_size": 2, "net_arch": [16], "learning_rate": 5e-3},
+    )
+    folder = train(training, tmp_path / "run", progress=False)
+    policy = load(folder.best)
+    assert policy.memory == (0.0, 0.05, 0.1)
+    arguments = {"speed_kmh": 300, "line_condition": "smooth", "seed": 1001, "actuator": "realistic"}
+    arguments |= {"sensors": "realistic", "spans": 12}
+    active, passive = simulate(**arguments, policy=policy), simulate(**arguments)
+    assert active.summary().std < 0.97 * passive.summary().std
+    assert active.summary().mean == pytest.approx(passive.summary().mean, rel=0.015)
+
+
+def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
+    folder = train(settings(total_steps=40_000), tmp_path / "run", progress=False)
+    first = load(folder.model).facts
+    train(settings(total_steps=80_000), tmp_path / "run", resume=True, progress=False)
+    second = load(folder.model).facts
+    assert second.steps > first.steps
+    assert second.updates == 2 * first.updates == 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"residual_of": "repetitive"}, "apg starts from nothing and adds to nothing"),
+        ({"start_from": "repetitive"}, "apg starts from nothing and adds to nothing"),
+        ({"hyperparameters": {"updates": 0}}, "updates"),
+    ],
+)
+def test_what_apg_does_not_do_is_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        settings(**changes)
+
+
+@pytest.mark.parametrize("given", [{"observation": "centred", "normalise": None}, {"observation": "full"}])
+def test_an_observation_that_cannot_be_learnt_from_is_refused(given, tmp_path: Path):
+    with pytest.raises(InputError, match="apg needs the observation 'measured'"):
+        train(settings(environment=given), tmp_path / "run", progress=False)
