@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 class Algorithm(Settings, ABC):
     """Hyperparameters, named as in Stable-Baselines3; a subclass is an algorithm."""
-
-    steps_lanes: ClassVar[bool] = True
-    """Whether it learns from steps of a ``VecEnv`` and their rewards, not from whole passes."""
 
     learning_rate: Positive | tuple[Positive, Positive] = Field(
         3e-4, description="step of the optimiser; two numbers: linearly from the first to the second"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
@@ -22,12 +22,10 @@ class APG(Algorithm):
     """Hyperparameters of the analytic policy gradient.
 
     Each round measures new passes of the present policy, as many as there are lanes, as exact linear
-    models (``linear_pass``), and then descends the mean of the contact force's variance, relative to passive, through
-    the passes of the latest rounds. It takes lines, speeds and the observation from the environment, not the
-    reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
+    models (``linear_pass``), and then descends the mean of the contact force's variance, relative to passive,
+    through the passes of the latest rounds. It takes lines, speeds and the observation from the environment,
+    not the reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
     """
-
-    steps_lanes: ClassVar[bool] = False
 
     updates: Count = Field(100, description="steps of the optimiser in a round")
     rounds_kept: Count = Field(4, description="rounds whose passes are learnt from")
@@ -38,6 +36,9 @@ class APG(Algorithm):
         0.25, description="change of the action in a control step that costs nothing: the actuator's limit"
     )
     max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
+    response_steps: Count = Field(
+        180, description="control steps after which the response to an action is taken to be over"
+    )
     batch_size: Count = Field(16, description="passes in a step of the optimiser")
 
     def make_learner(self, lanes: Any, seed: int) -> Any:

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env.envs import PantographVectorEnv
 
+from .apg import APG
 from .base_policy import PolicyLanes
 from .residual import ResidualVecEnv
 from .settings import Training
@@ -25,10 +26,10 @@ def make_lanes(training: Training) -> Any:
     Where the algorithm learns from whole passes they stand for lanes. Raises InputError if the environment's
     arguments are not valid.
     """
-    if not training.hyperparameters.steps_lanes:
+    if isinstance(training.hyperparameters, APG):
         from .pass_lanes import PassLanes
 
-        return PassLanes(training)
+        return PassLanes(training, training.hyperparameters.response_steps)
     parts = [_part(training, changes) for changes in training.variants or ({},)]
     return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
 

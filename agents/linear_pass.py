@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.entries import READING_ENTRIES, earlier
+from panto_env.control.entries import DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.observation import Layout
 from panto_env.control.settings import RunSettings
@@ -23,8 +23,6 @@ from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.state import Row
 from panto_env.policies import Policy
 
-LENGTH = 180
-"""Control steps after which the response to an action is over."""
 PULSE = 0.2
 """Pulse of an action: large beside rounding, small beside the actuator's limit."""
 Numbers = NDArray[np.float32]
@@ -38,6 +36,7 @@ class Columns(NamedTuple):
     force: NDArray[np.int64]  # (spans, times): of the remembered contact force
     acted: NDArray[np.int64]  # (spans, times): likewise of actions
     of_force: int  # place of the contact force among the readings
+    deviate: bool  # whether readings are deviations from their slow averages
 
 
 class LinearPass(NamedTuple):
@@ -46,8 +45,8 @@ class LinearPass(NamedTuple):
     observations: Numbers  # (times + 1, entries)
     actions: Numbers  # (times,): after a washout
     force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
-    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, LENGTH, readings + 1): of the scaled readings,
-    # and of the force (N).
+    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, readings + 1): of the scaled readings,
+    # not of their deviations, and of the force (N).
     response: NDArray[np.float16]
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
     passive_variance: float  # of the force without control, where it counts (N^2)
@@ -55,15 +54,16 @@ class LinearPass(NamedTuple):
 
 
 def columns_of(layout: Layout) -> Columns:
-    """Where the entries of an observation come from. Raises InputError for a kind other than "measured"."""
+    """Where the entries of an observation come from. Raises InputError for one that it does not know."""
     names = [entry.name for entry in layout.entries]
     actions = [name for name in names if name.startswith("last ") and "," not in name]
-    if layout.kind != "measured" or layout.front or len(actions) != 1:
+    if layout.kind not in (MEASURED, DEVIATIONS) or layout.front or len(actions) != 1:
         raise InputError(
-            "apg needs the observation 'measured', of one actuator, without front; choose it, or another "
-            "algorithm"
+            "apg needs the observation 'measured' or 'deviations', of one actuator, without front; choose "
+            "one, or another algorithm"
         )
-    readings = [name for name, *_ in READING_ENTRIES]
+    ending = DEVIATION if layout.kind == DEVIATIONS else ""
+    readings = [name + ending for name, *_ in READING_ENTRIES]
     place = actions[0].split()[1]
 
     def at(name: str, ago: int) -> int:
@@ -85,31 +85,37 @@ def columns_of(layout: Layout) -> Columns:
     return Columns(
         np.array([[at(name, ago) for name in readings] for ago in depth]),
         tuple(at(actions[0], ago) for ago in depth),
-        remembered("force"),
+        remembered("force" + ending),
         remembered(f"{place} action"),
-        readings.index("contact force"),
+        readings.index("contact force" + ending),
+        layout.kind == DEVIATIONS,
     )
 
 
-def measure(settings: RunSettings, policy: Policy, seed: int) -> LinearPass:
+def measure(settings: RunSettings, policy: Policy, seed: int, length: int) -> LinearPass:
     """The pass of a policy under a seed, on a line and at a speed drawn by it.
 
+    length: control steps after which the response to an action is taken to be over.
     Raises InputError where it ends early, or for settings that do not fit.
     """
     random = np.random.default_rng(seed)
     drawn = on_drawn_line(settings, lambda: random)
     speed = float(random.uniform(*drawn.speed_kmh))
-    task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed)}), lanes=LENGTH + 2)
+    task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed)}), lanes=length + 2)
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
     policy.reset(task.context(0))
+    scale = task.layout.scale[columns.readings[0]]
     observations, differences, places, speeds = [], [], [], []
     actions: list[float] = []
 
     def observe() -> None:
         seen = task.results.observation
         observations.append(seen[0].copy())
-        differences.append(seen[1:-1][:, columns.readings[0]] - seen[0, columns.readings[0]])
+        readings = seen[:, columns.readings[0]]
+        if columns.deviate:  # their averages forget more slowly than responses are kept
+            readings = readings + task.episode.averages / scale
+        differences.append(readings[1:-1] - readings[0])
         now = task.episode.now[0]
         places.append(now[Now.SPANS])
         speeds.append(now[Now.SPEED])
@@ -118,7 +124,7 @@ def measure(settings: RunSettings, policy: Policy, seed: int) -> LinearPass:
     while not task.results.flags[0].any():
         action = policy.act(task.results.observation[0].copy())[0]
         every = np.full((task.lanes, 1), action)
-        every[1 + len(actions) % LENGTH] += -PULSE if action > 0 else PULSE
+        every[1 + len(actions) % length] += -PULSE if action > 0 else PULSE
         every[-1] = 0.0
         actions.append(action)
         task.step(every)
@@ -149,15 +155,15 @@ def _filtered(task: Task, count: int) -> NDArray[np.float64]:
 
 
 def _responses(moved: NDArray[np.float64], pulses: NDArray[np.float64]) -> NDArray[np.float16]:
-    """Responses at each time to an action of 1 taken 1, 2, .. steps before, (times + 1, LENGTH, values).
+    """Responses at each time to an action of 1 taken 1, 2, .. steps before, (times + 1, length, values).
 
-    moved: differences of the lanes with pulses, (times + 1, LENGTH, values); pulses: of each step, (times,).
+    moved: differences of the lanes with pulses, (times + 1, length, values); pulses: of each step, (times,).
     """
-    count = len(pulses)
+    count, length = len(pulses), moved.shape[1]
     response = np.zeros(moved.shape, dtype=np.float16)
-    for ago in range(1, LENGTH + 1):
+    for ago in range(1, length + 1):
         time = np.arange(ago, count + 1)
-        response[time, ago - 1] = moved[time, (time - ago) % LENGTH] / pulses[time - ago, None]
+        response[time, ago - 1] = moved[time, (time - ago) % length] / pulses[time - ago, None]
     return response
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import torch
 
 from panto_baselines.policies.washout import WashoutSettings
+from panto_env.control.entries import AVERAGED
 
-from .linear_pass import LENGTH, Columns, LinearPass
+from .linear_pass import Columns, LinearPass
 
 Network = Callable[[torch.Tensor], torch.Tensor]
 
@@ -29,6 +30,7 @@ class Rollout:
     ) -> None:
         """interval: of control (s); limit: of the actuator's force (N); washout: of the action, if any."""
         self._columns, self._washout, self._interval, self._limit = columns, washout, interval, limit
+        self._average_share = 1.0 - math.exp(-interval / AVERAGED) if columns.deviate else 0.0
         self.steps = min(len(each.actions) for each in passes)
 
         def stacked(values: list[Any]) -> torch.Tensor:
@@ -54,8 +56,9 @@ class Rollout:
         network: actions, (passes, 1), for observations, (passes, entries).
         """
         lanes, depth = self._actions.shape[1], len(self._columns.actions)
-        changes = torch.zeros(lanes, LENGTH)  # of the actions 1, 2, .. steps ago
+        changes = torch.zeros(lanes, self._response.shape[2])  # of the actions 1, 2, .. steps ago
         read = torch.zeros(lanes, self._columns.readings.size)  # changes of readings, the latest first
+        averages = torch.zeros(lanes, self._columns.readings.shape[1])
         forces: list[torch.Tensor] = []  # changes of the read force
         acted = [torch.zeros(lanes)]  # of actions, of the step before
         moved, taken = [], []
@@ -66,15 +69,21 @@ class Rollout:
             for step in range(first, last):
                 change = torch.bmm(changes[:, None], self._response[step].float())[:, 0]
                 moved.append(change[:, -1])
-                forces.append(change[:, self._columns.of_force])
-                read = torch.cat([change[:, :-1], read[:, : read.shape[1] - change.shape[1] + 1]], dim=1)
+                reading = change[:, :-1]
+                if self._average_share:
+                    averages = averages + self._average_share * (reading - averages)
+                    reading = reading - averages
+                forces.append(reading[:, self._columns.of_force])
+                read = torch.cat([reading, read[:, : read.shape[1] - reading.shape[1]]], dim=1)
                 every = torch.cat([read, changes[:, :depth], told[step - first]], dim=1)
                 action = washout(network(self._observations[step] + every @ self._into)[:, 0])
                 taken.append(action)
                 acted.append(action - self._actions[step])
                 changes = torch.cat([acted[-1][:, None], changes[:, :-1]], dim=1)
         force = (self._force + torch.stack(moved)).T
-        counted = [own[start + 1 :].var(correction=0) for own, start in zip(force, self._counted_from, strict=True)]
+        counted = [
+            own[start + 1 :].var(correction=0) for own, start in zip(force, self._counted_from, strict=True)
+        ]
         return torch.stack(counted) / self._passive, torch.stack(taken)
 
     def _remembered(

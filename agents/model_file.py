@@ -58,7 +58,11 @@ class Needs(Settings):
         """Observation and actuator of an episode."""
         layout = context.layout
         # Normalised readings use each line's own centre and slope, which the policy is meant to see.
-        names = (*(name for name, _, _ in READING_ENTRIES), "remembered force", "speed") if layout.normalise else ()
+        names = (
+            (*(name for name, _, _ in READING_ENTRIES), "remembered force", "speed")
+            if layout.normalise
+            else ()
+        )
         return cls(
             observation=layout.kind,
             harmonics=layout.harmonics,

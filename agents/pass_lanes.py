@@ -14,7 +14,7 @@ from panto_env.control.settings import run_settings
 from panto_env.policies import Policy
 
 from .actor import Actor
-from .linear_pass import LENGTH, LinearPass, columns_of, measure
+from .linear_pass import LinearPass, columns_of, measure
 from .linear_rollout import Rollout
 from .settings import Training
 from .washout_policy import WashedOut
@@ -26,14 +26,14 @@ MOST_FAILURES = 20
 class PassLanes:
     """Measures passes of a policy in a training's environments, by turns."""
 
-    def __init__(self, training: Training) -> None:
-        """Raises InputError for an observation that cannot be learnt from."""
+    def __init__(self, training: Training, length: int) -> None:
+        """length: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
         self._settings = [run_settings(own) for own in training.environments]
         context = Task(on_example(self._settings[0])).context(0)
         self.columns = columns_of(context.layout)
         self.entries, self.count = len(context.layout.entries), training.lanes
         self._interval, self._limit = context.control_interval, context.force_limit
-        self._washout = training.washout
+        self._washout, self._length = training.washout, length
         self.seconds, self.unwrapped = 0.0, self  # spent in the plant so far
 
     def seed(self, seed: int) -> None:
@@ -50,14 +50,15 @@ class PassLanes:
         while len(passes) < self.count:
             seed = TRAINING[int(self._random.integers(len(TRAINING)))]
             try:
-                passes.append(measure(self._settings[len(passes) % len(self._settings)], policy, seed))
+                settings = self._settings[len(passes) % len(self._settings)]
+                passes.append(measure(settings, policy, seed, self._length))
                 failures = 0
             except InputError:
                 failures += 1
                 if failures == MOST_FAILURES:
                     raise
         self.seconds += time.perf_counter() - start
-        return passes, (LENGTH + 2) * sum(len(each.actions) for each in passes)
+        return passes, (self._length + 2) * sum(len(each.actions) for each in passes)
 
     def rollout(self, passes: list[LinearPass]) -> Rollout:
         """These passes side by side, for a network in torch."""

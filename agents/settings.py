@@ -184,7 +184,7 @@ def _check_environment(training: Training) -> None:
 def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
-    if not training.hyperparameters.steps_lanes and (training.start_from or training.residual_of):
+    if isinstance(training.hyperparameters, APG) and (training.start_from or training.residual_of):
         raise InputError(
             f"{training.algorithm} starts from nothing and adds to nothing; leave out start_from "
             "and residual_of, or take ppo or sac"

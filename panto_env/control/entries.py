@@ -22,10 +22,16 @@ from .line_values import LINE_CENTRES, LINE_ENTRIES, SPAN_LENGTH
 from .state import NOW, NOW_ROWS, TASK_ROW
 
 MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
+DEVIATIONS = "deviations"
 """Kinds of observation: what a train can measure; in addition values that it cannot, without noise and
 delay; measured values and the nominal force, from fixed centres and in fixed scales, by which each has a mean
 near 0 and a spread near 1 in a passive run of Pantograph-v0's own line and pantograph; measured values with
-the contact force that a filter estimates instead of a measured one."""
+the contact force that a filter estimates instead of a measured one; measured values with each reading's
+deviation from its slow average in its place, which says nothing of what differs from line to line."""
+AVERAGED = 1.0
+"""Time constant (s) of the slow averages of readings in "deviations"; some spans pass in it."""
+DEVIATION = " deviation"
+"""How the names end of readings in "deviations"."""
 CENTRES = {
     "head displacement": (0.056, 0.012),
     "frame displacement": (0.084, 0.013),
@@ -38,6 +44,8 @@ CENTRES = {
     **LINE_CENTRES,
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
+FORCE_SPREAD = 30.0
+"""Usual spread of the contact force (N)."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
 """Scale and unit of the force deviation."""
 READING_ENTRIES = (
@@ -49,7 +57,7 @@ READING_ENTRIES = (
 )
 """Name, scale and unit of the sensors' readings, in the order of ``Reading``."""
 KINDS: dict[str, tuple[str, ...]] = {
-    MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED),
+    MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED, DEVIATIONS),
     FULL: (FULL,),
     CENTRED: (CENTRED,),
 }
@@ -118,6 +126,8 @@ def entries_of(kind: str, options: EntryOptions) -> list[Entry]:
         if kind in KINDS[belongs_to]
         for name, scale, unit, number in listing(options)
     ]
+    if kind == DEVIATIONS:
+        return [_deviation(entry) for entry in entries]
     if kind != CENTRED:
         return entries
     centred = [entry for entry in entries if present(entry) != "contact force"]  # its deviation stands for it
@@ -127,6 +137,18 @@ def entries_of(kind: str, options: EntryOptions) -> list[Entry]:
         else entry
         for entry in centred
     ]
+
+
+def _deviation(entry: Entry) -> Entry:
+    """Entry of the kind "deviations": a reading's, or that of a remembered force, in its usual spread."""
+    name = present(entry)
+    reading = "contact force" if name == "remembered force" else name
+    if reading in (each for each, _, _ in READING_ENTRIES):
+        spread = CENTRES[reading][1] if reading in CENTRES else FORCE_SPREAD
+        return entry._replace(name=entry.name.replace(name, name + DEVIATION, 1), scale=spread)
+    if name in CENTRES:
+        return entry._replace(centre=CENTRES[name][0], scale=CENTRES[name][1])
+    return entry
 
 
 def earlier(name: str, steps: int) -> str:

@@ -15,6 +15,7 @@ from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
+from .entries import AVERAGED, DEVIATIONS
 from .front import FrontArrays, front_arrays
 from .line_values import line_values
 from .memory import MemoryArrays, memory_arrays
@@ -44,6 +45,8 @@ class Episode(NamedTuple):
     steps: Index  # (lanes,): control steps per call
     writers: Index  # (entries, 2): writer and number of each entry of the observation
     history: int  # earlier control steps in the observation
+    averages: Array  # (rows, readings): slow averages that readings deviate from; no columns where none do
+    average_share: float  # weight of a control step in them
     centre: Array  # (entries,): value at which an entry of the observation is 0, in its unit
     slope: Array  # (entries,): change of the centre for each metre per plant step
     per_unit: Array  # (entries,): 1 / scale of the entries
@@ -86,6 +89,8 @@ def new_episode(
         steps=np.ones(lanes, dtype=np.int64),
         writers=layout.writers,
         history=layout.history,
+        averages=np.zeros((rows, READINGS if layout.kind == DEVIATIONS else 0)),
+        average_share=_share(settings.control_interval, AVERAGED),
         centre=layout.centre,
         slope=layout.slope / plant.time_step,
         per_unit=1 / layout.scale,

@@ -17,7 +17,18 @@ from ..plant.alignment import in_spans
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from ..plant.train import place_on_line, stride
-from .entries import CENTRED, ESTIMATED, FULL, MEASURED, WRITERS, Entry, EntryOptions, earlier, entries_of
+from .entries import (
+    CENTRED,
+    DEVIATIONS,
+    ESTIMATED,
+    FULL,
+    MEASURED,
+    WRITERS,
+    Entry,
+    EntryOptions,
+    earlier,
+    entries_of,
+)
 from .front import force_in_front
 from .memory import keep_and_recall
 from .state import NOW, NOW_ROWS, TASK_ROW
@@ -103,7 +114,7 @@ OBSERVATION_SETTINGS = (
     "normalise",
 )
 """Settings of a run that determine only the observation."""
-OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED)
+OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED, DEVIATIONS)
 """Kinds of observation."""
 
 
@@ -140,6 +151,21 @@ def add_noise(sensors, readings, collector, lane):
 
 
 @inlined
+def begin_averages(episode, now, row):
+    """Begin a row's slow averages with its first readings."""
+    for k in range(episode.averages.shape[1]):
+        episode.averages[row, k] = now[NOW.READING + k]
+
+
+@inlined
+def go_on_with_averages(episode, now, row):
+    """Add a control step's readings, before their noise, to a row's slow averages."""
+    for k in range(episode.averages.shape[1]):
+        change = now[NOW.READING + k] - episode.averages[row, k]
+        episode.averages[row, k] += episode.average_share * change
+
+
+@inlined
 def use_noise(sensors, lane):
     """Go on to a lane's next noise."""
     if sensors.noise.shape[2] > 0:
@@ -152,6 +178,8 @@ def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
     collector = episode.controlled[agent]
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], collector, lane)
+    for k in range(episode.averages.shape[1]):
+        now[NOW.READING + k] -= episode.averages[row, k]
     for place in range(episode.front.ahead.size):
         now[NOW_ROWS + place] = force_in_front(episode, own, agent, row, place)
     now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))

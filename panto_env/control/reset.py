@@ -128,7 +128,8 @@ def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array,
         in_front = task.plant.run.table[task.episode.front.collector[agent], lanes]
         task.episode.front.kept[rows] = in_front[:, Row.CONTACT_FORCE, None]  # at rest
     if task.episode.memory.ahead.size and not start[:, Row.STEP].any():
-        forget(task.episode.memory, rows, start[:, Row.CONTACT_FORCE])
+        deviates = task.episode.averages.shape[1] > 0  # at rest from its average by nothing
+        forget(task.episode.memory, rows, start[:, Row.CONTACT_FORCE] * (not deviates))
     task.running.peak[rows] = -np.inf
 
 

@@ -267,8 +267,9 @@ class RunSettings(Numerics):
     )
     observation: Annotated[str, BeforeValidator(_observation)] = Field(
         "measured",
-        description='what a policy sees: "measured", "full", "centred", or "estimated": as measured, but '
-        "with the contact force that a Kalman filter estimates from the pantograph's motion",
+        description='what a policy sees: "measured", "full", "centred", "deviations": of readings from their '
+        'slow averages, for any line; or "estimated": as measured, but with the contact force that a Kalman '
+        "filter estimates from the pantograph's motion",
     )
     harmonics: Annotated[int, Between(1, 14)] = Field(
         1, description="sines and cosines of the position within the span, up to this multiple of it (-)"

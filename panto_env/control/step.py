@@ -13,7 +13,15 @@ from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, place_on_line, position
 from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .front import keep_front
-from .observation import begin_history, entry_of, prepare_entries, remember, use_noise
+from .observation import (
+    begin_averages,
+    begin_history,
+    entry_of,
+    go_on_with_averages,
+    prepare_entries,
+    remember,
+    use_noise,
+)
 from .reward import (
     add_sample_to_terms,
     begin_terms,
@@ -168,6 +176,7 @@ def control_lane(packed, entries, values, flags, lane):
         for a in range(agents):
             row = lane * agents + a
             own, task, now = run.table[episode.controlled[a], lane], episode.table[row], episode.now[row]
+            go_on_with_averages(episode, now, row)
             compute_reward(episode, own, task, now, values[row])
             compute_cost(episode, now, values[row])
             if own[ROW.STEP] > task[TASK_ROW.COUNTED_FROM]:
@@ -230,6 +239,7 @@ def observe_start(packed, entries, values, flags, first, last):
                 c, row = episode.controlled[a], lane * agents + a
                 own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
                 take_first_readings(sensors, c, own, now[NOW.READING :], lane)
+                begin_averages(episode, now, row)
                 prepare_entries(episode, sensors, run, own, now, a, lane, row)
                 begin_history(episode, task, now)
                 for k in range(entries.shape[1]):

@@ -18,7 +18,7 @@ from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .context import Context
 from .cost import Cost, arrays_of, run_cost
-from .entries import ESTIMATED, EntryOptions
+from .entries import DEVIATIONS, ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
@@ -66,6 +66,11 @@ class Task(TaskState):
         self.cost = self._cost(plant, lanes)
         self.layout = layout(settings.observation, _entry_options(settings))
         self.known_pantograph = settings.known_pantograph or settings.controlled_pantograph
+        if settings.normalise is not None and settings.observation == DEVIATIONS:
+            raise InputError(
+                "The observation 'deviations' has scales of its own, for any line; leave out normalise, or "
+                "take 'measured'."
+            )
         if settings.normalise is not None:
             known = settings.with_pantograph(plant.train.driven[0], self.known_pantograph)
             speeds = self._speeds_of_passive_runs(settings.normalise)

@@ -63,6 +63,31 @@ def _rising(places):
     return np.flatnonzero(rises & (low == places) & (high == places))
 
 
+def test_deviations_are_those_of_readings_from_their_slow_averages():
+    """Beside the readings of "measured" and a recursion in numpy; remembered forces likewise."""
+    given = RUN | {"catenary": "en50318-2002", "sensors": "ideal", "run_in": 0}
+    measured, seen = (
+        run(gymnasium.make("Pantograph-v0", **given | {"observation": kind}))
+        for kind in ("measured", "deviations")
+    )
+    share = 1 - np.exp(-0.01 / 1.0)
+    for name, scale, spread in (("contact force", 100, 30), ("head displacement", 0.1, 0.012)):
+        readings = scale * measured[1][:, measured[0].layout.index(name)].astype(float)
+        average, expected = readings[0], []
+        for reading in readings:
+            average += share * (reading - average)
+            expected.append(reading - average)
+        told = spread * seen[1][:, seen[0].layout.index(f"{name} deviation")]
+        assert np.std(expected) > 0.3 * spread
+        np.testing.assert_allclose(told, expected, atol=1e-4 * spread)
+    force = seen[1][:, seen[0].layout.index("contact force deviation")]
+    told = seen[1][:, seen[0].layout.index("remembered force deviation, 1 span ago, 0 s ahead")]
+    sought = seen[3] - 1
+    known = sought > seen[3][0]
+    np.testing.assert_allclose(told[known], np.interp(sought[known], seen[3], force), atol=1e-5)
+    np.testing.assert_allclose(told[~known], 0.0, atol=1e-6)
+
+
 def test_lanes_remember_as_single_environments_do():
     vector = gymnasium.make_vec("Pantograph-v0", num_envs=3, memory=AHEAD, distance=200)
     first, _ = vector.reset(seed=[5, 6, 7])
@@ -89,6 +114,7 @@ def test_a_second_episode_remembers_nothing_of_the_first():
         ({"memory": (0.8,), "speed_kmh": 300}, "memory must be at most 0.72 s.*shortest span, 60 m"),
         ({"memory": AHEAD, "sensors": "blind"}, "which these sensors do not measure"),
         ({"memory": AHEAD, "memory_spans": 0}, "memory_spans"),
+        ({"observation": "deviations", "normalise": 270}, "'deviations' has scales of its own"),
     ],
 )
 def test_a_memory_that_cannot_be_is_refused(given, message):
