@@ -32,6 +32,10 @@ class Actor:
     def reset(self, context: Context) -> None:
         """Do nothing: the actor has no memory."""
 
+    def after_first(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the second layer sees of the values of the first."""
+        return values
+
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
         values = observation
@@ -40,6 +44,8 @@ class Actor:
             values = weight @ values + bias
             if k < last:
                 values = np.tanh(values) if self.activation == "tanh" else np.maximum(values, 0)
+            if k == 0:
+                values = self.after_first(values)
         if self.squashed:
             values = np.tanh(values)
         return np.clip(values, -1.0, 1.0).astype(np.float64)

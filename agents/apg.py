@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
@@ -11,7 +11,8 @@ from panto_env.base.settings import NonNegative
 
 from .actor import Actor
 from .algorithm import Algorithm
-from .ranges import Count
+from .ranges import MOST_UNITS, Count
+from .recurrent_actor import RecurrentActor
 
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
@@ -36,6 +37,9 @@ class APG(Algorithm):
         0.25, description="change of the action in a control step that costs nothing: the actuator's limit"
     )
     max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
+    recurrent_units: Annotated[int, Field(ge=0, le=MOST_UNITS, strict=True)] = Field(
+        0, description="width of a gated recurrent unit after the first layer; 0: none"
+    )
     response_steps: Count = Field(
         180, description="control steps after which the response to an action is taken to be over"
     )
@@ -53,4 +57,6 @@ class APG(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""
-        return self.actor_from_layers(model.network).squash()
+        plain = self.actor_from_layers(model.network.first, model.network.rest).squash()
+        cell = model.network.arrays()
+        return plain if cell is None else RecurrentActor(**vars(plain), cell=cell)

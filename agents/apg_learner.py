@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,14 +10,14 @@ import torch
 from stable_baselines3.common.logger import Logger
 from torch import nn
 
+from .network import Driver, Network
+
 if TYPE_CHECKING:
     from .apg import APG
     from .pass_lanes import PassLanes
 
 MOST = 4.0
 """Maximum ratio of variances that has a gradient."""
-FIRST = 0.01
-"""Factor on the last layer's initial weights: the first passes are nearly passive."""
 
 
 class APGLearner:
@@ -33,17 +32,8 @@ class APGLearner:
         self.set_random_seed(seed)
         torch.manual_seed(seed)
         kwargs = settings.policy_kwargs()
-        widths = [lanes.entries, *kwargs["net_arch"]]
-        hidden = [
-            part
-            for wide, narrow in pairwise(widths)
-            for part in (nn.Linear(wide, narrow), kwargs["activation_fn"]())
-        ]
-        last = nn.Linear(widths[-1], 1)
-        with torch.no_grad():
-            last.weight *= FIRST
-            last.bias.zero_()
-        self.network = nn.Sequential(*hidden, last)
+        shape = tuple(kwargs["net_arch"]), kwargs["activation_fn"]
+        self.network = Network(lanes.entries, *shape, settings.recurrent_units)
         self._optimiser = torch.optim.Adam(self.network.parameters())
         self.logger: Logger
         self._rounds: deque[list[Any]] = deque(maxlen=settings.rounds_kept)
@@ -100,7 +90,7 @@ class APGLearner:
         settings = self._settings
         known = [each for own in self._rounds for each in own]
         chosen = self._random.permutation(len(known))[: settings.batch_size]
-        ratios, actions = self._lanes.rollout([known[each] for each in chosen.tolist()])(self._act)
+        ratios, actions = self._lanes.rollout([known[each] for each in chosen.tolist()])(Driver(self.network))
         beyond = torch.relu(actions.diff(dim=0).abs() - settings.rate_free)
         # A pass worse than without control is learnt from, but does not outweigh all others.
         loss = ratios.clamp(max=MOST).mean() + settings.rate_weight * beyond.square().mean()
@@ -112,6 +102,3 @@ class APGLearner:
         self._optimiser.step()
         self._n_updates += 1
         return float(ratios.detach().sqrt().mean())
-
-    def _act(self, observations: torch.Tensor) -> torch.Tensor:
-        return torch.tanh(self.network(observations))

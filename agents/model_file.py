@@ -22,7 +22,10 @@ from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
 from .learner import Arrays, learn_again, learnt
+from .recurrent_actor import Cell, RecurrentActor
 
+CELL = "actor/cell_"
+"""How the names of a recurrent cell's arrays begin."""
 DRIVEN = ((0,), (1,), (0, 1))
 """Actuators that the actions of a policy can drive: frame, head, or both."""
 
@@ -172,12 +175,19 @@ def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
 def layers(actor: Actor) -> Arrays:
     """Weights and biases of a policy's network, with their names in a model file."""
     weights = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
-    return weights | {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
+    own = weights | {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
+    if isinstance(actor, RecurrentActor):
+        own |= {f"{CELL}{name}": array for name, array in actor.cell._asdict().items()}
+    return own
 
 
 def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     """The policy's network. Raises ValueError unless its layers fit each other and what the facts say."""
     own = {name: array for name, array in arrays.items() if name.startswith("actor/")}
+    parts = {name.removeprefix(CELL): own.pop(name) for name in list(own) if name.startswith(CELL)}
+    if parts and set(parts) != set(Cell._fields):
+        raise ValueError("its network has only a part of a cell")
+    cell = Cell(**parts) if parts else None
     count, width = len(own) // 2, len(facts.needs.entries)
     if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
@@ -188,6 +198,11 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
         if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
             raise ValueError(f"layer {k} of its network does not fit the one before, or what it observes")
         width = len(bias)
+        if k == 1 and cell is not None:
+            cell.check(width)
+            width += cell.units
     if width != len(facts.needs.channels):
         raise ValueError("its network differs in shape from its facts")
+    if cell is not None:
+        return RecurrentActor(weights, biases, facts.activation, facts.squashed, cell=cell)
     return Actor(weights, biases, facts.activation, facts.squashed)

@@ -19,6 +19,7 @@ class WashedOut:
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
+        self._actor.reset(context)
         self._limit = context.force_limit
         self._washout = Washout(self._settings, context.control_interval, self._limit, (context.actions,))
 

@@ -15,6 +15,7 @@ import torch
 from panto_agents.apg_learner import APGLearner
 from panto_agents.linear_pass import measure
 from panto_agents.linear_rollout import _Washout
+from panto_agents.network import Driver
 from panto_agents.pass_lanes import PassLanes
 from panto_agents.policy import load
 from panto_agents.settings import Training, parse_training
@@ -62,7 +63,7 @@ def learner(training: Training) -> APGLearner:
     """A learner with a network that acts, by more than 5 N rms."""
     made = APGLearner(training.hyperparameters, PassLanes(training, LENGTH), training.seed)
     with torch.no_grad():
-        made.network[-1].weight *= 60
+        made.network.rest[-1].weight *= 60
     return made
 
 
@@ -74,14 +75,16 @@ def ratio(made: APGLearner, training: Training, seed: int) -> float:
 
 
 CASES = [
-    {"catenary": "en50318-2002", "normalise": 270},
-    {"catenary": "family:high-speed", "observation": "deviations", "normalise": None},
+    ({"catenary": "en50318-2002", "normalise": 270}, 0),
+    ({"catenary": "family:high-speed", "observation": "deviations", "normalise": None}, 8),
 ]
 
 
-@pytest.fixture(scope="module", params=CASES, ids=["measured", "deviations"])
+@pytest.fixture(scope="module", params=CASES, ids=["measured", "deviations, recurrent"])
 def case(request):
-    training = settings(environment={"speed_kmh": 270, **request.param})
+    hyperparameters = {"net_arch": [16], "recurrent_units": request.param[1]}
+    environment = {"speed_kmh": 270, **request.param[0]}
+    training = settings(environment=environment, hyperparameters=hyperparameters)
     made, seed = learner(training), TRAINING[7]
     policy = WashedOut(training.hyperparameters.actor(made), training.washout)
     return training, made, seed, measure(made.get_env()._settings[0], policy, seed, LENGTH)
@@ -91,7 +94,7 @@ def test_a_network_repeats_its_own_pass(case):
     """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
     _, made, _, own = case
     with torch.no_grad():
-        ratios, actions = made.get_env().rollout([own])(made._act)
+        ratios, actions = made.get_env().rollout([own])(Driver(made.network))
     assert np.sqrt(np.mean(own.actions**2)) > 0.05
     np.testing.assert_allclose(actions[:, 0].numpy(), own.actions, atol=1e-5)
     expected = own.force[own.counted_from + 1 : -1].astype(float).var() / own.passive_variance
@@ -102,7 +105,7 @@ def test_the_gradient_is_that_of_the_plant(case):
     """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
     training, made, seed, own = case
     parameters = list(made.network.parameters())
-    ratios, _ = made.get_env().rollout([own])(made._act)
+    ratios, _ = made.get_env().rollout([own])(Driver(made.network))
     slopes = torch.autograd.grad(ratios[0], parameters)
     torch.manual_seed(3)
     for direction in (slopes, [torch.randn_like(each) for each in parameters]):
