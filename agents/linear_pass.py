@@ -101,7 +101,8 @@ def measure(settings: RunSettings, policy: Policy, seed: int, length: int) -> Li
     random = np.random.default_rng(seed)
     drawn = on_drawn_line(settings, lambda: random)
     speed = float(random.uniform(*drawn.speed_kmh))
-    task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed)}), lanes=length + 2)
+    # A pass begins at the line's start, as those of a benchmark do.
+    task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}), lanes=length + 2)
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
     policy.reset(task.context(0))

@@ -24,6 +24,7 @@ from panto_agents.washout_policy import WashedOut
 from panto_baselines.benchmark.seeds import TRAINING
 from panto_baselines.policies.washout import Washout, WashoutSettings
 from panto_env import InputError, simulate
+from panto_env.metrics.low_pass import low_pass
 
 LENGTH = 400
 """Longer than the passes: nothing of a response is neglected."""
@@ -131,6 +132,24 @@ def test_responses_are_those_of_single_pulses():
     told = 0.1 * own.response[after, after - 61, -1].astype(float)
     assert told.std() > 0.3
     np.testing.assert_allclose(moved[after], told, atol=0.15 * np.abs(told).max())
+
+
+def test_a_pass_is_that_of_simulate():
+    """The force, filtered along the whole record, and the passive variance where an episode counts."""
+    training = settings(environment={"settle": 2, "distance": 150.0})
+    lanes = PassLanes(training, 10)
+    own = measure(lanes._settings[0], _Script({60: 0.5}), TRAINING[0], 10)
+    given = {"accuracy": "fast", "speed_kmh": 300, "line_condition": "as-built", "distance": 150.0 + 120}
+    given |= {"actuator": "realistic", "sensors": "realistic", "pantograph_scatter": 0.05, "speed_drift": 0.5}
+    environment = training.environments[0]
+    given |= {key: environment[key] for key in given if key in environment and key != "distance"}
+    given["catenary"] = "en50318-2002"
+    run = simulate(**given, seed=TRAINING[0], policy=_Script({60: 0.5}))
+    every = round(0.01 / run.time_step)
+    force = low_pass(run.contact_force, run.time_step)[every - 1 :: every]
+    count = min(len(force), len(own.force) - 1)
+    np.testing.assert_allclose(own.force[1 : count + 1], force[:count], atol=2.0)
+    assert own.counted_from * (300 / 3.6) * 0.01 == pytest.approx(120, abs=2)
 
 
 class _Script:
