@@ -18,6 +18,7 @@ from panto_agents.evaluation import Pair, in_words, pair, verdict
 from panto_agents.model_file import actor_of, read_model
 from panto_agents.ppo import PPO
 from panto_agents.ranges import MOST_KEPT
+from panto_agents.recurrent_actor import RecurrentActor
 from panto_agents.run_folder import RunFolder
 from panto_agents.sac import SAC
 from panto_agents.stable_baselines import save_policy
@@ -183,6 +184,52 @@ def test_layers_that_do_not_fit_are_refused(change, message):
     arrays = {name: array for name, array in (LAYERS | change).items() if array is not None}
     with pytest.raises(ValueError, match=message):
         actor_of(arrays | {"critic/weight_0": np.ones(1)}, FACTS)
+
+
+CELLS = {"weight_input": (6, 3), "weight_state": (6, 2), "bias_input": (6,), "bias_state": (6,)}
+RECURRENT = LAYERS | {f"actor/cell_{name}": np.ones(shape) for name, shape in CELLS.items()}
+RECURRENT |= {"actor/weight_1": np.ones((1, 5))}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"actor/cell_bias_state": None}, "only a part of a cell"),
+        ({"actor/cell_other": np.ones(1)}, "only a part of a cell"),
+        ({"actor/cell_weight_input": np.ones((6, 2))}, "the cell of its network does not fit"),
+        ({"actor/cell_weight_state": np.ones(6)}, "the cell of its network does not fit"),
+        ({"actor/cell_bias_input": np.full(6, np.inf)}, "the cell of its network holds values that are not"),
+        ({"actor/weight_1": np.ones((1, 3))}, "layer 2 of its network does not fit"),
+    ],
+)
+def test_a_cell_that_does_not_fit_is_refused(change, message):
+    assert isinstance(actor_of(RECURRENT, FACTS), RecurrentActor)
+    arrays = {name: array for name, array in (RECURRENT | change).items() if array is not None}
+    with pytest.raises(ValueError, match=message):
+        actor_of(arrays, FACTS)
+
+
+def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
+    torch = pytest.importorskip("torch")
+    from panto_agents.network import Driver, Network
+
+    torch.manual_seed(0)
+    network = Network(4, (6, 5), torch.nn.Tanh, 3)
+    with torch.no_grad():
+        network.rest[-1].weight *= 100
+    linear = [network.first, *network.rest]
+    arrays = [[getattr(each, kind).detach().numpy() for each in linear] for kind in ("weight", "bias")]
+    actor = RecurrentActor(*map(tuple, arrays), "tanh", True, cell=network.arrays())
+    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
+    driver = Driver(network)
+    with torch.no_grad():
+        expected = [driver(torch.tensor(each[None]))[0, 0].item() for each in seen]
+    for _ in range(2):
+        actor.reset(None)
+        assert [actor.act(each)[0] for each in seen] == pytest.approx(expected, abs=1e-5)
+    assert np.std(expected) > 0.03
+    actor.reset(None)
+    assert actor.act(seen[5])[0] != pytest.approx(expected[5], abs=1e-3)  # it remembers what came before
 
 
 def test_layers_act_as_their_formula():

@@ -317,3 +317,39 @@ def test_repetitive_control_needs_no_gains_of_the_line() -> None:
     passive, figures = (simulate(policy=policy, **settings).summary() for policy in (None, "repetitive"))
     assert figures.std < passive.std
     assert figures.mean == pytest.approx(passive.mean, rel=MEAN_TOLERANCE)
+
+
+FAMILY = {"catenary": "family:high-speed", "pantograph": "dsa380", "line_condition": "as-built"}
+FAMILY |= {"actuator": "realistic", "sensors": "realistic", "accuracy": "fast", "speed_kmh": 275}
+
+
+def test_on_a_family_each_seed_has_its_own_line():
+    """Forces of a batch beside those of single runs, which draw the same lines."""
+    force = run_batch(run_settings(FAMILY), [Still(), Skyhook(gains=(200.0, 0.0))], [2001, 2002])
+    assert force.values.shape[:2] == (2, 2)
+    for law, policy in ((0, None), (1, Skyhook(gains=(200.0, 0.0)))):
+        for k, seed in enumerate((2001, 2002)):
+            run = simulate(**FAMILY, observation="measured", seed=seed, policy=policy)
+            assert force.std[law, k] == pytest.approx(run.summary().std, rel=0.02)
+            assert force.mean[law, k] == pytest.approx(run.summary().mean, rel=0.005)
+
+
+def test_gains_of_a_family_are_for_any_line_that_has_none_of_its_own(tmp_path):
+    settings = run_settings(FAMILY)
+    tuned = tune_at("skyhook", settings, 275.0, 1, 30)
+    path = tmp_path / "gains.toml"
+    check_gain_file(path, "skyhook", settings, force=False)
+    store(path, "skyhook", make_tuning(settings, list(Skyhook.TUNED), [tuned], (2000,), "test"))
+    assert load_gains(path).tunings[0].catenary == "family:high-speed"
+    given = {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": 275.0}
+    found = find_gains(str(path), list(Skyhook.TUNED), a_context(**given))
+    np.testing.assert_allclose(found, tuned.gains, rtol=1e-4)
+    with pytest.raises(InputError, match="already holds gains for dsa380 on family:high-speed"):
+        check_gain_file(path, "skyhook", settings, force=False)
+    with pytest.raises(InputError, match="no gains for the pantograph 'dsa250'"):
+        find_gains(str(path), list(Skyhook.TUNED), a_context(**given | {"pantograph": "dsa250"}))
+    own = run_settings(FAMILY | {"catenary": "re330"})
+    other = tune_at("skyhook", own, 275.0, 1, 30)
+    store(path, "skyhook", make_tuning(own, list(Skyhook.TUNED), [other], (2000,), "test"))
+    found = find_gains(str(path), list(Skyhook.TUNED), a_context(**given))
+    np.testing.assert_allclose(found, other.gains, rtol=1e-4)  # its own go first
