@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_baselines.policies.lanes_law import LanesLaw
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.entries import DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
@@ -31,11 +32,10 @@ Numbers = NDArray[np.float32]
 class Columns(NamedTuple):
     """Where an observation's entries come from; all others do not depend on actions."""
 
-    readings: NDArray[np.int64]  # (depth, readings): now and 1, 2, .. control steps ago
-    actions: tuple[int, ...]  # (depth,): of the last action, and of those before
+    now: NDArray[np.int64]  # (depth, values): readings and last action, now and 1, 2, .. control steps ago
     force: NDArray[np.int64]  # (spans, times): of the remembered contact force
     acted: NDArray[np.int64]  # (spans, times): likewise of actions
-    of_force: int  # place of the contact force among the readings
+    of_force: int  # place of the contact force among the values; the action's is the last one
     deviate: bool  # whether readings are deviations from their slow averages
 
 
@@ -43,10 +43,10 @@ class LinearPass(NamedTuple):
     """One pass of a policy; times are control steps, 0 at the start."""
 
     observations: Numbers  # (times + 1, entries)
-    actions: Numbers  # (times,): after a washout
+    actions: Numbers  # (times,): of the network, after its washout
     force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
-    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, readings + 1): of the scaled readings,
-    # not of their deviations, and of the force (N).
+    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, values + 1): of scaled readings, not of
+    # their deviations, of the action with what a base policy adds, and of the force (N).
     response: NDArray[np.float16]
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
     passive_variance: float  # of the force without control, where it counts (N^2)
@@ -83,8 +83,7 @@ def columns_of(layout: Layout) -> Columns:
 
     depth = range(layout.history + 1)
     return Columns(
-        np.array([[at(name, ago) for name in readings] for ago in depth]),
-        tuple(at(actions[0], ago) for ago in depth),
+        np.array([[at(name, ago) for name in (*readings, *actions)] for ago in depth]),
         remembered("force" + ending),
         remembered(f"{place} action"),
         readings.index("contact force" + ending),
@@ -92,11 +91,20 @@ def columns_of(layout: Layout) -> Columns:
     )
 
 
-def measure(settings: RunSettings, policy: Policy, seed: int, length: int) -> LinearPass:
+class Base(NamedTuple):
+    """A policy that a network adds to."""
+
+    law: LanesLaw  # acts in all lanes at once
+    share: float  # part of the actuator's limit that the network may add
+
+
+def measure(
+    settings: RunSettings, policy: Policy, seed: int, length: int, base: Base | None = None
+) -> LinearPass:
     """The pass of a policy under a seed, on a line and at a speed drawn by it.
 
-    length: control steps after which the response to an action is taken to be over.
-    Raises InputError where it ends early, or for settings that do not fit.
+    length: control steps after which the response to an action is taken to be over. base: to which the policy
+    adds; it reacts to pulses. Raises InputError where the pass ends early, or for settings that do not fit.
     """
     random = np.random.default_rng(seed)
     drawn = on_drawn_line(settings, lambda: random)
@@ -105,43 +113,54 @@ def measure(settings: RunSettings, policy: Policy, seed: int, length: int) -> Li
     task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}), lanes=length + 2)
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
-    policy.reset(task.context(0))
-    scale = task.layout.scale[columns.readings[0]]
+    context = task.context(0)
+    policy.reset(context)
+    if base is not None:
+        base.law.begin(context, task.lanes)
+    share = 1.0 if base is None else base.share
+    readings, action = columns.now[0, :-1], columns.now[0, -1]
+    scale = task.layout.scale[readings]
     observations, differences, places, speeds = [], [], [], []
     actions: list[float] = []
+    pulses: list[float] = []
 
     def observe() -> None:
         seen = task.results.observation
         observations.append(seen[0].copy())
-        readings = seen[:, columns.readings[0]]
+        values = seen[:, readings].astype(float)
         if columns.deviate:  # their averages forget more slowly than responses are kept
-            readings = readings + task.episode.averages / scale
-        differences.append(readings[1:-1] - readings[0])
+            values += task.episode.averages / scale
+        values = np.column_stack([values, seen[:, action]])
+        differences.append(values[1:-1] - values[0])
         now = task.episode.now[0]
         places.append(now[Now.SPANS])
         speeds.append(now[Now.SPEED])
 
     observe()
     while not task.results.flags[0].any():
-        action = policy.act(task.results.observation[0].copy())[0]
-        every = np.full((task.lanes, 1), action)
-        every[1 + len(actions) % length] += -PULSE if action > 0 else PULSE
-        every[-1] = 0.0
-        actions.append(action)
-        task.step(every)
+        seen = task.results.observation.copy()
+        under = np.zeros(task.lanes)
+        if base is not None:
+            under = np.clip(base.law.forces(seen) / context.force_limit, -1.0, 1.0)
+        actions.append(float(policy.act(seen[0])[0]))
+        every = np.full(task.lanes, actions[-1])
+        pulses.append((-PULSE if under[0] + share * actions[-1] > 0 else PULSE) / share)
+        every[1 + (len(actions) - 1) % length] += pulses[-1]
+        total = np.clip(under + share * every, -1.0, 1.0)
+        total[-1] = 0.0
+        task.step(total[:, None])
         observe()
     if task.results.terminated.any():
         raise InputError(task.ending(int(np.flatnonzero(task.results.terminated)[0])))
-    count, given = len(actions), np.array(actions)
+    count = len(actions)
     force = _filtered(task, count)
-    pulses = np.where(given > 0, -PULSE, PULSE)
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
     counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps
     return LinearPass(
         np.array(observations, dtype=np.float32),
-        given.astype(np.float32),
+        np.array(actions, dtype=np.float32),
         force[:, 0].astype(np.float32),
-        _responses(moved, pulses),
+        _responses(moved, np.array(pulses)),
         _recalled(task, np.array(places), np.array(speeds)),
         float(force[counted + 1 :, -1].var()),
         counted,

@@ -30,7 +30,8 @@ class Rollout:
     ) -> None:
         """interval: of control (s); limit: of the actuator's force (N); washout: of the action, if any."""
         self._columns, self._washout, self._interval, self._limit = columns, washout, interval, limit
-        self._average_share = 1.0 - math.exp(-interval / AVERAGED) if columns.deviate else 0.0
+        self._average_share = torch.full((columns.now.shape[1],), 1.0 - math.exp(-interval / AVERAGED))
+        self._average_share[-1] = 0.0  # the action has no average
         self.steps = min(len(each.actions) for each in passes)
 
         def stacked(values: list[Any]) -> torch.Tensor:
@@ -55,49 +56,46 @@ class Rollout:
 
         network: actions, (passes, 1), for observations, (passes, entries).
         """
-        lanes, depth = self._actions.shape[1], len(self._columns.actions)
+        lanes, values = self._actions.shape[1], self._columns.now.shape[1]
         changes = torch.zeros(lanes, self._response.shape[2])  # of the actions 1, 2, .. steps ago
-        read = torch.zeros(lanes, self._columns.readings.size)  # changes of readings, the latest first
-        averages = torch.zeros(lanes, self._columns.readings.shape[1])
-        forces: list[torch.Tensor] = []  # changes of the read force
-        acted = [torch.zeros(lanes)]  # of actions, of the step before
+        told = torch.zeros(lanes, self._columns.now.size)  # changes of the observed values, the latest first
+        averages = torch.zeros(lanes, values)
+        kept: list[torch.Tensor] = []  # changes of the values of each step
         moved, taken = [], []
         washout = _Washout(self._washout, self._interval, self._limit, lanes)
         for first in range(0, self.steps, self._stretch):
             last = min(first + self._stretch, self.steps)
-            told = self._remembered(forces, acted, first, last)
+            remembered = self._remembered(kept, first, last)
             for step in range(first, last):
                 change = torch.bmm(changes[:, None], self._response[step].float())[:, 0]
                 moved.append(change[:, -1])
-                reading = change[:, :-1]
-                if self._average_share:
-                    averages = averages + self._average_share * (reading - averages)
-                    reading = reading - averages
-                forces.append(reading[:, self._columns.of_force])
-                read = torch.cat([reading, read[:, : read.shape[1] - reading.shape[1]]], dim=1)
-                every = torch.cat([read, changes[:, :depth], told[step - first]], dim=1)
+                now = change[:, :-1]
+                if self._columns.deviate:
+                    averages = averages + self._average_share * (now - averages)
+                    now = now - averages
+                kept.append(now)
+                told = torch.cat([now, told[:, :-values]], dim=1)
+                every = torch.cat([told, remembered[step - first]], dim=1)
                 action = washout(network(self._observations[step] + every @ self._into)[:, 0])
                 taken.append(action)
-                acted.append(action - self._actions[step])
-                changes = torch.cat([acted[-1][:, None], changes[:, :-1]], dim=1)
+                changes = torch.cat([(action - self._actions[step])[:, None], changes[:, :-1]], dim=1)
         force = (self._force + torch.stack(moved)).T
         counted = [
             own[start + 1 :].var(correction=0) for own, start in zip(force, self._counted_from, strict=True)
         ]
         return torch.stack(counted) / self._passive, torch.stack(taken)
 
-    def _remembered(
-        self, forces: list[torch.Tensor], acted: list[torch.Tensor], first: int, last: int
-    ) -> torch.Tensor:
+    def _remembered(self, kept: list[torch.Tensor], first: int, last: int) -> torch.Tensor:
         """Changes of what is remembered in steps from first to before last, (steps, passes, values)."""
         if first < 2:
             return torch.zeros(last - first, self._recalled.shape[1], 2 * self._recalled.shape[2])
         when = self._recalled[first:last].clamp(max=first - 1.0)
         before = when.floor().long().clamp(max=first - 2)
         share, known = when - before, self._known[first:last]
+        values = torch.stack(kept, dim=1)  # (passes, steps before, values)
 
-        def between(values: list[torch.Tensor]) -> torch.Tensor:
-            line, steps = torch.stack(values[:first], dim=1), last - first
+        def between(line: torch.Tensor) -> torch.Tensor:
+            steps = last - first
             at = before.transpose(0, 1).flatten(1)
             low, high = (
                 torch.gather(line, 1, each).view(len(line), steps, -1).transpose(0, 1)
@@ -105,16 +103,15 @@ class Rollout:
             )
             return known * (low + share * (high - low))
 
-        return torch.cat([between(forces), between(acted)], dim=2)
+        return torch.cat([between(values[:, :, self._columns.of_force]), between(values[:, :, -1])], dim=2)
 
 
 def _selection(columns: Columns, entries: int) -> torch.Tensor:
     """Matrix from changes to the entries that they change, (changes, entries).
 
-    Changes: of readings now and in earlier steps, of actions one and more steps ago, of the force and of the
-    actions that are remembered.
+    Changes: of readings and action now and in earlier steps, of the force and the actions that are remembered.
     """
-    into = [*columns.readings.ravel(), *columns.actions, *columns.force.ravel(), *columns.acted.ravel()]
+    into = [*columns.now.ravel(), *columns.force.ravel(), *columns.acted.ravel()]
     matrix = torch.zeros(len(into), entries)
     matrix[torch.arange(len(into)), torch.tensor(np.array(into))] = 1.0
     return matrix

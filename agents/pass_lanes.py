@@ -7,14 +7,15 @@ import time
 import numpy as np
 
 from panto_baselines.benchmark.seeds import TRAINING
+from panto_baselines.policies.lanes_law import LanesLaw
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
-from panto_env.policies import Policy
+from panto_env.policies import Policy, find_policy
 
 from .actor import Actor
-from .linear_pass import LinearPass, columns_of, measure
+from .linear_pass import Base, LinearPass, columns_of, measure
 from .linear_rollout import Rollout
 from .settings import Training
 from .washout_policy import WashedOut
@@ -34,6 +35,10 @@ class PassLanes:
         self.entries, self.count = len(context.layout.entries), training.lanes
         self._interval, self._limit = context.control_interval, context.force_limit
         self._washout, self._length = training.washout, length
+        self._base = (
+            None if training.residual_of is None else _base(training.residual_of, training.residual_share)
+        )
+        self.share = training.residual_share if self._base else 1.0  # of the force limit, of an action of 1
         self.seconds, self.unwrapped = 0.0, self  # spent in the plant so far
 
     def seed(self, seed: int) -> None:
@@ -51,7 +56,7 @@ class PassLanes:
             seed = TRAINING[int(self._random.integers(len(TRAINING)))]
             try:
                 settings = self._settings[len(passes) % len(self._settings)]
-                passes.append(measure(settings, policy, seed, self._length))
+                passes.append(measure(settings, policy, seed, self._length, self._base))
                 failures = 0
             except InputError:
                 failures += 1
@@ -66,3 +71,13 @@ class PassLanes:
 
     def close(self) -> None:
         """Do nothing: nothing is open."""
+
+
+def _base(name: str, share: float) -> Base:
+    """The policy that a network adds to. Raises InputError unless it acts in many lanes at once."""
+    law = find_policy(name)
+    if not isinstance(law, LanesLaw):
+        raise InputError(
+            f"apg adds to policies that act in many lanes at once, such as repetitive, not to '{name}'."
+        )
+    return Base(law, share)

@@ -184,11 +184,8 @@ def _check_environment(training: Training) -> None:
 def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
-    if isinstance(training.hyperparameters, APG) and (training.start_from or training.residual_of):
-        raise InputError(
-            f"{training.algorithm} starts from nothing and adds to nothing; leave out start_from "
-            "and residual_of, or take ppo or sac"
-        )
+    if isinstance(training.hyperparameters, APG) and training.start_from:
+        raise InputError("apg starts from nothing; leave out start_from, or add to a policy by residual_of")
     if training.start_from is not None and training.variants:
         raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)

@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from panto_agents.apg_learner import APGLearner
-from panto_agents.linear_pass import measure
+from panto_agents.linear_pass import LinearPass, measure
 from panto_agents.linear_rollout import _Washout
 from panto_agents.network import Driver
 from panto_agents.pass_lanes import PassLanes
@@ -68,27 +68,33 @@ def learner(training: Training) -> APGLearner:
     return made
 
 
+def own_pass(made: APGLearner, training: Training, seed: int) -> LinearPass:
+    """The pass of a learner's network."""
+    lanes, policy = made.get_env(), WashedOut(training.hyperparameters.actor(made), training.washout)
+    return measure(lanes._settings[0], policy, seed, LENGTH, lanes._base)
+
+
 def ratio(made: APGLearner, training: Training, seed: int) -> float:
     """Variance of the force over the passive one in the plant."""
-    policy = WashedOut(training.hyperparameters.actor(made), training.washout)
-    own = measure(made.get_env()._settings[0], policy, seed, LENGTH)
+    own = own_pass(made, training, seed)
     return float(own.force[own.counted_from + 1 :].astype(float).var() / own.passive_variance)
 
 
 CASES = [
     ({"catenary": "en50318-2002", "normalise": 270}, 0),
+    ({"catenary": "en50318-2002", "normalise": 270, "distance": 250.0}, "repetitive"),
     ({"catenary": "family:high-speed", "observation": "deviations", "normalise": None}, 8),
 ]
 
 
-@pytest.fixture(scope="module", params=CASES, ids=["measured", "deviations, recurrent"])
+@pytest.fixture(scope="module", params=CASES, ids=["measured", "added to a policy", "deviations, recurrent"])
 def case(request):
-    hyperparameters = {"net_arch": [16], "recurrent_units": request.param[1]}
-    environment = {"speed_kmh": 270, **request.param[0]}
-    training = settings(environment=environment, hyperparameters=hyperparameters)
+    given, kind = request.param
+    hyperparameters = {"net_arch": [16], "recurrent_units": kind if kind == 8 else 0}
+    changes = {"residual_of": kind, "residual_share": 0.5} if kind == "repetitive" else {}
+    training = settings(environment={"speed_kmh": 270, **given}, hyperparameters=hyperparameters, **changes)
     made, seed = learner(training), TRAINING[7]
-    policy = WashedOut(training.hyperparameters.actor(made), training.washout)
-    return training, made, seed, measure(made.get_env()._settings[0], policy, seed, LENGTH)
+    return training, made, seed, own_pass(made, training, seed)
 
 
 def test_a_network_repeats_its_own_pass(case):
@@ -202,8 +208,7 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"residual_of": "repetitive"}, "apg starts from nothing and adds to nothing"),
-        ({"start_from": "repetitive"}, "apg starts from nothing and adds to nothing"),
+        ({"start_from": "repetitive"}, "apg starts from nothing"),
         ({"hyperparameters": {"updates": 0}}, "updates"),
     ],
 )
@@ -216,3 +221,8 @@ def test_what_apg_does_not_do_is_refused(changes, message):
 def test_an_observation_that_cannot_be_learnt_from_is_refused(given, tmp_path: Path):
     with pytest.raises(InputError, match="apg needs the observation 'measured' or 'deviations'"):
         train(settings(environment=given), tmp_path / "run", progress=False)
+
+
+def test_a_policy_that_acts_in_one_lane_only_is_no_base(tmp_path):
+    with pytest.raises(InputError, match=r"adds to policies that act in many lanes at once.*not to 'pd'"):
+        train(settings(residual_of="pd"), tmp_path / "run", progress=False)
