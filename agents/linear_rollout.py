@@ -109,7 +109,7 @@ class Rollout:
 def _selection(columns: Columns, entries: int) -> torch.Tensor:
     """Matrix from changes to the entries that they change, (changes, entries).
 
-    Changes: of readings and action now and in earlier steps, of the force and the actions that are remembered.
+    Changes: of readings and action now and in earlier steps, of the remembered force and actions.
     """
     into = [*columns.now.ravel(), *columns.force.ravel(), *columns.acted.ravel()]
     matrix = torch.zeros(len(into), entries)
