@@ -43,3 +43,12 @@ def train() -> TrainedPolicy:
     sensors; it sees what the pantograph in front measured.
     """
     return load(FOLDER / "train.safetensors")
+
+
+def any_line() -> TrainedPolicy:
+    """Agent for dsa380 on any line of family:high-speed, 240 to 310 km/h, as built.
+
+    It was trained by the analytic policy gradient on lines drawn from the family, from nothing, with a
+    realistic actuator on the frame and realistic sensors. It is told nothing of the line.
+    """
+    return load(FOLDER / "any-line.safetensors")
