@@ -10,7 +10,7 @@ from pydantic import Field
 from panto_env.base.settings import Positive, Settings
 
 from .actor import Actor
-from .ranges import MOST_LAYERS, Count, Share, Units
+from .ranges import MOST_LAYERS, Count, Units
 
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
@@ -24,7 +24,6 @@ class Algorithm(Settings, ABC):
         3e-4, description="step of the optimiser; two numbers: linearly from the first to the second"
     )
     batch_size: Count = Field(256, description="transitions in a minibatch")
-    gamma: Share = Field(0.97, description="discount of a reward one control step later")
     net_arch: tuple[Units, ...] = Field(
         (64, 64), max_length=MOST_LAYERS, description="widths of the hidden layers"
     )

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 class PPO(Algorithm):
     """Hyperparameters of PPO."""
 
+    gamma: Share = Field(0.97, description="discount of a reward one control step later")
     n_steps: Count = Field(512, description="steps of each lane between two updates")
     n_epochs: Count = Field(10, description="passes over these steps in an update")
     gae_lambda: Share = Field(0.95, description="bias against variance of the advantage")

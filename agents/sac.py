@@ -22,6 +22,7 @@ class SAC(Algorithm):
     """Hyperparameters of SAC."""
 
     activation: Literal["tanh", "relu"] = Field("relu", description="of the hidden layers")
+    gamma: Share = Field(0.97, description="discount of a reward one control step later")
     buffer_size: Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)] = Field(
         200_000, description="maximum number of transitions in the replay buffer"
     )

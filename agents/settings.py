@@ -186,6 +186,11 @@ def _check_policies(training: Training) -> None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
     if isinstance(training.hyperparameters, APG) and training.start_from:
         raise InputError("apg starts from nothing; leave out start_from, or add to a policy by residual_of")
+    if isinstance(training.hyperparameters, APG) and (training.lines, training.episodes_per_line) != (
+        None,
+        1,
+    ):
+        raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
     if training.start_from is not None and training.variants:
         raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)

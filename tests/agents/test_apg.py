@@ -209,6 +209,8 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     ("changes", "message"),
     [
         ({"start_from": "repetitive"}, "apg starts from nothing"),
+        ({"lines": 2}, "apg draws a line for each pass"),
+        ({"hyperparameters": {"gamma": 0.9}}, "unknown key 'gamma' in .hyperparameters. of apg"),
         ({"hyperparameters": {"updates": 0}}, "updates"),
     ],
 )
