@@ -145,7 +145,8 @@ class Run:
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        self.pairs = [pair for each in self._comparisons for pair in each.run(self._policy())]
+        policy = self._policy()
+        self.pairs = [pair for each in self._comparisons for pair in each.run(policy)]
         self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
         logger.record("evaluation/std_ratio", ratio)

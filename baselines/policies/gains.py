@@ -116,8 +116,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
     place, tunings = place_of(context.channels), load_gains(path).tunings
     own = [each for each in tunings if each.is_for(context.catenary, context.pantograph, place)]
     others = [each for each in tunings if each.is_for_any_line(context.pantograph, place)]
-    for tuning in (*own, *others):
-        return _at_speed(tuning, names, to_kmh(context.speed), path)
+    if own or others:
+        return _at_speed((*own, *others)[0], names, to_kmh(context.speed), path)
     line, pantograph = context.catenary.name, context.pantograph.name
     named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
     raise InputError(

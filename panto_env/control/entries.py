@@ -44,8 +44,6 @@ CENTRES = {
     **LINE_CENTRES,
 }
 """Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
-FORCE_SPREAD = 30.0
-"""Usual spread of the contact force (N)."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
 """Scale and unit of the force deviation."""
 READING_ENTRIES = (
@@ -142,9 +140,8 @@ def entries_of(kind: str, options: EntryOptions) -> list[Entry]:
 def _deviation(entry: Entry) -> Entry:
     """Entry of the kind "deviations": a reading's, or that of a remembered force, in its usual spread."""
     name = present(entry)
-    reading = "contact force" if name == "remembered force" else name
-    if reading in (each for each, _, _ in READING_ENTRIES):
-        spread = CENTRES[reading][1] if reading in CENTRES else FORCE_SPREAD
+    if name in (*(each for each, _, _ in READING_ENTRIES), "remembered force"):
+        _, spread = CENTRES["remembered force" if name == "contact force" else name]
         return entry._replace(name=entry.name.replace(name, name + DEVIATION, 1), scale=spread)
     if name in CENTRES:
         return entry._replace(centre=CENTRES[name][0], scale=CENTRES[name][1])
