@@ -50,9 +50,9 @@ def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[st
 
 
 def announce_overwriting(path: str | Path) -> None:
-    """Announce on standard error that an existing file will be overwritten."""
+    """Warn on standard error that an existing file will be overwritten, unless the command is refused."""
     if Path(path).is_file():
-        say(f"{path} exists already and will be overwritten.")
+        say(f"warning: {path} exists already and will be overwritten.")
 
 
 def refuse_overwriting(path: str | Path, force: bool) -> None:

@@ -35,7 +35,7 @@ def test_overwriting_is_told_in_one_line(option, file, folder):
     (folder / file).write_text("old")
     second = called(*RUN, option, file)
     assert second.exit_code == 0
-    assert second.stderr.splitlines() == [f"panto: {file} exists already and will be overwritten."]
+    assert second.stderr.splitlines() == [f"panto: warning: {file} exists already and will be overwritten."]
     assert (folder / file).read_bytes() == before
 
 

@@ -56,7 +56,7 @@ def test_a_full_disk_is_one_sentence_and_the_film_before_stays(size, suffix, tmp
         done = panto(*FILM, f"film{suffix}", cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     announced, said = done.stderr.splitlines()
-    assert announced == f"panto: film{suffix} exists already and will be overwritten."
+    assert announced == f"panto: warning: film{suffix} exists already and will be overwritten."
     assert said == f"panto: film{suffix} cannot be written: File too large."
     assert "The film is" not in done.stdout
     assert (tmp_path / f"film{suffix}").read_text() == "old"
