@@ -17,7 +17,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
-from renamed import pantograph_named
 
 Chunk = Callable[[], NDArray[np.float64]]
 """Runs the work; the seconds that it took, by the clock and of the processor (all threads together)."""
@@ -55,14 +54,18 @@ def plant(name: str, interval: float, steps: int, episodes: int) -> Chunk:
     return run
 
 
-def one_pass(passes: int, **settings: Any) -> Chunk:
+def one_pass(passes: int, pantograph: str, **settings: Any) -> Chunk:
     """Whole calls of ``simulate``, set-up and record included."""
+    from renamed import pantograph_named  # beside this file, which runs as a script
+
     from panto_env import simulate
+
+    named = pantograph_named(pantograph)
 
     def run() -> NDArray[np.float64]:
         start = _now()
         for _ in range(passes):
-            simulate(record_droppers=False, **settings)
+            simulate(record_droppers=False, pantograph=named, **settings)
         return _now() - start
 
     return run
@@ -127,7 +130,7 @@ def _rows() -> dict[str, Row]:
         ("periodic-stiffness", "three-mass", 10),
         ("ohl-three-span", "own-two-mass", 2),
     ):
-        prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph_named(pantograph))
+        prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph)
         found[f"simulate, {line}"] = Row("passes/s", passes, prepare)
     for name, count in (
         ("Pantograph-v0", 4000),

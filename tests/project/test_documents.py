@@ -1,5 +1,6 @@
 """What documents show is what works: their Python is run, their commands are run, shortened or parsed."""
 
+import importlib
 import os
 import re
 import shlex
@@ -193,6 +194,14 @@ def test_targets_that_documents_name_are_run_by_ci_or_by_hand():
     assert named <= ci | set(BY_HAND)
     assert [target for target in BY_HAND if target not in named or target in ci] == []
     assert set(BY_HAND) <= set(targets())
+
+
+def test_studies_in_tests_that_documents_run_can_be_loaded():
+    told = [ROOT / "Makefile", *(ROOT / page for page in pages())]
+    modules = {name for each in told for name in re.findall(r"-m (tests\.[\w.]+\w)", each.read_text())}
+    assert "tests.before.speed" in modules
+    for module in sorted(modules):
+        importlib.import_module(module)
 
 
 def test_every_command_has_its_row_in_the_readme():
