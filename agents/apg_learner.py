@@ -91,9 +91,12 @@ class APGLearner:
         known = [each for own in self._rounds for each in own]
         chosen = self._random.permutation(len(known))[: settings.batch_size]
         ratios, actions = self._lanes.rollout([known[each] for each in chosen.tolist()])(Driver(self.network))
-        beyond = torch.relu(self._lanes.share * actions.diff(dim=0).abs() - settings.rate_free)
+        beyond = [
+            torch.relu(self._lanes.share * own.diff().abs() - settings.rate_free).square().mean()
+            for own in actions
+        ]
         # A pass worse than without control is learnt from, but does not outweigh all others.
-        loss = ratios.clamp(max=MOST).mean() + settings.rate_weight * beyond.square().mean()
+        loss = ratios.clamp(max=MOST).mean() + settings.rate_weight * torch.stack(beyond).mean()
         for group in self._optimiser.param_groups:
             group["lr"] = rate
         self._optimiser.zero_grad()

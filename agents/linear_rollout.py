@@ -18,7 +18,7 @@ Network = Callable[[torch.Tensor], torch.Tensor]
 
 
 class Rollout:
-    """Passes cut to the length of the shortest one; a network drives them in place of their own policy."""
+    """Passes side by side; a network drives them in place of their own policy."""
 
     def __init__(
         self,
@@ -32,11 +32,15 @@ class Rollout:
         self._columns, self._washout, self._interval, self._limit = columns, washout, interval, limit
         self._average_share = torch.full((columns.now.shape[1],), 1.0 - math.exp(-interval / AVERAGED))
         self._average_share[-1] = 0.0  # the action has no average
-        self.steps = min(len(each.actions) for each in passes)
+        self._ends = [len(each.actions) for each in passes]
+        self.steps = max(self._ends)
 
         def stacked(values: list[Any]) -> torch.Tensor:
-            """Values of all passes, (steps, passes, ...)."""
-            return torch.from_numpy(np.stack([value[: self.steps] for value in values], axis=1))
+            """Values of all passes, (steps, passes, ...); zeros after the end of each."""
+            every = np.zeros((self.steps, len(values), *values[0].shape[1:]), dtype=values[0].dtype)
+            for own, value, end in zip(every.swapaxes(0, 1), values, self._ends, strict=True):
+                own[:end] = value[:end]
+            return torch.from_numpy(every)
 
         self._observations = stacked([each.observations for each in passes])
         self._actions = stacked([each.actions for each in passes])
@@ -51,8 +55,8 @@ class Rollout:
         self._stretch = max(1, int(lag[self._known].min())) if self._known.any() else self.steps
         self._into = _selection(columns, self._observations.shape[2])
 
-    def __call__(self, network: Network) -> tuple[torch.Tensor, torch.Tensor]:
-        """Variance of the force, where it counts, over the passive one, (passes,); actions, (steps, passes).
+    def __call__(self, network: Network) -> tuple[torch.Tensor, list[torch.Tensor]]:
+        """Variance of the force, where it counts, over the passive one, (passes,); actions of each pass.
 
         network: actions, (passes, 1), for observations, (passes, entries).
         """
@@ -81,9 +85,13 @@ class Rollout:
                 changes = torch.cat([(action - self._actions[step])[:, None], changes[:, :-1]], dim=1)
         force = (self._force + torch.stack(moved)).T
         counted = [
-            own[start + 1 :].var(correction=0) for own, start in zip(force, self._counted_from, strict=True)
+            own[start + 1 : end].var(correction=0)
+            for own, start, end in zip(force, self._counted_from, self._ends, strict=True)
         ]
-        return torch.stack(counted) / self._passive, torch.stack(taken)
+        actions = torch.stack(taken, dim=1)
+        return torch.stack(counted) / self._passive, [
+            own[:end] for own, end in zip(actions, self._ends, strict=True)
+        ]
 
     def _remembered(self, kept: list[torch.Tensor], first: int, last: int) -> torch.Tensor:
         """Changes of what is remembered in steps from first to before last, (steps, passes, values)."""

@@ -103,7 +103,7 @@ def test_a_network_repeats_its_own_pass(case):
     with torch.no_grad():
         ratios, actions = made.get_env().rollout([own])(Driver(made.network))
     assert np.sqrt(np.mean(own.actions**2)) > 0.05
-    np.testing.assert_allclose(actions[:, 0].numpy(), own.actions, atol=1e-5)
+    np.testing.assert_allclose(actions[0].numpy(), own.actions, atol=1e-5)
     expected = own.force[own.counted_from + 1 : -1].astype(float).var() / own.passive_variance
     assert float(ratios[0]) == pytest.approx(expected, rel=1e-4)
 

@@ -132,6 +132,9 @@ def _rows() -> dict[str, Row]:
     ):
         prepare = partial(one_pass, passes, catenary=line, pantograph=pantograph)
         found[f"simulate, {line}"] = Row("passes/s", passes, prepare)
+    for speed, passes in ((30, 1), (100, 1), (250, 3), (350, 3), (400, 3)):
+        prepare = partial(one_pass, passes, "en50318-2002", catenary="en50318-2002", speed_kmh=speed)
+        found[f"simulate, en50318-2002 at {speed} km/h"] = Row("passes/s", passes, prepare)
     for name, count in (
         ("Pantograph-v0", 4000),
         ("PantographStiffness-v0", 8000),
