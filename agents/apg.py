@@ -43,7 +43,7 @@ class APG(Algorithm):
     response_steps: Count = Field(
         180, description="control steps after which the response to an action is taken to be over"
     )
-    batch_size: Count = Field(16, description="passes in a step of the optimiser")
+    batch_size: Count = Field(16, description="passes in a step of the optimiser, in groups of eight")
 
     def make_learner(self, lanes: Any, seed: int) -> Any:
         """Learner that takes its passes from the lanes' environments."""

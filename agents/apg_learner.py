@@ -10,7 +10,10 @@ import torch
 from stable_baselines3.common.logger import Logger
 from torch import nn
 
-from .network import Driver, Network
+from panto_env.backend import WIDTH
+
+from .linear_rollout import Group
+from .network import Network
 
 if TYPE_CHECKING:
     from .apg import APG
@@ -36,7 +39,7 @@ class APGLearner:
         self.network = Network(lanes.entries, *shape, settings.recurrent_units)
         self._optimiser = torch.optim.Adam(self.network.parameters())
         self.logger: Logger
-        self._rounds: deque[list[Any]] = deque(maxlen=settings.rounds_kept)
+        self._rounds: deque[list[Group]] = deque(maxlen=settings.rounds_kept)
 
     def get_env(self) -> PassLanes:
         """Where passes are measured."""
@@ -70,8 +73,8 @@ class APGLearner:
         callback.on_training_start({"infos": []}, {})
         while self.num_timesteps < end:
             callback.on_rollout_start()
-            passes, steps = self._lanes.measure(self._settings.actor(self))
-            self._rounds.append(passes)
+            groups, steps = self._lanes.measure(self._settings.actor(self))
+            self._rounds.append(groups)
             self.num_timesteps += steps
             callback.update_locals({"infos": []})
             callback.on_step()
@@ -88,9 +91,10 @@ class APGLearner:
     def _update(self, rate: float) -> float:
         """One step of the optimiser; mean ratio of sigma to passive in its minibatch."""
         settings = self._settings
-        known = [each for own in self._rounds for each in own]
-        chosen = self._random.permutation(len(known))[: settings.batch_size]
-        ratios, actions = self._lanes.rollout([known[each] for each in chosen.tolist()])(Driver(self.network))
+        known = [group for own in self._rounds for group in own]
+        count = max(1, settings.batch_size // WIDTH)
+        chosen = self._random.permutation(len(known))[:count].tolist()
+        ratios, actions = self._lanes.rollout([known[each] for each in chosen])(self.network)
         beyond = [
             torch.relu(self._lanes.share * own.diff().abs() - settings.rate_free).square().mean()
             for own in actions

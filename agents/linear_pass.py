@@ -45,9 +45,10 @@ class LinearPass(NamedTuple):
     observations: Numbers  # (times + 1, entries)
     actions: Numbers  # (times,): of the network, after its washout
     force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
-    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, values + 1): of scaled readings, not of
-    # their deviations, of the action with what a base policy adds, and of the force (N).
-    response: NDArray[np.float16]
+    # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, values + 1), in units of its own: of
+    # scaled readings, not of their deviations, of the action with what a base policy adds, of the force (N).
+    response: NDArray[np.int16]
+    unit: Numbers  # (values + 1,)
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
     passive_variance: float  # of the force without control, where it counts (N^2)
     counted_from: int  # step
@@ -160,7 +161,7 @@ def measure(
         np.array(observations, dtype=np.float32),
         np.array(actions, dtype=np.float32),
         force[:, 0].astype(np.float32),
-        _responses(moved, np.array(pulses)),
+        *_responses(moved, np.array(pulses)),
         _recalled(task, np.array(places), np.array(speeds)),
         float(force[counted + 1 :, -1].var()),
         counted,
@@ -174,17 +175,19 @@ def _filtered(task: Task, count: int) -> NDArray[np.float64]:
     return np.asarray(low_pass(rows, task.plant.time_step)[:, ::every].T)
 
 
-def _responses(moved: NDArray[np.float64], pulses: NDArray[np.float64]) -> NDArray[np.float16]:
-    """Responses at each time to an action of 1 taken 1, 2, .. steps before, (times + 1, length, values).
+def _responses(moved: NDArray[np.float64], pulses: NDArray[np.float64]) -> tuple[NDArray[np.int16], Numbers]:
+    """Responses at each time to an action of 1 taken 1, 2, .. steps before, as moved, and their units.
 
     moved: differences of the lanes with pulses, (times + 1, length, values); pulses: of each step, (times,).
     """
     count, length = len(pulses), moved.shape[1]
-    response = np.zeros(moved.shape, dtype=np.float16)
+    response = np.zeros(moved.shape, dtype=np.float32)
     for ago in range(1, length + 1):
         time = np.arange(ago, count + 1)
         response[time, ago - 1] = moved[time, (time - ago) % length] / pulses[time - ago, None]
-    return response
+    largest = np.abs(response).max(axis=(0, 1))
+    unit = np.where(largest > 0, largest, 1.0) / np.iinfo(np.int16).max
+    return np.rint(response / unit).astype(np.int16), unit.astype(np.float32)
 
 
 def _recalled(task: Task, places: NDArray[np.float64], speeds: NDArray[np.float64]) -> Numbers:

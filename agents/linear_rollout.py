@@ -1,149 +1,225 @@
-"""A policy's network in many linear passes at once, differentiable by torch through whole passes."""
+"""A policy's network in many linear passes at once, with derivatives through whole passes for torch."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from panto_baselines.policies.washout import WashoutSettings
+from panto_env.backend import WIDTH
+from panto_env.base.machine import cores
 from panto_env.control.entries import AVERAGED
 
 from .linear_pass import Columns, LinearPass
+from .network import Network
+from .rollout_arrays import Entries, Given, Slopes, Trace, Washout, Weights
+from .rollout_backward import backward
+from .rollout_forward import forward
 
-Network = Callable[[torch.Tensor], torch.Tensor]
+Numbers = NDArray[np.float32]
+
+
+class Terms(NamedTuple):
+    """What all passes of a training have in common."""
+
+    columns: Columns
+    interval: float  # of control (s)
+    limit: float  # of the actuator's force (N)
+    washout: WashoutSettings | None  # of the action
+
+
+class Judged(NamedTuple):
+    """What a pass is judged by; times are control steps."""
+
+    force: Numbers  # (times + 1,): without a change, as EN 50317 filters it (N)
+    counted_from: int
+    end: int
+    passive_variance: float  # N^2
+
+
+class Group(NamedTuple):
+    """Passes that are driven abreast, at most ``WIDTH``."""
+
+    given: Given
+    judged: list[Judged]
+
+
+def grouped(passes: Sequence[LinearPass]) -> list[Group]:
+    """Passes in groups of similar lengths; one with fewer than ``WIDTH`` is filled with its first pass."""
+    ordered = sorted(passes, key=lambda each: len(each.actions))
+    return [_group(ordered[first : first + WIDTH]) for first in range(0, len(ordered), WIDTH)]
+
+
+def _group(passes: Sequence[LinearPass]) -> Group:
+    judged = [
+        Judged(each.force, each.counted_from, len(each.actions), each.passive_variance) for each in passes
+    ]
+    return Group(_given([*passes, *[passes[0]] * (WIDTH - len(passes))]), judged)
 
 
 class Rollout:
-    """Passes side by side; a network drives them in place of their own policy."""
+    """Groups of passes side by side; a network drives them in place of their own policy."""
 
-    def __init__(
-        self,
-        passes: Sequence[LinearPass],
-        columns: Columns,
-        interval: float,
-        limit: float,
-        washout: WashoutSettings | None,
-    ) -> None:
-        """interval: of control (s); limit: of the actuator's force (N); washout: of the action, if any."""
-        self._columns, self._washout, self._interval, self._limit = columns, washout, interval, limit
-        self._average_share = torch.full((columns.now.shape[1],), 1.0 - math.exp(-interval / AVERAGED))
-        self._average_share[-1] = 0.0  # the action has no average
-        self._ends = [len(each.actions) for each in passes]
-        self.steps = max(self._ends)
-
-        def stacked(values: list[Any]) -> torch.Tensor:
-            """Values of all passes, (steps, passes, ...); zeros after the end of each."""
-            every = np.zeros((self.steps, len(values), *values[0].shape[1:]), dtype=values[0].dtype)
-            for own, value, end in zip(every.swapaxes(0, 1), values, self._ends, strict=True):
-                own[:end] = value[:end]
-            return torch.from_numpy(every)
-
-        self._observations = stacked([each.observations for each in passes])
-        self._actions = stacked([each.actions for each in passes])
-        self._response = stacked([each.response for each in passes])
-        self._force = stacked([each.force for each in passes])
-        recalled = stacked([each.recalled for each in passes]).flatten(2)
-        self._known, self._recalled = recalled >= 0, recalled.clamp(min=0.0)
-        self._counted_from = [each.counted_from for each in passes]
-        self._passive = torch.tensor([each.passive_variance for each in passes])
-        # Within so many steps none of them is remembered.
-        lag = torch.arange(float(self.steps))[:, None, None] - recalled.ceil()
-        self._stretch = max(1, int(lag[self._known].min())) if self._known.any() else self.steps
-        self._into = _selection(columns, self._observations.shape[2])
+    def __init__(self, groups: Sequence[Group], terms: Terms) -> None:
+        """terms: of all passes."""
+        self._groups, self._entries, self._washout = groups, _entries(terms), _washout(terms)
+        self._given = [each.given for each in groups]
 
     def __call__(self, network: Network) -> tuple[torch.Tensor, list[torch.Tensor]]:
-        """Variance of the force, where it counts, over the passive one, (passes,); actions of each pass.
+        """Variance of the force, where it counts, over the passive one, (passes,); actions of each pass."""
+        driven = _Driven.apply(self, network, *network.parameters())  # force and actions of each group
+        ratios, taken = [], []
+        for number, group in enumerate(self._groups):
+            moved, actions = driven[2 * number : 2 * number + 2]
+            for p, own in enumerate(group.judged):
+                counted = slice(own.counted_from + 1, own.end)
+                force = torch.from_numpy(own.force[counted]) + moved[counted, p]
+                ratios.append(force.var(correction=0) / own.passive_variance)
+                taken.append(actions[: own.end, p])
+        return torch.stack(ratios), taken
 
-        network: actions, (passes, 1), for observations, (passes, entries).
-        """
-        lanes, values = self._actions.shape[1], self._columns.now.shape[1]
-        changes = torch.zeros(lanes, self._response.shape[2])  # of the actions 1, 2, .. steps ago
-        told = torch.zeros(lanes, self._columns.now.size)  # changes of the observed values, the latest first
-        averages = torch.zeros(lanes, values)
-        kept: list[torch.Tensor] = []  # changes of the values of each step
-        moved, taken = [], []
-        washout = _Washout(self._washout, self._interval, self._limit, lanes)
-        for first in range(0, self.steps, self._stretch):
-            last = min(first + self._stretch, self.steps)
-            remembered = self._remembered(kept, first, last)
-            for step in range(first, last):
-                change = torch.bmm(changes[:, None], self._response[step].float())[:, 0]
-                moved.append(change[:, -1])
-                now = change[:, :-1]
-                if self._columns.deviate:
-                    averages = averages + self._average_share * (now - averages)
-                    now = now - averages
-                kept.append(now)
-                told = torch.cat([now, told[:, :-values]], dim=1)
-                every = torch.cat([told, remembered[step - first]], dim=1)
-                action = washout(network(self._observations[step] + every @ self._into)[:, 0])
-                taken.append(action)
-                changes = torch.cat([(action - self._actions[step])[:, None], changes[:, :-1]], dim=1)
-        force = (self._force + torch.stack(moved)).T
-        counted = [
-            own[start + 1 : end].var(correction=0)
-            for own, start, end in zip(force, self._counted_from, self._ends, strict=True)
-        ]
-        actions = torch.stack(taken, dim=1)
-        return torch.stack(counted) / self._passive, [
-            own[:end] for own, end in zip(actions, self._ends, strict=True)
-        ]
+    def forward(self, weights: Weights) -> list[Trace]:
+        """Drive all groups."""
 
-    def _remembered(self, kept: list[torch.Tensor], first: int, last: int) -> torch.Tensor:
-        """Changes of what is remembered in steps from first to before last, (steps, passes, values)."""
-        if first < 2:
-            return torch.zeros(last - first, self._recalled.shape[1], 2 * self._recalled.shape[2])
-        when = self._recalled[first:last].clamp(max=first - 1.0)
-        before = when.floor().long().clamp(max=first - 2)
-        share, known = when - before, self._known[first:last]
-        values = torch.stack(kept, dim=1)  # (passes, steps before, values)
+        def drive(given: Given) -> Trace:
+            trace = _trace(given, self._entries, weights)
+            units, values = weights.state.shape[1], len(self._entries.average)
+            sums, averages, actuator = _zeros((2, 3 * units), (values,), (2,))
+            forward(given, self._entries, weights, self._washout, trace, sums, averages, actuator)
+            return trace
 
-        def between(line: torch.Tensor) -> torch.Tensor:
-            steps = last - first
-            at = before.transpose(0, 1).flatten(1)
-            low, high = (
-                torch.gather(line, 1, each).view(len(line), steps, -1).transpose(0, 1)
-                for each in (at, at + 1)
+        return _side_by_side(drive, self._given)
+
+    def backward(
+        self, weights: Weights, traces: list[Trace], by_force: list[Numbers], by_action: list[Numbers]
+    ) -> list[Numbers]:
+        """Derivatives by each array of the weights, from those by force and action, (times, WIDTH)."""
+
+        def differentiate(given: Given, trace: Trace, force: Numbers, action: Numbers) -> list[Numbers]:
+            first, cell, state = (
+                np.zeros((len(action), len(each), WIDTH), np.float32)
+                for each in (weights.first, weights.cell, weights.state)
             )
-            return known * (low + share * (high - low))
+            layers = Slopes(first, cell, state, tuple(np.zeros_like(each) for each in trace.rest))
+            units, values = weights.state.shape[1], len(self._entries.average)
+            work = _zeros((weights.first.shape[1],), (trace.joined.shape[1],), (units,), (values,), (2,))
+            rest = self._entries, weights, self._washout, trace, force, action, layers
+            backward(given, *rest, np.zeros_like(trace.now), work)
+            return _by_weights(trace, layers, units)
 
-        return torch.cat([between(values[:, :, self._columns.of_force]), between(values[:, :, -1])], dim=2)
-
-
-def _selection(columns: Columns, entries: int) -> torch.Tensor:
-    """Matrix from changes to the entries that they change, (changes, entries).
-
-    Changes: of readings and action now and in earlier steps, of the remembered force and actions.
-    """
-    into = [*columns.now.ravel(), *columns.force.ravel(), *columns.acted.ravel()]
-    matrix = torch.zeros(len(into), entries)
-    matrix[torch.arange(len(into)), torch.tensor(np.array(into))] = 1.0
-    return matrix
+        every = _side_by_side(differentiate, self._given, traces, by_force, by_action)
+        return [np.sum(own, axis=0, dtype=np.float32) for own in zip(*every, strict=True)]
 
 
-class _Washout:
-    """``panto_baselines.policies.washout.Washout`` in torch, for actions; none leaves them as they are."""
+class _Driven(torch.autograd.Function):  # type: ignore[misc]
+    """Changes of the force, and actions, of each group by turns, (times, WIDTH), by the parameters."""
 
-    def __init__(self, settings: WashoutSettings | None, interval: float, limit: float, lanes: int) -> None:
-        self._settings, self._interval = settings, interval
-        if settings is not None:
-            self._share = 1.0 - math.exp(-interval / settings.time_constant)
-            self._rate = settings.rate / limit
-            self._average, self._force = torch.zeros(lanes), torch.zeros(lanes)
+    @staticmethod
+    def forward(ctx: Any, rollout: Rollout, network: Network, *_: torch.Tensor) -> Any:
+        ctx.rollout, ctx.weights = rollout, network.weights()
+        ctx.traces = rollout.forward(ctx.weights)
+        pairs = [(np.ascontiguousarray(each.moved[:, -1]), each.taken) for each in ctx.traces]
+        return tuple(torch.from_numpy(each) for pair in pairs for each in pair)
 
-    def __call__(self, requested: torch.Tensor) -> torch.Tensor:
-        """Actions, (lanes,), each in -1..1."""
-        if self._settings is None:
-            return requested.clamp(-1.0, 1.0)
-        left = (requested - self._average).clamp(-1.0, 1.0)
-        ahead, lag, interval = left - self._force, self._settings.lag, self._interval
-        distance = ahead.abs()
-        by_rate = (distance - self._rate * lag).clamp(0.0, self._rate * interval)
-        nearer = -torch.expm1((by_rate / self._rate - interval) / lag) if lag else 1.0
-        self._force = self._force + ahead.sign() * (by_rate + (distance - by_rate) * nearer)
-        self._average = self._average + self._share * self._force
-        return left
+    @staticmethod
+    def backward(ctx: Any, *slopes: torch.Tensor) -> Any:
+        by = [np.ascontiguousarray(each.numpy()) for each in slopes]
+        found = ctx.rollout.backward(ctx.weights, ctx.traces, by[::2], by[1::2])
+        return None, None, *map(torch.from_numpy, found)
+
+
+def _side_by_side(work: Any, *groups: Any) -> list[Any]:
+    """The work for each group, on all cores."""
+    with ThreadPoolExecutor(cores()) as pool:
+        return list(pool.map(work, *groups))
+
+
+def _zeros(*shapes: tuple[int, ...]) -> tuple[Numbers, ...]:
+    return tuple(np.zeros((*shape, WIDTH), dtype=np.float32) for shape in shapes)
+
+
+def _given(group: list[LinearPass]) -> Given:
+    """Passes as the kernels take them; those that are shorter than the longest one end in zeros."""
+    steps = max(len(each.actions) for each in group)
+
+    def padded(values: list[Any], axis: int = -1) -> Any:
+        every = np.zeros((len(values), steps, *values[0].shape[1:]), dtype=values[0].dtype)
+        for own, value in zip(every, values, strict=True):
+            count = min(steps, len(value))
+            own[:count] = value[:count]
+        return np.ascontiguousarray(np.moveaxis(every, 0, axis))
+
+    recalled = padded([each.recalled.reshape(len(each.recalled), -1) for each in group])
+    before = np.floor(recalled).astype(np.int32)
+    return Given(
+        padded([each.observations for each in group]),
+        padded([each.actions for each in group]),
+        padded([each.response for each in group], axis=0),
+        np.array([each.unit for each in group], dtype=np.float32),
+        before,
+        (recalled - before).astype(np.float32),
+    )
+
+
+def _entries(terms: Terms) -> Entries:
+    columns = terms.columns
+    average = np.zeros(columns.now.shape[1], dtype=np.float32)
+    if columns.deviate:
+        average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
+    return Entries(columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average)
+
+
+def _washout(terms: Terms) -> Washout:
+    settings = terms.washout
+    if settings is None:
+        return Washout(0.0, 1.0, 0.0, terms.interval)
+    share = 1.0 - math.exp(-terms.interval / settings.time_constant)
+    return Washout(share, settings.rate / terms.limit, float(settings.lag), terms.interval)
+
+
+def _trace(given: Given, entries: Entries, weights: Weights) -> Trace:
+    """Room for a forward pass."""
+    times, seen, _ = given.observations.shape
+    units, values = weights.state.shape[1], len(entries.average)
+
+    def room(*rows: int) -> Numbers:
+        return np.zeros((times, *rows, WIDTH), dtype=np.float32)
+
+    return Trace(
+        room(values + 1),
+        room(values),
+        room(seen),
+        room(units + len(weights.first)),
+        room(4 * units),
+        tuple(room(len(each)) for each in weights.rest),
+        room(),
+        room(),
+        room(),
+    )
+
+
+def _by_weights(trace: Trace, slopes: Slopes, units: int) -> list[Numbers]:
+    """Derivatives by weights and biases, in the order of a network's parameters."""
+    state = np.concatenate([np.zeros_like(trace.joined[:1, :units]), trace.joined[:-1, :units]])
+    first = trace.joined[:, units:]
+    layers = [(slopes.first, trace.entries)]
+    inputs = [trace.joined, *trace.rest[:-1]]
+    found: list[Numbers] = []
+
+    def add(pairs: Any) -> None:
+        for slope, values in pairs:
+            found.append(np.tensordot(slope, values, axes=((0, 2), (0, 2))))
+        found.extend(slope.sum(axis=(0, 2)) for slope, _ in pairs)
+
+    add(layers)
+    if units:
+        add([(slopes.cell, first), (slopes.state, state)])
+    for pair in zip(slopes.rest, inputs, strict=True):
+        add([pair])
+    return found

@@ -5,10 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import torch
 from torch import nn
 
 from .recurrent_actor import Cell
+from .rollout_arrays import Weights
 
 FIRST = 0.01
 """Factor on the last layer's initial weights: the first passes are nearly passive."""
@@ -29,17 +31,17 @@ class Network(nn.Module):  # type: ignore[misc]
             self.rest[-1].weight *= FIRST
             self.rest[-1].bias.zero_()
 
-    def forward(
-        self, observations: torch.Tensor, state: torch.Tensor | None = None
-    ) -> tuple[torch.Tensor, torch.Tensor | None]:
-        """Actions, (passes, 1), and the cell's state, (passes, units), zero at first, None without a cell."""
-        values = self.activation(self.first(observations))
+    def weights(self) -> Weights:
+        """Its parameters, in their order, for the kernels of a rollout."""
+        first, first_bias, *others = (each.detach().numpy() for each in self.parameters())
+        cell = [np.zeros((0, len(first)), np.float32), np.zeros((0, 0), np.float32)]
+        biases = [np.zeros(0, np.float32)] * 2
         if self.cell is not None:
-            state = self.cell(values, state)
-            values = torch.cat([state, values], dim=1)
-        for layer in self.rest[:-1]:
-            values = self.activation(layer(values))
-        return torch.tanh(self.rest[-1](values)), state
+            *cell, biases[0], biases[1] = others[:4]
+            others = others[4:]
+        relu = isinstance(self.activation, nn.ReLU)
+        rest = tuple(others[::2]), tuple(others[1::2])
+        return Weights(first, first_bias, cell[0], biases[0], cell[1], biases[1], *rest, relu)
 
     def arrays(self) -> Cell | None:
         """The cell's arrays, if it has one."""
@@ -47,16 +49,3 @@ class Network(nn.Module):  # type: ignore[misc]
             return None
         own = self.cell.weight_ih, self.cell.weight_hh, self.cell.bias_ih, self.cell.bias_hh
         return Cell(*(each.detach().numpy().copy() for each in own))
-
-
-class Driver:
-    """A network in one rollout: it keeps the cell's state."""
-
-    def __init__(self, network: Network) -> None:
-        self._network = network
-        self._state: torch.Tensor | None = None
-
-    def __call__(self, observations: torch.Tensor) -> torch.Tensor:
-        """Actions, (passes, 1), for the next observations, (passes, entries)."""
-        actions, self._state = self._network(observations, self._state)
-        return torch.as_tensor(actions)

@@ -16,7 +16,7 @@ from panto_env.policies import Policy, find_policy
 
 from .actor import Actor
 from .linear_pass import Base, LinearPass, columns_of, measure
-from .linear_rollout import Rollout
+from .linear_rollout import Group, Rollout, Terms, grouped
 from .settings import Training
 from .washout_policy import WashedOut
 
@@ -31,9 +31,10 @@ class PassLanes:
         """length: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
         self._settings = [run_settings(own) for own in training.environments]
         context = Task(on_example(self._settings[0])).context(0)
-        self.columns = columns_of(context.layout)
         self.entries, self.count = len(context.layout.entries), training.lanes
-        self._interval, self._limit = context.control_interval, context.force_limit
+        self.terms = Terms(
+            columns_of(context.layout), context.control_interval, context.force_limit, training.washout
+        )
         self._washout, self._length = training.washout, length
         self._base = (
             None if training.residual_of is None else _base(training.residual_of, training.residual_share)
@@ -45,7 +46,7 @@ class PassLanes:
         """Draw the passes' seeds, which are for training, from this one on."""
         self._random = np.random.default_rng(seed)
 
-    def measure(self, actor: Actor) -> tuple[list[LinearPass], int]:
+    def measure(self, actor: Actor) -> tuple[list[Group], int]:
         """One round of passes under a network, and the environment steps that they took.
 
         Raises InputError where pass after pass ends early.
@@ -63,11 +64,11 @@ class PassLanes:
                 if failures == MOST_FAILURES:
                     raise
         self.seconds += time.perf_counter() - start
-        return passes, (self._length + 2) * sum(len(each.actions) for each in passes)
+        return grouped(passes), (self._length + 2) * sum(len(each.actions) for each in passes)
 
-    def rollout(self, passes: list[LinearPass]) -> Rollout:
-        """These passes side by side, for a network in torch."""
-        return Rollout(passes, self.columns, self._interval, self._limit, self._washout)
+    def rollout(self, groups: list[Group]) -> Rollout:
+        """These groups side by side, for a network."""
+        return Rollout(groups, self.terms)
 
     def close(self) -> None:
         """Do nothing: nothing is open."""

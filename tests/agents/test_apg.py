@@ -14,15 +14,13 @@ import torch
 
 from panto_agents.apg_learner import APGLearner
 from panto_agents.linear_pass import LinearPass, measure
-from panto_agents.linear_rollout import _Washout
-from panto_agents.network import Driver
+from panto_agents.linear_rollout import grouped
 from panto_agents.pass_lanes import PassLanes
 from panto_agents.policy import load
 from panto_agents.settings import Training, parse_training
 from panto_agents.train import train
 from panto_agents.washout_policy import WashedOut
 from panto_baselines.benchmark.seeds import TRAINING
-from panto_baselines.policies.washout import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.metrics.low_pass import low_pass
 
@@ -101,7 +99,7 @@ def test_a_network_repeats_its_own_pass(case):
     """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
     _, made, _, own = case
     with torch.no_grad():
-        ratios, actions = made.get_env().rollout([own])(Driver(made.network))
+        ratios, actions = made.get_env().rollout(grouped([own]))(made.network)
     assert np.sqrt(np.mean(own.actions**2)) > 0.05
     np.testing.assert_allclose(actions[0].numpy(), own.actions, atol=1e-5)
     expected = own.force[own.counted_from + 1 : -1].astype(float).var() / own.passive_variance
@@ -112,7 +110,7 @@ def test_the_gradient_is_that_of_the_plant(case):
     """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
     training, made, seed, own = case
     parameters = list(made.network.parameters())
-    ratios, _ = made.get_env().rollout([own])(Driver(made.network))
+    ratios, _ = made.get_env().rollout(grouped([own]))(made.network)
     slopes = torch.autograd.grad(ratios[0], parameters)
     torch.manual_seed(3)
     for direction in (slopes, [torch.randn_like(each) for each in parameters]):
@@ -135,7 +133,7 @@ def test_responses_are_those_of_single_pulses():
     other = measure(lanes._settings[0], _Script({60: 0.1}), TRAINING[0], LENGTH)
     moved, after = other.force - own.force, np.arange(61, 61 + 60)
     np.testing.assert_allclose(moved[:61], 0.0, atol=1e-9)
-    told = 0.1 * own.response[after, after - 61, -1].astype(float)
+    told = 0.1 * own.unit[-1] * own.response[after, after - 61, -1].astype(float)
     assert told.std() > 0.3
     np.testing.assert_allclose(moved[after], told, atol=0.15 * np.abs(told).max())
 
@@ -170,14 +168,6 @@ class _Script:
     def act(self, observation: Any) -> Any:
         self._step += 1
         return np.array([self._actions.get(self._step, 0.0)])
-
-
-def test_the_washout_in_torch_is_that_of_the_policies():
-    random, given = np.random.default_rng(0), WashoutSettings(time_constant=0.3)
-    requested = np.cumsum(random.normal(0, 0.3, (200, 3)), axis=0).clip(-1, 1)
-    own, known = _Washout(given, 0.01, 100.0, 3), Washout(given, 0.01, 100.0, (3,))
-    for each in requested:
-        np.testing.assert_allclose(own(torch.tensor(each)).numpy(), known(100 * each) / 100, atol=1e-6)
 
 
 def test_a_training_lowers_sigma_and_its_model_runs_as_a_policy(tmp_path):
