@@ -43,7 +43,16 @@ class APG(Algorithm):
     response_steps: Count = Field(
         180, description="control steps after which the response to an action is taken to be over"
     )
+    pulse_spacing: Count = Field(
+        3, description="every how many actions a response is measured; those between are interpolated"
+    )
     batch_size: Count = Field(16, description="passes in a step of the optimiser, in groups of eight")
+
+    def pulsing(self) -> Any:
+        """How responses are measured, as ``linear_pass`` takes it."""
+        from .linear_pass import Pulsing
+
+        return Pulsing(self.response_steps, self.pulse_spacing)
 
     def make_learner(self, lanes: Any, seed: int) -> Any:
         """Learner that takes its passes from the lanes' environments."""

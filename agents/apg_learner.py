@@ -75,6 +75,8 @@ class APGLearner:
             callback.on_rollout_start()
             groups, steps = self._lanes.measure(self._settings.actor(self))
             self._rounds.append(groups)
+            own = [judged.ratio for group in groups for judged in group.judged]
+            self.logger.record("rollout/std_ratio", float(np.mean(own)))  # of passes not learnt from yet
             self.num_timesteps += steps
             callback.update_locals({"infos": []})
             callback.on_step()

@@ -29,7 +29,7 @@ def make_lanes(training: Training) -> Any:
     if isinstance(training.hyperparameters, APG):
         from .pass_lanes import PassLanes
 
-        return PassLanes(training, training.hyperparameters.response_steps)
+        return PassLanes(training, training.hyperparameters.pulsing())
     parts = [_part(training, changes) for changes in training.variants or ({},)]
     return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
 

@@ -1,8 +1,9 @@
 """Passes as exact linear models: what a small change of any action does to all that follows.
 
 Lanes of one task run the same pass, on the same line under the same noise, with the actions that a policy
-takes in the first of them; in each of the others every n-th action is pulsed. The differences are the columns
-of the plant's derivative along the policy's own trajectory: with waves, slack droppers, actuator and sensors.
+takes in the first of them; in each of the others some actions, far apart, are pulsed. The differences are
+columns of the plant's derivative along the policy's own trajectory: with waves, slack droppers, actuator and
+sensors.
 """
 
 from __future__ import annotations
@@ -99,19 +100,33 @@ class Base(NamedTuple):
     share: float  # part of the actuator's limit that the network may add
 
 
+class Pulsing(NamedTuple):
+    """How responses are measured."""
+
+    length: int  # control steps after which the response to an action is taken to be over
+    spacing: int  # every how many actions one is pulsed
+
+    @property
+    def lanes(self) -> int:
+        """Lanes with pulses: in each of them one response is over before the next begins."""
+        return -(-self.length // self.spacing)
+
+
 def measure(
-    settings: RunSettings, policy: Policy, seed: int, length: int, base: Base | None = None
+    settings: RunSettings, policy: Policy, seed: int, pulsing: Pulsing, base: Base | None = None
 ) -> LinearPass:
     """The pass of a policy under a seed, on a line and at a speed drawn by it.
 
-    length: control steps after which the response to an action is taken to be over. base: to which the policy
-    adds; it reacts to pulses. Raises InputError where the pass ends early, or for settings that do not fit.
+    base: to which the policy adds; it reacts to pulses. Raises InputError where the pass ends early, or for
+    settings that do not fit.
     """
     random = np.random.default_rng(seed)
     drawn = on_drawn_line(settings, lambda: random)
     speed = float(random.uniform(*drawn.speed_kmh))
     # A pass begins at the line's start, as those of a benchmark do.
-    task = Task(drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}), lanes=length + 2)
+    task = Task(
+        drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}), lanes=pulsing.lanes + 2
+    )
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
     context = task.context(0)
@@ -143,10 +158,12 @@ def measure(
         under = np.zeros(task.lanes)
         if base is not None:
             under = np.clip(base.law.forces(seen) / context.force_limit, -1.0, 1.0)
-        actions.append(float(policy.act(seen[0])[0]))
-        every = np.full(task.lanes, actions[-1])
-        pulses.append((-PULSE if under[0] + share * actions[-1] > 0 else PULSE) / share)
-        every[1 + (len(actions) - 1) % length] += pulses[-1]
+        every = np.full(task.lanes, float(policy.act(seen[0])[0]))
+        if len(actions) % pulsing.spacing == 0:
+            lane = 1 + len(pulses) % pulsing.lanes
+            pulses.append((-PULSE if under[0] + share * every[0] > 0 else PULSE) / share)
+            every[lane] += pulses[-1]
+        actions.append(every[0])
         total = np.clip(under + share * every, -1.0, 1.0)
         total[-1] = 0.0
         task.step(total[:, None])
@@ -161,7 +178,7 @@ def measure(
         np.array(observations, dtype=np.float32),
         np.array(actions, dtype=np.float32),
         force[:, 0].astype(np.float32),
-        *_responses(moved, np.array(pulses)),
+        *_responses(moved, np.array(pulses), pulsing),
         _recalled(task, np.array(places), np.array(speeds)),
         float(force[counted + 1 :, -1].var()),
         counted,
@@ -175,16 +192,25 @@ def _filtered(task: Task, count: int) -> NDArray[np.float64]:
     return np.asarray(low_pass(rows, task.plant.time_step)[:, ::every].T)
 
 
-def _responses(moved: NDArray[np.float64], pulses: NDArray[np.float64]) -> tuple[NDArray[np.int16], Numbers]:
-    """Responses at each time to an action of 1 taken 1, 2, .. steps before, as moved, and their units.
+def _responses(
+    moved: NDArray[np.float64], pulses: NDArray[np.float64], pulsing: Pulsing
+) -> tuple[NDArray[np.int16], Numbers]:
+    """Responses at each time to an action of 1 taken 1, 2, .. steps before, and their units.
 
-    moved: differences of the lanes with pulses, (times + 1, length, values); pulses: of each step, (times,).
+    moved: differences of the lanes with pulses, (times + 1, lanes, values); pulses: of the pulsed actions.
+    Between two of these, responses after equal times are interpolated.
     """
-    count, length = len(pulses), moved.shape[1]
-    response = np.zeros(moved.shape, dtype=np.float32)
-    for ago in range(1, length + 1):
-        time = np.arange(ago, count + 1)
-        response[time, ago - 1] = moved[time, (time - ago) % length] / pulses[time - ago, None]
+    count, ago = len(moved) - 1, np.arange(1, pulsing.length + 1)
+    number = np.arange(len(pulses))
+    time = pulsing.spacing * number[:, None] + ago
+    own = moved[np.minimum(time, count), (number % pulsing.lanes)[:, None]] / pulses[:, None, None]
+    own[1:] = np.where((time[1:] > count)[..., None], own[:-1], own[1:])  # the pass ended before
+    response = np.zeros((count + 1, pulsing.length, moved.shape[2]), dtype=np.float32)
+    for each in ago:
+        place = np.arange(count + 1 - each) / pulsing.spacing
+        before = place.astype(int)
+        share, after = (place - before)[:, None], np.minimum(before + 1, len(own) - 1)
+        response[each:, each - 1] = (1 - share) * own[before, each - 1] + share * own[after, each - 1]
     largest = np.abs(response).max(axis=(0, 1))
     unit = np.where(largest > 0, largest, 1.0) / np.iinfo(np.int16).max
     return np.rint(response / unit).astype(np.int16), unit.astype(np.float32)

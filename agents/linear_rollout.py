@@ -42,6 +42,11 @@ class Judged(NamedTuple):
     end: int
     passive_variance: float  # N^2
 
+    @property
+    def ratio(self) -> float:
+        """Sigma over that without control, of the pass as it was measured."""
+        return math.sqrt(float(self.force[self.counted_from + 1 : self.end].var()) / self.passive_variance)
+
 
 class Group(NamedTuple):
     """Passes that are driven abreast, at most ``WIDTH``."""

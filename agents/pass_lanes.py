@@ -15,7 +15,7 @@ from panto_env.control.settings import run_settings
 from panto_env.policies import Policy, find_policy
 
 from .actor import Actor
-from .linear_pass import Base, LinearPass, columns_of, measure
+from .linear_pass import Base, LinearPass, Pulsing, columns_of, measure
 from .linear_rollout import Group, Rollout, Terms, grouped
 from .settings import Training
 from .washout_policy import WashedOut
@@ -27,15 +27,15 @@ MOST_FAILURES = 20
 class PassLanes:
     """Measures passes of a policy in a training's environments, by turns."""
 
-    def __init__(self, training: Training, length: int) -> None:
-        """length: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
+    def __init__(self, training: Training, pulsing: Pulsing) -> None:
+        """pulsing: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
         self._settings = [run_settings(own) for own in training.environments]
         context = Task(on_example(self._settings[0])).context(0)
         self.entries, self.count = len(context.layout.entries), training.lanes
         self.terms = Terms(
             columns_of(context.layout), context.control_interval, context.force_limit, training.washout
         )
-        self._washout, self._length = training.washout, length
+        self._washout, self._pulsing = training.washout, pulsing
         self._base = (
             None if training.residual_of is None else _base(training.residual_of, training.residual_share)
         )
@@ -57,14 +57,14 @@ class PassLanes:
             seed = TRAINING[int(self._random.integers(len(TRAINING)))]
             try:
                 settings = self._settings[len(passes) % len(self._settings)]
-                passes.append(measure(settings, policy, seed, self._length, self._base))
+                passes.append(measure(settings, policy, seed, self._pulsing, self._base))
                 failures = 0
             except InputError:
                 failures += 1
                 if failures == MOST_FAILURES:
                     raise
         self.seconds += time.perf_counter() - start
-        return grouped(passes), (self._length + 2) * sum(len(each.actions) for each in passes)
+        return grouped(passes), (self._pulsing.lanes + 2) * sum(len(each.actions) for each in passes)
 
     def rollout(self, groups: list[Group]) -> Rollout:
         """These groups side by side, for a network."""

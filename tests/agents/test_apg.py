@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from panto_agents.apg_learner import APGLearner
-from panto_agents.linear_pass import LinearPass, measure
+from panto_agents.linear_pass import LinearPass, Pulsing, measure
 from panto_agents.linear_rollout import grouped
 from panto_agents.pass_lanes import PassLanes
 from panto_agents.policy import load
@@ -24,7 +24,7 @@ from panto_baselines.benchmark.seeds import TRAINING
 from panto_env import InputError, simulate
 from panto_env.metrics.low_pass import low_pass
 
-LENGTH = 400
+PULSING = Pulsing(400, 1)
 """Longer than the passes: nothing of a response is neglected."""
 MEMORY = {"history": 2, "memory": [0.0, 0.05, 0.1], "memory_spans": 2, "harmonics": 2}
 
@@ -60,7 +60,7 @@ def settings(**changes: Any) -> Training:
 
 def learner(training: Training) -> APGLearner:
     """A learner with a network that acts, by more than 5 N rms."""
-    made = APGLearner(training.hyperparameters, PassLanes(training, LENGTH), training.seed)
+    made = APGLearner(training.hyperparameters, PassLanes(training, PULSING), training.seed)
     with torch.no_grad():
         made.network.rest[-1].weight *= 60
     return made
@@ -69,7 +69,7 @@ def learner(training: Training) -> APGLearner:
 def own_pass(made: APGLearner, training: Training, seed: int) -> LinearPass:
     """The pass of a learner's network."""
     lanes, policy = made.get_env(), WashedOut(training.hyperparameters.actor(made), training.washout)
-    return measure(lanes._settings[0], policy, seed, LENGTH, lanes._base)
+    return measure(lanes._settings[0], policy, seed, PULSING, lanes._base)
 
 
 def ratio(made: APGLearner, training: Training, seed: int) -> float:
@@ -128,9 +128,9 @@ def test_the_gradient_is_that_of_the_plant(case):
 def test_responses_are_those_of_single_pulses():
     """A command pulse in the plant moves force and readings as the column of its step says."""
     training = settings()
-    lanes = PassLanes(training, LENGTH)
-    own = measure(lanes._settings[0], _Script({}), TRAINING[0], LENGTH)
-    other = measure(lanes._settings[0], _Script({60: 0.1}), TRAINING[0], LENGTH)
+    lanes = PassLanes(training, PULSING)
+    own = measure(lanes._settings[0], _Script({}), TRAINING[0], PULSING)
+    other = measure(lanes._settings[0], _Script({60: 0.1}), TRAINING[0], PULSING)
     moved, after = other.force - own.force, np.arange(61, 61 + 60)
     np.testing.assert_allclose(moved[:61], 0.0, atol=1e-9)
     told = 0.1 * own.unit[-1] * own.response[after, after - 61, -1].astype(float)
@@ -141,8 +141,8 @@ def test_responses_are_those_of_single_pulses():
 def test_a_pass_is_that_of_simulate():
     """The force, filtered along the whole record, and the passive variance where an episode counts."""
     training = settings(environment={"settle": 2, "distance": 150.0})
-    lanes = PassLanes(training, 10)
-    own = measure(lanes._settings[0], _Script({60: 0.5}), TRAINING[0], 10)
+    lanes = PassLanes(training, Pulsing(10, 1))
+    own = measure(lanes._settings[0], _Script({60: 0.5}), TRAINING[0], Pulsing(10, 1))
     given = {"accuracy": "fast", "speed_kmh": 300, "line_condition": "as-built", "distance": 150.0 + 120}
     given |= {"actuator": "realistic", "sensors": "realistic", "pantograph_scatter": 0.05, "speed_drift": 0.5}
     environment = training.environments[0]
