@@ -192,7 +192,7 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     train(settings(total_steps=200_000), tmp_path / "run", resume=True, progress=False)
     second = load(folder.model).facts
     assert second.steps > first.steps
-    assert second.updates == 2 * first.updates == 4
+    assert second.updates / first.updates == second.steps / first.steps  # all rounds are alike
 
 
 @pytest.mark.parametrize(
