@@ -36,6 +36,10 @@ class APG(Algorithm):
     rate_free: NonNegative = Field(
         0.25, description="change of the action in a control step that costs nothing: the actuator's limit"
     )
+    mean_weight: NonNegative = Field(
+        0.1,
+        description="weight of the square of the mean force's shift beyond 0.5 %, in halves of a per cent",
+    )
     max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
     recurrent_units: Annotated[int, Field(ge=0, le=MOST_UNITS, strict=True)] = Field(
         0, description="width of a gated recurrent unit after the first layer; 0: none"

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 MOST = 4.0
 """Maximum ratio of variances that has a gradient."""
+SHIFT_FREE = 0.005
+"""Relative shift of the mean force that costs nothing: a third of what a benchmark allows."""
 
 
 class APGLearner:
@@ -96,13 +98,15 @@ class APGLearner:
         known = [group for own in self._rounds for group in own]
         count = max(1, settings.batch_size // WIDTH)
         chosen = self._random.permutation(len(known))[:count].tolist()
-        ratios, actions = self._lanes.rollout([known[each] for each in chosen])(self.network)
+        ratios, shifts, actions = self._lanes.rollout([known[each] for each in chosen])(self.network)
         beyond = [
             torch.relu(self._lanes.share * own.diff().abs() - settings.rate_free).square().mean()
             for own in actions
         ]
         # A pass worse than without control is learnt from, but does not outweigh all others.
         loss = ratios.clamp(max=MOST).mean() + settings.rate_weight * torch.stack(beyond).mean()
+        shifted = torch.relu(shifts.abs() - SHIFT_FREE) / SHIFT_FREE
+        loss = loss + settings.mean_weight * shifted.square().clamp(max=MOST).mean()
         for group in self._optimiser.param_groups:
             group["lr"] = rate
         self._optimiser.zero_grad()

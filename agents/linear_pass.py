@@ -51,7 +51,8 @@ class LinearPass(NamedTuple):
     response: NDArray[np.int16]
     unit: Numbers  # (values + 1,)
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
-    passive_variance: float  # of the force without control, where it counts (N^2)
+    passive_mean: float  # of the force without control, where it counts (N)
+    passive_variance: float  # likewise (N^2)
     counted_from: int  # step
 
 
@@ -174,13 +175,15 @@ def measure(
     force = _filtered(task, count)
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
     counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps
+    passive = force[counted + 1 :, -1]
     return LinearPass(
         np.array(observations, dtype=np.float32),
         np.array(actions, dtype=np.float32),
         force[:, 0].astype(np.float32),
         *_responses(moved, np.array(pulses), pulsing),
         _recalled(task, np.array(places), np.array(speeds)),
-        float(force[counted + 1 :, -1].var()),
+        float(passive.mean()),
+        float(passive.var()),
         counted,
     )
 

@@ -40,6 +40,7 @@ class Judged(NamedTuple):
     force: Numbers  # (times + 1,): without a change, as EN 50317 filters it (N)
     counted_from: int
     end: int
+    passive_mean: float  # N
     passive_variance: float  # N^2
 
     @property
@@ -63,9 +64,18 @@ def grouped(passes: Sequence[LinearPass]) -> list[Group]:
 
 def _group(passes: Sequence[LinearPass]) -> Group:
     judged = [
-        Judged(each.force, each.counted_from, len(each.actions), each.passive_variance) for each in passes
+        Judged(each.force, each.counted_from, len(each.actions), each.passive_mean, each.passive_variance)
+        for each in passes
     ]
     return Group(_given([*passes, *[passes[0]] * (WIDTH - len(passes))]), judged)
+
+
+class Driven(NamedTuple):
+    """Passes as a network drives them, with derivatives by its parameters."""
+
+    ratios: torch.Tensor  # (passes,): variance of the force, where it counts, over the passive one
+    shifts: torch.Tensor  # (passes,): of the mean force, relative to the passive one
+    actions: list[torch.Tensor]  # of each pass, (times,)
 
 
 class Rollout:
@@ -76,18 +86,19 @@ class Rollout:
         self._groups, self._entries, self._washout = groups, _entries(terms), _washout(terms)
         self._given = [each.given for each in groups]
 
-    def __call__(self, network: Network) -> tuple[torch.Tensor, list[torch.Tensor]]:
-        """Variance of the force, where it counts, over the passive one, (passes,); actions of each pass."""
-        driven = _Driven.apply(self, network, *network.parameters())  # force and actions of each group
-        ratios, taken = [], []
+    def __call__(self, network: Network) -> Driven:
+        """What the network makes of the passes."""
+        driven = _Driving.apply(self, network, *network.parameters())  # force and actions of each group
+        ratios, shifts, taken = [], [], []
         for number, group in enumerate(self._groups):
             moved, actions = driven[2 * number : 2 * number + 2]
             for p, own in enumerate(group.judged):
                 counted = slice(own.counted_from + 1, own.end)
                 force = torch.from_numpy(own.force[counted]) + moved[counted, p]
                 ratios.append(force.var(correction=0) / own.passive_variance)
+                shifts.append(force.mean() / own.passive_mean - 1.0)
                 taken.append(actions[: own.end, p])
-        return torch.stack(ratios), taken
+        return Driven(torch.stack(ratios), torch.stack(shifts), taken)
 
     def forward(self, weights: Weights) -> list[Trace]:
         """Drive all groups."""
@@ -122,7 +133,7 @@ class Rollout:
         return [np.sum(own, axis=0, dtype=np.float32) for own in zip(*every, strict=True)]
 
 
-class _Driven(torch.autograd.Function):  # type: ignore[misc]
+class _Driving(torch.autograd.Function):  # type: ignore[misc]
     """Changes of the force, and actions, of each group by turns, (times, WIDTH), by the parameters."""
 
     @staticmethod

@@ -99,7 +99,7 @@ def test_a_network_repeats_its_own_pass(case):
     """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
     _, made, _, own = case
     with torch.no_grad():
-        ratios, actions = made.get_env().rollout(grouped([own]))(made.network)
+        ratios, _, actions = made.get_env().rollout(grouped([own]))(made.network)
     assert np.sqrt(np.mean(own.actions**2)) > 0.05
     np.testing.assert_allclose(actions[0].numpy(), own.actions, atol=1e-5)
     expected = own.force[own.counted_from + 1 : -1].astype(float).var() / own.passive_variance
@@ -110,7 +110,7 @@ def test_the_gradient_is_that_of_the_plant(case):
     """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
     training, made, seed, own = case
     parameters = list(made.network.parameters())
-    ratios, _ = made.get_env().rollout(grouped([own]))(made.network)
+    ratios, _, _ = made.get_env().rollout(grouped([own]))(made.network)
     slopes = torch.autograd.grad(ratios[0], parameters)
     torch.manual_seed(3)
     for direction in (slopes, [torch.randn_like(each) for each in parameters]):

@@ -44,6 +44,7 @@ def a_pass(seed: int, times: int) -> LinearPass:
         response,
         np.full(VALUES + 1, 1e-4, dtype=np.float32),
         np.where(recalled < 0, -1.0, recalled).astype(np.float32),
+        100.0,
         300.0,
         20,
     )
@@ -77,16 +78,19 @@ def test_rollouts_and_their_derivatives_are_those_of_torch(given):
     if not own.get("memory", True):
         passes = [each._replace(recalled=each.recalled[:, :, :0]) for each in passes]
     groups = grouped(passes)
-    ratios, actions = Rollout(groups, common)(network)
-    loss = (ratios * torch.arange(1.0, 12)).sum() + sum((each.diff() ** 2).sum() for each in actions)
+    ratios, shifts, actions = Rollout(groups, common)(network)
+    loss = (ratios * torch.arange(1.0, 12)).sum() + (shifts**2).sum()
+    loss = loss + sum((each.diff() ** 2).sum() for each in actions)
     found = torch.autograd.grad(loss, list(network.parameters()))
     loss_in_torch, ordered = 0.0, sorted(passes, key=lambda each: len(each.actions))
     for number, each in enumerate(ordered):
         force, acted = driven(network, each, common)
         np.testing.assert_allclose(actions[number].detach(), acted.detach(), atol=2e-5)
-        ratio = force[each.counted_from + 1 :].var(correction=0) / each.passive_variance
+        counted = force[each.counted_from + 1 :]
+        ratio = counted.var(correction=0) / each.passive_variance
         assert ratios[number].item() == pytest.approx(ratio.item(), rel=1e-4)
         loss_in_torch = loss_in_torch + (number + 1) * ratio + (acted.diff() ** 2).sum()
+        loss_in_torch = loss_in_torch + (counted.mean() / each.passive_mean - 1) ** 2
     expected = torch.autograd.grad(loss_in_torch, list(network.parameters()))
     assert max(float(each.abs().max()) for each in expected) > 0.1
     for a, b in zip(found, expected, strict=True):
