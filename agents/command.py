@@ -141,7 +141,7 @@ def evaluate(
     driver = find_policy(policy)
     environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
     environment = environment | settings
-    chosen = speed or speeds(environment)
+    chosen = speed or speeds(arguments(environment))
     check_passes(2 * seeds * len(chosen), "This evaluation")
     judged_on = range(TEST.start, TEST.start + seeds)
     check_seeds(judged_on, "test")

@@ -45,7 +45,7 @@ class Evaluation(Settings):
 
     interval_steps: Count = Field(description="training steps between evaluations")
     speeds_kmh: tuple[Positive, ...] | None = Field(
-        None, description="speeds (km/h); the ends and the middle of the training's by default"
+        None, description="speeds (km/h); the ends and the middle of each environment's by default"
     )
     seeds: Count = Field(1, description="runs at each speed, with seeds for selection: 1000, 1001, ...")
 
@@ -100,10 +100,9 @@ class Training(Settings):
         """Arguments of each variant's environment, or of the only one."""
         return tuple(arguments(self.environment | changes) for changes in self.variants or ({},))
 
-    @property
-    def speeds_kmh(self) -> tuple[float, ...]:
-        """Speeds of the evaluation (km/h)."""
-        return self.evaluation.speeds_kmh or speeds(self.environment)
+    def speeds_in(self, own: Mapping[str, Any]) -> tuple[float, ...]:
+        """Speeds of the evaluation in one of the environments (km/h)."""
+        return self.evaluation.speeds_kmh or speeds(own)
 
 
 def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
@@ -119,9 +118,9 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     return {**IDS[name], **own}
 
 
-def speeds(environment: Mapping[str, Any]) -> tuple[float, ...]:
-    """Minimum, middle and maximum of an environment's range of speeds, or its single speed (km/h)."""
-    low, high = run_settings(arguments(environment)).speeds
+def speeds(own: Mapping[str, Any]) -> tuple[float, ...]:
+    """Minimum, middle and maximum speed of an environment, by its arguments, or its single speed (km/h)."""
+    low, high = run_settings(own).speeds
     return tuple(sorted({round(to_kmh(v), 6) for v in (low, (low + high) / 2, high)}))
 
 

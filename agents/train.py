@@ -79,7 +79,7 @@ class Run:
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
         check_seeds(chosen_by, "selection")
         self._comparisons = [
-            Comparison(each, training.speeds_kmh, chosen_by) for each in training.environments
+            Comparison(each, training.speeds_in(each), chosen_by) for each in training.environments
         ]
         self._seed_lanes()
 

@@ -74,6 +74,13 @@ def test_a_training_learns_from_all_and_evaluates_all(tmp_path):
     assert rows[0]["passive_std"] != rows[1]["passive_std"]
 
 
+def test_each_variant_is_evaluated_at_its_own_speeds_unless_they_are_given():
+    training = settings(evaluation={"interval_steps": 256})
+    assert [training.speeds_in(own) for own in training.environments] == [(250.0,), (280.0,)]
+    training = settings()
+    assert [training.speeds_in(own) for own in training.environments] == [(250.0,), (250.0,)]
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
