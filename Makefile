@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark test lint docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
+.PHONY: demo benchmark cards test lint docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -49,6 +49,10 @@ SITE := docs/_build/html
 docs: $(READY)
 	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs $(SITE)
 	@echo "The site is $(SITE)/index.html; it needs no network."
+
+# The cards of the stored agents, after a benchmark or a change of docs/agents.md.
+cards: $(READY)
+	$(BIN)/python -m tests.cards
 
 # The notebook of the examples, run anew; what it prints and draws is stored in it.
 notebook: $(READY)
