@@ -16,7 +16,7 @@ KINDS: dict[Kind, str] = {
     "training": "algorithm",
     "benchmark": "lines",
     "oracle": "cells",
-    "ablation": "variants",
+    "ablation": "judged_by",
     "dataset": "sets",
     "designs": "ranges",
 }
