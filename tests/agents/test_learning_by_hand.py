@@ -142,9 +142,9 @@ def test_a_task_that_differs_is_named_by_its_first_difference(name, both_ways):
 
 
 def test_an_environment_s_speeds_are_the_ends_and_the_middle_of_its_range():
-    assert speeds({"id": "Pantograph-v0"}) == (200.0, 275.0, 350.0)
-    assert speeds({"id": "Pantograph-v0", "speed_kmh": (201.0, 302.0)}) == (201.0, 251.5, 302.0)
-    assert speeds({"id": "Pantograph-v0", "speed_kmh": 250.0}) == (250.0,)
+    assert speeds(arguments({"id": "Pantograph-v0"})) == (200.0, 275.0, 350.0)
+    assert speeds(arguments({"id": "Pantograph-v0", "speed_kmh": (201.0, 302.0)})) == (201.0, 251.5, 302.0)
+    assert speeds(arguments({"id": "Pantograph-v0", "speed_kmh": 250.0})) == (250.0,)
     given = arguments({"id": "Pantograph-v0", "speed_kmh": 250.0, "accuracy": "fast"})
     assert given == IDS["Pantograph-v0"] | {"speed_kmh": 250.0, "accuracy": "fast"}
     for name in ("Pantograf-v0", None, 3, ["Pantograph-v0"]):
