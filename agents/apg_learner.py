@@ -10,6 +10,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 from torch import nn
 
+from panto_baselines.benchmark.statistics import MOVED
 from panto_env.backend import WIDTH
 
 from .linear_rollout import Group
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 MOST = 4.0
 """Maximum ratio of variances that has a gradient."""
-SHIFT_FREE = 0.005
+SHIFT_FREE = MOVED / 3
 """Relative shift of the mean force that costs nothing: a third of what a benchmark allows."""
 
 

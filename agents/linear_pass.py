@@ -1,4 +1,4 @@
-"""Passes as exact linear models: what a small change of any action does to all that follows.
+"""Passes as linear models: what a small change of any action does to all that follows.
 
 Lanes of one task run the same pass, on the same line under the same noise, with the actions that a policy
 takes in the first of them; in each of the others some actions, far apart, are pulsed. The differences are

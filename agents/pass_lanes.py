@@ -35,7 +35,7 @@ class PassLanes:
         self.terms = Terms(
             columns_of(context.layout), context.control_interval, context.force_limit, training.washout
         )
-        self._washout, self._pulsing = training.washout, pulsing
+        self._pulsing = pulsing
         self._base = (
             None if training.residual_of is None else _base(training.residual_of, training.residual_share)
         )
@@ -51,7 +51,8 @@ class PassLanes:
 
         Raises InputError where pass after pass ends early.
         """
-        policy: Policy = actor if self._washout is None else WashedOut(actor, self._washout)
+        washout = self.terms.washout
+        policy: Policy = actor if washout is None else WashedOut(actor, washout)
         start, passes, failures = time.perf_counter(), list[LinearPass](), 0
         while len(passes) < self.count:
             seed = TRAINING[int(self._random.integers(len(TRAINING)))]

@@ -55,7 +55,7 @@ class Washout(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What the forward pass leaves for the backward one, which leaves the layers' slopes in its place."""
+    """What the forward pass leaves for the backward one."""
 
     moved: Array  # (times, values + 1, WIDTH): changes of values and force
     now: Array  # (times, values, WIDTH): changes as observed

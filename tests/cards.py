@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 
 from huggingface_hub import EvalResult, ModelCardData
 
@@ -20,6 +21,7 @@ from .documents import ROOT
 
 RESULTS = ROOT / "docs" / "benchmark"
 LIBRARY = "panto-env"
+ADDRESS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]["Homepage"]
 CHANGE = "change of the contact force's standard deviation against a passive pantograph (%)"
 
 
@@ -46,7 +48,7 @@ def card(name):
 
 # {policy}
 
-A controller of a train's pantograph, trained in [panto-env](https://example.org/panto-env), and part of it:
+A controller of a train's pantograph, trained in [panto-env]({ADDRESS}), and part of it:
 
 ```
 pip install '{LIBRARY}[agents]'
@@ -96,7 +98,7 @@ def _section(policy):
     """What docs/agents.md says of an agent; links lead into the documents."""
     text = (ROOT / "docs" / "agents.md").read_text(encoding="utf-8")
     section = re.search(rf"### {policy}\n\n(.*?)(?=\n#)", text, re.DOTALL)[1].strip()
-    return re.sub(r"\]\((?!http)([^)]*)\)", r"](https://example.org/panto-env/docs/\1)", section)
+    return re.sub(r"\]\((?!http)([^)]*)\)", rf"]({ADDRESS}/docs/\1)", section)
 
 
 def main():
