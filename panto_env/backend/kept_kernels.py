@@ -77,6 +77,6 @@ def _announce() -> None:
     global _announced
     seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if seen and time.monotonic() - _announced > PAUSE:
-        text = "Compiling kernels, about 10 s, once per version and kind of line ..."
+        text = "Compiling kernels, 10 to 30 s, once per version and kind of line ..."
         print(text, file=sys.stderr, flush=True)
         _announced = time.monotonic()
