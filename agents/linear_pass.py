@@ -31,7 +31,10 @@ Numbers = NDArray[np.float32]
 
 
 class Columns(NamedTuple):
-    """Where an observation's entries come from; all others do not depend on actions."""
+    """Where an observation's entries come from; all others do not depend on actions.
+
+    Nor is the force of a pantograph in front taken to: waves from one behind reach it late and weak.
+    """
 
     now: NDArray[np.int64]  # (depth, values): readings and last action, now and 1, 2, .. control steps ago
     force: NDArray[np.int64]  # (spans, times): of the remembered contact force
@@ -60,10 +63,10 @@ def columns_of(layout: Layout) -> Columns:
     """Where the entries of an observation come from. Raises InputError for one that it does not know."""
     names = [entry.name for entry in layout.entries]
     actions = [name for name in names if name.startswith("last ") and "," not in name]
-    if layout.kind not in (MEASURED, DEVIATIONS) or layout.front or len(actions) != 1:
+    if layout.kind not in (MEASURED, DEVIATIONS) or len(actions) != 1:
         raise InputError(
-            "apg needs the observation 'measured' or 'deviations', of one actuator, without front; choose "
-            "one, or another algorithm"
+            "apg needs the observation 'measured' or 'deviations', of one actuator; choose one, or another "
+            "algorithm"
         )
     ending = DEVIATION if layout.kind == DEVIATIONS else ""
     readings = [name + ending for name, *_ in READING_ENTRIES]
@@ -130,6 +133,8 @@ def measure(
     )
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
+    # A pantograph behind another one comes onto the line later.
+    first = int(task.plant.of(0, Row.STEP, task.episode.controlled[0])) // task.length.control_steps
     context = task.context(0)
     policy.reset(context)
     if base is not None:
@@ -171,10 +176,9 @@ def measure(
         observe()
     if task.results.terminated.any():
         raise InputError(task.ending(int(np.flatnonzero(task.results.terminated)[0])))
-    count = len(actions)
-    force = _filtered(task, count)
+    force = _filtered(task, first, first + len(actions))
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
-    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps
+    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps - first
     passive = force[counted + 1 :, -1]
     return LinearPass(
         np.array(observations, dtype=np.float32),
@@ -188,11 +192,11 @@ def measure(
     )
 
 
-def _filtered(task: Task, count: int) -> NDArray[np.float64]:
-    """Contact force of all lanes as EN 50317 filters it, at the control steps, (count + 1, lanes), N."""
+def _filtered(task: Task, first: int, last: int) -> NDArray[np.float64]:
+    """Contact force as EN 50317 filters it, at control steps first to last, (last - first + 1, lanes), N."""
     every, collector = task.length.control_steps, task.episode.controlled[0]
-    rows: Any = task.samples.rows[:, : count * every + 1, collector, Row.CONTACT_FORCE]
-    return np.asarray(low_pass(rows, task.plant.time_step)[:, ::every].T)
+    rows: Any = task.samples.rows[:, : last * every + 1, collector, Row.CONTACT_FORCE]
+    return np.asarray(low_pass(rows, task.plant.time_step)[:, first * every :: every].T)
 
 
 def _responses(

@@ -78,14 +78,23 @@ def ratio(made: APGLearner, training: Training, seed: int) -> float:
     return float(own.force[own.counted_from + 1 :].astype(float).var() / own.passive_variance)
 
 
+TRAILING = {
+    "pantographs": ["dsa380", "dsa380"],
+    "distances": [100],
+    "controlled": 2,
+    "front": [0, 5, 10],
+    "spans": 8,
+}
 CASES = [
     ({"catenary": "en50318-2002", "normalise": 270}, 0),
     ({"catenary": "en50318-2002", "normalise": 270, "distance": 250.0}, "repetitive"),
     ({"catenary": "family:high-speed", "observation": "deviations", "normalise": None}, 8),
+    ({"catenary": "en50318-2002", "normalise": 270, **TRAILING}, 8),
 ]
+IDS = ["measured", "added to a policy", "deviations, recurrent", "trailing, with front"]
 
 
-@pytest.fixture(scope="module", params=CASES, ids=["measured", "added to a policy", "deviations, recurrent"])
+@pytest.fixture(scope="module", params=CASES, ids=IDS)
 def case(request):
     given, kind = request.param
     hyperparameters = {"net_arch": [16], "recurrent_units": kind if kind == 8 else 0}
