@@ -47,7 +47,8 @@ LEGEND = (
 
 ORACLE = (
     "oracle: the smallest σ found for the same actuator when the line is known, over the same spans "
-    "(`panto oracle --stored`), under other seeds. It is a local optimum: a share above 100 % is possible."
+    "(`panto oracle --stored`), mean over seeds of its own. It is a local optimum: a share above 100 % is "
+    "possible."
 )
 
 

@@ -10,6 +10,8 @@ import typer
 
 from panto_env.analysis.options import parse_spans, with_settings
 from panto_env.base.errors import InputError
+from panto_env.control.lines import draws_line
+from panto_env.control.settings import run_settings
 from panto_env.terminal import (
     Force,
     Json,
@@ -30,8 +32,11 @@ if TYPE_CHECKING:
     from .search import Oracle
     from .solver import Iteration
 
+CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
+"""Options that all cells have in common."""
 
-@with_settings(only=(*OPTIONS, "actuator", "line_condition", "control_interval"), defaults=False)
+
+@with_settings(only=(*OPTIONS, "actuator", *CONDITIONS), defaults=False)
 def oracle(
     given: dict[str, Any],
     config: Annotated[
@@ -67,7 +72,8 @@ def oracle(
 
     The minimum σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
     what control can reach. It is a local optimum, reached by the plant, not a proof that nothing is better.
-    The search for each further seed starts from the result of the one before. The picture shows the first
+    The search for each further seed starts from the result of the one before, except where each seed draws a
+    line of its own. The picture shows the first
     pass that was searched for. Cells that are in the output already, with the same settings, are kept, so
     that an interrupted list continues. An output with other cells, which would be lost, is refused without
     --force.
@@ -78,10 +84,10 @@ def oracle(
     from .problem import Problem
     from .search import find
     from .settings import oracle_settings
-    from .stored import as_data, cell, load, read, requests, save
+    from .stored import as_data, cell, read, requests, save, stored_cells
 
     if known:
-        print_table(report.stored_table(load()))
+        print_table(report.stored_table(stored_cells()))
         return
 
     changes: dict[str, Any] = {
@@ -89,8 +95,7 @@ def oracle(
         "spans": parse_spans(spans),
         "starts": start or None,
         "hops": hops,
-        "line_condition": given.pop("line_condition", None),
-        "control_interval": given.pop("control_interval", None),
+        **{name: given.pop(name, None) for name in CONDITIONS},
     }
     only = given | ({"speeds_kmh": speed} if speed else {})
     settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
@@ -112,8 +117,9 @@ def oracle(
         if done[k] is not None:
             continue
         passes: list[Oracle] = []
+        another_line = draws_line(run_settings(values))  # under each seed
         for number in settings.seeds:
-            neighbour = passes[-1] if passes else None
+            neighbour = passes[-1] if passes and not another_line else None
             problem = Problem(values, number, settings.spans)
             passes.append(find(problem, settings.starts, _print_progress, neighbour, settings.hops))
             if not json:

@@ -41,8 +41,8 @@ class Problem:
         Raises InputError for settings that are not valid, or if the passive run ends early.
         """
         settings = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
-        if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in or settings.pantograph_scatter:
-            raise InputError("An oracle takes one speed, without run_in and without pantograph_scatter.")
+        if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in:
+            raise InputError("An oracle takes one speed, without run_in.")
         if len(settings.controlled) > 1:
             numbers = " and ".join(map(str, settings.controlled))
             raise InputError(f"An oracle controls one pantograph of a train, not {numbers}; name one.")

@@ -95,10 +95,10 @@ def summary(oracles: Sequence[Oracle]) -> Table:
     return Table("Oracles", headings, rows)
 
 
-def stored_table(data: Mapping[str, Any]) -> Table:
-    """Table of stored oracles, data of ``stored.load``, with a row per cell."""
+def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
+    """Table of stored oracles, with a row per cell."""
     rows = []
-    for cell in data["cells"]:
+    for cell in cells:
         passes, actuator = cell["passes"], actuator_settings(cell["actuator"])
         preset = next(
             (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]

@@ -12,7 +12,13 @@ from panto_configs import find
 from panto_env.base.files import read_toml
 from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.control.settings import ControlInterval, default, description
+from panto_env.control.settings import (
+    ControlInterval,
+    PantographScatter,
+    SpeedDrift,
+    default,
+    description,
+)
 from panto_env.plant.actuators import ActuatorSettings, actuator_settings
 from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
@@ -60,6 +66,10 @@ class OracleSettings(Settings):
     line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
+    pantograph_scatter: PantographScatter = Field(
+        default("pantograph_scatter"), description=description("pantograph_scatter")
+    )
+    speed_drift: SpeedDrift = Field(default("speed_drift"), description=description("speed_drift"))
     control_interval: ControlInterval = Field(
         default("control_interval"), description=description("control_interval")
     )
@@ -78,6 +88,8 @@ class OracleSettings(Settings):
             "speed_kmh": speed_kmh,
             "actuator": cell.actuator,
             "line_condition": self.line_condition,
+            "pantograph_scatter": self.pantograph_scatter,
+            "speed_drift": self.speed_drift,
             "control_interval": self.control_interval,
         }
 

@@ -17,14 +17,16 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import is_entry
+from panto_env.catalog.drawn_lines import DrawnLines
 from panto_env.control.identity import OF_TRAINS
+from panto_env.control.lines import draws_line
 from panto_env.control.settings import RunSettings, run_settings
 
 from .search import METHOD, Oracle
 from .settings import OracleSettings
 
-RESULTS = Path(__file__).parent / "results.json"
-"""File of the project's own oracles; its key ``command`` says how they were made."""
+RESULTS = Path(__file__).parent / "results"
+"""Folder of the project's own oracles; the key ``command`` of each file says how they were made."""
 MATTER = (
     "catenary",
     "pantograph",
@@ -74,15 +76,17 @@ def requests(settings: OracleSettings) -> list[dict[str, Any]]:
 def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
     """A cell as plain data, with its passes under all seeds; request: its entry of ``requests``."""
     first = passes[0].problem
-    settings = first.settings
+    settings, lines = first.settings, run_settings(first.given).catenary
     table: dict[str, Any] = finite(
         {
-            "catenary": settings.line.name,
+            "catenary": lines.full_name if isinstance(lines, DrawnLines) else settings.line.name,
             "pantograph": settings.pantograph.name,
             **_train(settings),
             "speed_kmh": settings.speed_kmh[0],
             "actuator": settings.actuator.model_dump(mode="json"),
             "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
+            "pantograph_scatter": settings.pantograph_scatter,
+            "speed_drift": settings.speed_drift,
             "control_interval": settings.control_interval,
             "spans": first.spans,
             "ratio": float(np.mean([each.figures.std / each.problem.figures.std for each in passes])),
@@ -147,23 +151,23 @@ def read(path: str | Path) -> dict[str, Any]:
 
 
 @cache
-def load(path: Path = RESULTS) -> dict[str, Any]:
-    """Read a file written by ``save``, once per process."""
-    return read(path)
+def stored_cells() -> list[dict[str, Any]]:
+    """Cells of the project's own oracles, read once per process."""
+    return [each for path in sorted(RESULTS.glob("*.json")) for each in read(path)["cells"]]
 
 
-def stored_actions(given: Mapping[str, Any], path: Path = RESULTS) -> NDArray[np.float64] | None:
+def stored_actions(given: Mapping[str, Any]) -> NDArray[np.float64] | None:
     """Actions, (control steps, actions), of a stored oracle from the start of its pass on; None without one.
 
     The oracle may be for another condition of the line: line and pantograph, by their values, speed and
     actuator are those of ``given``, settings of a run by name. Those of files are not found, nor those of
-    trains of several pantographs.
+    trains of several pantographs, or of lines that each seed draws.
     """
     settings = run_settings(given)
-    if settings.pantographs:
+    if settings.pantographs or draws_line(settings):
         return None
     actuator = settings.actuator.model_dump(mode="json")
-    for one in load(path)["cells"]:
+    for one in stored_cells():
         same = (
             "pantographs" not in one
             and one["speed_kmh"] == settings.speed_kmh[0]
@@ -180,14 +184,14 @@ def stored_actions(given: Mapping[str, Any], path: Path = RESULTS) -> NDArray[np
     return None
 
 
-def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int], path: Path = RESULTS) -> float | None:
+def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int]) -> float | None:
     """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
 
     None if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
     control interval and computation over exactly these spans; sensors do not matter.
     """
     sought = fingerprint(given)
-    for one in load(path)["cells"]:
+    for one in stored_cells():
         if one["asked"]["fingerprint"] == sought and tuple(one["spans"]) == spans:
             return float(one["ratio"])
     return None

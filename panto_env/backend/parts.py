@@ -4,9 +4,9 @@ Numba would optimise each function, turn it into machine code and wrap it for Py
 caller, and so again at each of the levels that parts are nested in. A part is left as it was lowered instead;
 the kernel that it ends in is optimised once, as a whole. The first run in an empty cache then takes two
 thirds of the time: for a flexible line 7 to 25 s, by the processor. Half of it Python types and lowers some
-two hundred parts, a third LLVM optimises the whole; its own lower levels save less than a tenth and give slower
-kernels. Parts that were optimised by themselves would also be fused otherwise: the contact force, in single
-precision, would change by some 1e-6.
+two hundred parts, a third LLVM optimises the whole; its own lower levels save less than a tenth and give
+slower kernels. Parts that were optimised by themselves would also be fused otherwise: the contact force, in
+single precision, would change by some 1e-6.
 """
 
 from __future__ import annotations

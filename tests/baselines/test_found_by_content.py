@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from panto_baselines.oracle.stored import load, stored_actions
+from panto_baselines.oracle.stored import stored_actions, stored_cells
 from panto_baselines.policies.gains import load_gains
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store
 from panto_baselines.tuning.tune import Tuned
@@ -129,7 +129,7 @@ def test_gains_without_values_of_a_file_that_is_not_there_are_nobody_s(tmp_path:
 
 
 def test_the_tape_of_an_oracle_is_of_the_line_not_of_its_name(tmp_path: Path) -> None:
-    one = load()["cells"][0]
+    one = stored_cells()[0]
     given = {"speed_kmh": one["speed_kmh"], "actuator": one["actuator"]}
     named = given | {"catenary": one["catenary"], "pantograph": one["pantograph"]}
     actions = stored_actions(named)

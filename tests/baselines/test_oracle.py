@@ -305,7 +305,7 @@ def test_what_repeats_from_span_to_span_does(short: Problem):
 
 
 def test_stored_oracles_are_what_simulate_says_today():
-    cells = stored.load()["cells"]
+    cells = stored.stored_cells()
     assert cells
     for cell in cells:
         names = ["catenary", "speed_kmh", "actuator", "line_condition", "control_interval"]
@@ -346,11 +346,19 @@ def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
         assert stored.stored_ratio(given | other, spans) is None
 
 
-@pytest.mark.parametrize("track", ["known-line", "head", "high-speed"])
-def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
+@pytest.mark.parametrize(
+    ("track", "config"),
+    [
+        ("known-line", "oracle"),
+        ("head", "oracle"),
+        ("high-speed", "oracle"),
+        ("any-line", "oracle-any-line"),
+    ],
+)
+def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str, config: str):
     settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
     (line,) = settings.lines
-    oracles = oracle_settings("oracle", {}, {})
+    oracles = oracle_settings(config, {}, {})
     known = {each["fingerprint"] for each in stored.requests(oracles)}
     for speed in line.speeds_kmh:
         assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
@@ -361,7 +369,7 @@ def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
     settings = load_benchmark(find_config("benchmark/known-line", "benchmark"))
     kept = {
         each["speed_kmh"]: 100 * (each["ratio"] - 1)
-        for each in stored.load()["cells"]
+        for each in stored.stored_cells()
         if (each["pantograph"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
     }
     assert kept
@@ -393,10 +401,37 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     assert [each["seed"] for each in cell["passes"]] == [0, 1]
     assert [each["start"] for each in cell["passes"][1]["searches"]] == ["seed 0", "hop 1"]
     given = {"speed_kmh": 300, "line_condition": "smooth"}
-    assert stored.stored_ratio(given, SPANS, file) == cell["ratio"]
+    monkeypatch.setattr(stored, "stored_cells", lambda: stored.read(file)["cells"])
+    assert stored.stored_ratio(given, SPANS) == cell["ratio"]
     again = simulate(**given, seed=1, distance=None).summary((2, 2))
     assert cell["passes"][1]["passive"]["std"] == again.std
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_line_of_each_seed_is_searched_by_itself(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
+    """As built, under a pantograph of each seed, at a drifting speed: as a track of the benchmark is."""
+    monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
+    file = tmp_path / "o.json"
+    result = called(
+        "--catenary", "family:high-speed", "--pantograph", "dsa380", "--actuator", "realistic",
+        "--speed", "275", "--line-condition", "as-built", "--pantograph-scatter", "0.05",
+        "--speed-drift", "0.5", "--seed", "0", "--seed", "1", "--spans", "2-2", "--output", str(file),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    (cell,) = stored.read(file)["cells"]
+    assert cell["catenary"] == "family:high-speed"
+    track = load_benchmark(find_config("benchmark/any-line", "benchmark"))
+    given = along(track, track.lines[0]) | {"speed_kmh": 275}
+    monkeypatch.setattr(stored, "stored_cells", lambda: [cell])
+    assert stored.stored_ratio(given, SPANS) == cell["ratio"]
+    assert stored.stored_ratio(given | {"speed_drift": 0.0}, SPANS) is None
+    assert stored.stored_actions(given) is None
+    for seed, kept in enumerate(cell["passes"]):
+        assert [each["start"] for each in kept["searches"]] == ["zero"]
+        passive = simulate(**given, seed=seed, evaluated=SPANS).summary(SPANS)
+        assert kept["passive"]["std"] == pytest.approx(passive.std, rel=1e-12)
+        assert kept["oracle"]["std"] == pytest.approx(kept["searches"][0]["std"], rel=1e-4)
+        assert kept["oracle"]["std"] < 0.8 * passive.std
 
 
 LIST = """
@@ -480,7 +515,7 @@ def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
 
 
 def test_stored_oracles_are_printed_as_the_page_shows_them():
-    table = report.stored_table(stored.load())
+    table = report.stored_table(stored.stored_cells())
     assert len(tables_of("oracle.md")[table.title][1]) == len(table.rows)
     check_page("oracle.md", {table.title: table})
     assert "Stored oracles" in called("--stored").output

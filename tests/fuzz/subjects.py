@@ -87,7 +87,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "saved run": Subject("Parquet", folder / "run.parquet", Trajectory.load, checked=True),
         "benchmark": Subject("JSON", ROOT / "docs" / "benchmark" / "head.json", read_result, checked=True),
         "actions": _actions(folder),
-        "oracles": Subject("JSON", stored.RESULTS, stored.read, checked=True),
+        "oracles": Subject("JSON", stored.RESULTS / "known-lines.json", stored.read, checked=True),
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
         "settings of a training": Subject("JSON", run.settings, _settings, checked=True),
         "study": Subject("JSON", _study(folder), read_checked, checked=True),
