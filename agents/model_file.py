@@ -98,6 +98,7 @@ class Facts(Settings):
     steps: int  # environment steps that it has learnt from
     updates: int  # of the networks, as Stable-Baselines3 counts them
     environment: dict[str, Any]  # environment that it was trained in: id and arguments
+    variants: tuple[dict[str, Any], ...] = ()  # changes of its arguments, each with a share of the training
     needs: Needs
     residual_of: str | None = None  # policy that its action is added to
     residual_share: float = 1.0  # factor on its action when added

@@ -184,6 +184,7 @@ class Run:
             steps=self.model.num_timesteps,
             updates=self.model._n_updates,
             environment=self.training.environment,
+            variants=self.training.variants,
             needs=self._needs,
             residual_of=self.training.residual_of,
             residual_share=self.training.residual_share,

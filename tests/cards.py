@@ -42,6 +42,9 @@ def card(name):
         eval_results=_results(policy) or None,
     )
     environment = "\n".join(f"| `{key}` | `{value}` |" for key, value in facts.environment.items())
+    for number, changes in enumerate(facts.variants, start=1):
+        values = ", ".join(f"{key}={value!r}" for key, value in changes.items())
+        environment += f"\n| variant {number} | `{values}` |"
     return f"""---
 {data.to_yaml()}
 ---

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 from panto_agents.lanes import make_lanes
+from panto_agents.policy import load
 from panto_agents.settings import Training, parse_training
 from panto_agents.side_by_side import SideBySide
 from panto_agents.train import train
@@ -72,6 +73,7 @@ def test_a_training_learns_from_all_and_evaluates_all(tmp_path):
         rows = list(csv.DictReader(file))
     assert len(rows) == 2  # a speed and a seed for each variant
     assert rows[0]["passive_std"] != rows[1]["passive_std"]
+    assert load(folder.best).facts.variants == tuple(VARIANTS)
 
 
 def test_each_variant_is_evaluated_at_its_own_speeds_unless_they_are_given():
