@@ -15,6 +15,7 @@ from .ranges import MOST_LAYERS, Count, Units
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
     from .demonstrations import Demonstrations
+    from .settings import Training
 
 
 class Algorithm(Settings, ABC):
@@ -41,8 +42,8 @@ class Algorithm(Settings, ABC):
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
         """Fit a new learner to a policy's demonstrations."""
 
-    def check(self, lanes: int, total_steps: int) -> None:
-        """Raise InputError where the hyperparameters do not fit this number of lanes and steps."""
+    def check(self, training: Training) -> None:
+        """Raise InputError where the hyperparameters do not fit the rest of a training."""
 
     def learning_rate_schedule(self) -> Any:
         """Learning rate in the form that Stable-Baselines3 expects."""

@@ -17,6 +17,7 @@ from .recurrent_actor import RecurrentActor
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
     from .demonstrations import Demonstrations
+    from .settings import Training
 
 
 class APG(Algorithm):
@@ -64,9 +65,18 @@ class APG(Algorithm):
 
         return APGLearner(self, lanes, seed)
 
+    def check(self, training: Training) -> None:
+        """Raise InputError for parts of a training that passes have no use for."""
+        if training.start_from:
+            raise InputError(
+                "apg starts from nothing; leave out start_from, or add to a policy by residual_of"
+            )
+        if (training.lines, training.episodes_per_line) != (None, 1):
+            raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
+
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
-        """Refused. Raises InputError."""
-        raise InputError("apg starts from no policy; leave out start_from.")
+        """Never called: ``check`` refuses it."""
+        raise NotImplementedError
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ from .washout_policy import WashedOut
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by the actuators that the actions drive."""
+_loading: ContextVar[tuple[Path, ...]] = ContextVar("_loading", default=())
+"""Model files that are being loaded, each as the base of the one before."""
 
 
 class TrainedPolicy:
@@ -58,13 +61,17 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 def load(path: str | Path) -> TrainedPolicy:
     """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
-    facts, actor = read_model(Path(path))
-    try:
-        return TrainedPolicy(Path(path), facts, actor)
-    except RecursionError as error:
+    file = Path(path)
+    outer, own = _loading.get(), file.resolve()
+    if own in outer:
         raise InputError(
             f"The model file {path} is, through its base policies, added to itself; take another model file."
-        ) from error
+        )
+    token = _loading.set((*outer, own))
+    try:
+        return TrainedPolicy(file, *read_model(file))
+    finally:
+        _loading.reset(token)
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:

@@ -16,6 +16,7 @@ from .ranges import MOST_KEPT, Count, Share
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
     from .demonstrations import Demonstrations
+    from .settings import Training
 
 
 class PPO(Algorithm):
@@ -32,17 +33,17 @@ class PPO(Algorithm):
     target_kl: Positive | None = Field(None, description="divergence that ends an update early")
     log_std_init: float = Field(-1.0, description="log of the action's initial standard deviation")
 
-    def check(self, lanes: int, total_steps: int) -> None:
+    def check(self, training: Training) -> None:
         """Raise InputError if minibatches do not divide the steps of an update, or these are too many."""
-        if lanes * self.n_steps > MOST_KEPT:
+        steps = training.lanes * self.n_steps
+        if steps > MOST_KEPT:
             raise InputError(
-                f"lanes x n_steps = {lanes * self.n_steps:,} must be at most {MOST_KEPT:,}: these steps "
-                "are kept in memory"
+                f"lanes x n_steps = {steps:,} must be at most {MOST_KEPT:,}: these steps are kept in memory"
             )
-        if lanes * self.n_steps % self.batch_size or lanes * self.n_steps == 1:
+        if steps % self.batch_size or steps == 1:
             raise InputError(
-                f"lanes x n_steps = {lanes * self.n_steps} must be a multiple of batch_size = "
-                f"{self.batch_size}, and more than 1"
+                f"lanes x n_steps = {steps} must be a multiple of batch_size = {self.batch_size}, and more "
+                "than 1"
             )
 
     def make_learner(self, lanes: Any, seed: int) -> Any:

@@ -16,6 +16,7 @@ from .ranges import MOST_KEPT, Count, Share
 if TYPE_CHECKING:
     from .cloning_settings import Cloning, CloningError
     from .demonstrations import Demonstrations
+    from .settings import Training
 
 
 class SAC(Algorithm):
@@ -36,11 +37,12 @@ class SAC(Algorithm):
         "auto", description="weight of the entropy; auto: adapted, starting at 1 or at the number after it"
     )
 
-    def check(self, lanes: int, total_steps: int) -> None:
+    def check(self, training: Training) -> None:
         """Raise InputError if learning would never start."""
-        if self.learning_starts >= total_steps:
+        if self.learning_starts >= training.total_steps:
             raise InputError(
-                f"learning_starts = {self.learning_starts} must be less than total_steps = {total_steps}"
+                f"learning_starts = {self.learning_starts} must be less than total_steps = "
+                f"{training.total_steps}"
             )
 
     def make_learner(self, lanes: Any, seed: int) -> Any:

@@ -156,7 +156,7 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
                 _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")
         hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
-        hyperparameters.check(training.lanes, training.total_steps)
+        hyperparameters.check(training)
         _check_environment(training)
         _check_policies(training)
     except InputError as error:
@@ -183,13 +183,6 @@ def _check_environment(training: Training) -> None:
 def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
-    if isinstance(training.hyperparameters, APG) and training.start_from:
-        raise InputError("apg starts from nothing; leave out start_from, or add to a policy by residual_of")
-    if isinstance(training.hyperparameters, APG) and (training.lines, training.episodes_per_line) != (
-        None,
-        1,
-    ):
-        raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
     if training.start_from is not None and training.variants:
         raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)

@@ -18,6 +18,7 @@ from panto_env.base.remember import remembered
 from panto_env.base.settings import Settings, parse
 from panto_env.base.units import to_kmh
 from panto_env.catalog.content import is_entry
+from panto_env.catalog.drawn_lines import DRAWN
 from panto_env.control.context import Context
 from panto_env.plant.catenary.schema import CatenaryData
 from panto_env.plant.pantograph.schema import PantographData
@@ -25,7 +26,7 @@ from panto_env.plant.state import Place
 
 Source = str | Sequence[float]
 GAINS_FOLDER = FOLDER / "policies"
-MANY_LINES = ("family:", "section:")
+MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)
 """How the names begin of what lines are drawn from."""
 REACH = 12.5
 """Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
