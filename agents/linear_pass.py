@@ -129,7 +129,9 @@ def measure(
     speed = float(random.uniform(*drawn.speed_kmh))
     # A pass begins at the line's start, as those of a benchmark do.
     task = Task(
-        drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}), lanes=pulsing.lanes + 2
+        drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}),
+        lanes=pulsing.lanes + 2,
+        threads=1,  # passes run side by side
     )
     columns = columns_of(task.layout)
     task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))

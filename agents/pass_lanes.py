@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import time
+from copy import deepcopy
+from functools import partial
 
 import numpy as np
 
 from panto_baselines.benchmark.seeds import TRAINING
 from panto_baselines.policies.lanes_law import LanesLaw
+from panto_env.analysis.pool import in_threads
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.lines import on_example
@@ -21,7 +24,7 @@ from .settings import Training
 from .washout_policy import WashedOut
 
 MOST_FAILURES = 20
-"""Passes in a row that may end early, under the policy or a pulse, before the training does."""
+"""Passes of a round that may end early, under the policy or a pulse, before the training does."""
 
 
 class PassLanes:
@@ -49,23 +52,36 @@ class PassLanes:
     def measure(self, actor: Actor) -> tuple[list[Group], int]:
         """One round of passes under a network, and the environment steps that they took.
 
-        Raises InputError where pass after pass ends early.
+        Passes run side by side: what each does in Python takes no time of the others' kernels. Raises
+        InputError where too many end early.
         """
         washout = self.terms.washout
         policy: Policy = actor if washout is None else WashedOut(actor, washout)
-        start, passes, failures = time.perf_counter(), list[LinearPass](), 0
-        while len(passes) < self.count:
-            seed = TRAINING[int(self._random.integers(len(TRAINING)))]
-            try:
-                settings = self._settings[len(passes) % len(self._settings)]
-                passes.append(measure(settings, policy, seed, self._pulsing, self._base))
-                failures = 0
-            except InputError:
+        start, passes, failures = time.perf_counter(), dict[int, LinearPass](), 0
+        while missing := [number for number in range(self.count) if number not in passes]:
+            jobs = [partial(self._pass, number, deepcopy(policy), self._seed()) for number in missing]
+            for number, found in zip(missing, in_threads(jobs), strict=True):
+                if isinstance(found, LinearPass):
+                    passes[number] = found
+                    continue
                 failures += 1
-                if failures == MOST_FAILURES:
-                    raise
+                if failures >= MOST_FAILURES:
+                    raise found
         self.seconds += time.perf_counter() - start
-        return grouped(passes), (self._pulsing.lanes + 2) * sum(len(each.actions) for each in passes)
+        ordered = [passes[number] for number in range(self.count)]
+        return grouped(ordered), (self._pulsing.lanes + 2) * sum(len(each.actions) for each in ordered)
+
+    def _pass(self, number: int, policy: Policy, seed: int) -> LinearPass | InputError:
+        """Pass of a number, in the environment whose turn it is; the error where it ends early."""
+        settings = self._settings[number % len(self._settings)]
+        try:
+            return measure(settings, policy, seed, self._pulsing, deepcopy(self._base))
+        except InputError as error:
+            return error
+
+    def _seed(self) -> int:
+        """The next pass's seed."""
+        return int(TRAINING[int(self._random.integers(len(TRAINING)))])
 
     def rollout(self, groups: list[Group]) -> Rollout:
         """These groups side by side, for a network."""

@@ -12,6 +12,7 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from panto_agents import pass_lanes
 from panto_agents.apg_learner import APGLearner
 from panto_agents.linear_pass import LinearPass, Pulsing, measure
 from panto_agents.linear_rollout import grouped
@@ -163,6 +164,33 @@ def test_a_pass_is_that_of_simulate():
     count = min(len(force), len(own.force) - 1)
     np.testing.assert_allclose(own.force[1 : count + 1], force[:count], atol=2.0)
     assert own.counted_from * (300 / 3.6) * 0.01 == pytest.approx(120, abs=2)
+
+
+def test_a_pass_that_ends_early_is_run_anew_in_the_same_environment(monkeypatch):
+    training = settings(lanes=4, variants=[{"speed_kmh": 280}, {"speed_kmh": 300}])
+    lanes, actor = PassLanes(training, Pulsing(10, 1)), training.hyperparameters.actor(learner(training))
+    lanes.seed(1)
+    called: list[tuple[float, int]] = []
+    failing = [1]  # numbers of the calls
+
+    def measured(own: Any, policy: Any, seed: int, *rest: Any) -> LinearPass:
+        called.append((own.speed_kmh[0], seed))
+        if len(called) - 1 in failing:
+            raise InputError("It ends early.")
+        return measure(own, policy, seed, *rest)
+
+    monkeypatch.setattr(pass_lanes, "measure", measured)
+    monkeypatch.setattr(pass_lanes, "in_threads", lambda jobs: [job() for job in jobs])
+    groups, _ = lanes.measure(actor)
+    assert [len(group.judged) for group in groups] == [4]
+    speeds, seeds = zip(*called, strict=True)
+    assert speeds == (280, 300, 280, 300, 300)
+    assert len(set(seeds)) == 5
+    called.clear()
+    failing[:] = range(1000)
+    with pytest.raises(InputError, match="It ends early"):
+        lanes.measure(actor)
+    assert len(called) == pass_lanes.MOST_FAILURES
 
 
 class _Script:
