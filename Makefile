@@ -54,7 +54,7 @@ docs: $(READY)
 cards: $(READY)
 	$(BIN)/python -m tests.cards
 
-# The notebook of the examples, run anew; what it prints and draws is stored in it.
+# The notebooks of the examples, run anew; what they print and draw is stored in them.
 notebook: $(READY)
 	$(BIN)/python -m tests.notebook
 
@@ -77,7 +77,7 @@ films: $(READY)
 PLACEHOLDER := https://example.org/panto-env
 urls:
 	@test -n "$(URL)" || { echo "Name the address: make urls URL=https://..."; exit 1; }
-	sed -i 's|$(PLACEHOLDER)|$(URL)|; s|^# Placeholders:.*||' pyproject.toml CITATION.cff
+	sed -i 's|$(PLACEHOLDER)|$(URL)|; s|^# Placeholders:.*||' pyproject.toml CITATION.cff examples/*.ipynb
 
 # Slow proofs: more lines against finite elements, longer trainings, random environments.
 CASES := 2000

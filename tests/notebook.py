@@ -1,4 +1,4 @@
-"""The notebook of the examples: `make notebook` runs it anew and stores what it prints and draws."""
+"""The notebooks of the examples: `make notebook` runs them anew and stores what they print and draw."""
 
 import re
 from pathlib import Path
@@ -6,18 +6,19 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 
-NOTEBOOK = Path(__file__).parents[1] / "examples" / "first_three.ipynb"
+EXAMPLES = Path(__file__).parents[1] / "examples"
+LEARNING, UNSEEN_LINE = EXAMPLES / "first_three.ipynb", EXAMPLES / "unseen_line.ipynb"
 SECONDS = 900.0
 """After which a cell is given up: some train."""
 
 
-def executed(before=None):
-    """The notebook, run anew in a process of its own; before: the heading at which to stop."""
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+def executed(path, before=None, folder=EXAMPLES):
+    """A notebook, run anew in a process of its own; before: the heading at which to stop."""
+    notebook = nbformat.read(path, as_version=4)
     if before is not None:
         headings = [cell.source.partition("\n")[0] for cell in notebook.cells]
         notebook.cells = notebook.cells[: headings.index(before)]
-    resources = {"metadata": {"path": str(NOTEBOOK.parent)}}
+    resources = {"metadata": {"path": str(folder)}}
     NotebookClient(notebook, timeout=SECONDS, resources=resources, record_timing=False).execute()
     return notebook
 
@@ -30,16 +31,19 @@ def told(notebook):
 
 def changes(notebook):
     """Changes of sigma (%) that it prints at last, by policy."""
-    return {name: float(value) for name, value in re.findall(r"^(\w+): sigma (\S+) %", told(notebook), re.M)}
+    return {
+        name: float(value) for name, value in re.findall(r"^([\w-]+): sigma (\S+) %", told(notebook), re.M)
+    }
 
 
 def main():
-    """Run it and store it with its outputs."""
-    notebook = executed()
-    for cell in notebook.cells:
-        cell.metadata = {}
-    notebook.metadata["language_info"] = {"name": "python"}  # and not which version ran it
-    nbformat.write(notebook, NOTEBOOK)
+    """Run them and store them with their outputs."""
+    for path in (LEARNING, UNSEEN_LINE):
+        notebook = executed(path)
+        for cell in notebook.cells:
+            cell.metadata = {}
+        notebook.metadata["language_info"] = {"name": "python"}  # and not which version ran it
+        nbformat.write(notebook, path)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from panto_env.envs import BARE, IDS, PantographEnv
 from panto_env.envs.settings import EnvironmentSettings, VectorSettings
 
 DOCS = Path(__file__).parents[1]
-NOTEBOOK = DOCS.parent / "examples" / "first_three.ipynb"
+NOTEBOOKS = sorted((DOCS.parent / "examples").glob("*.ipynb"))
 GENERATED = "generated"
 """Name of the folders, beside the pages that include them, which are not kept."""
 SHOWN = ("fitted-fb+ff", "agent-known-line", "repetitive", "lqg", "tuned-pd", "fb+ff:gain=0.3")
@@ -144,7 +144,8 @@ def write(app: Sphinx) -> None:
     wanted = {environments / f"{name}.md": part(name) for name in IDS} | {
         environments / "bare.md": table(("Argument", "Value"), bare),
         DOCS / GENERATED / "home.md": home_table(),
-        DOCS / NOTEBOOK.name: NOTEBOOK.read_text(encoding="utf-8"),  # Sphinx takes no page from elsewhere
+        # Sphinx takes no page from elsewhere.
+        **{DOCS / path.name: path.read_text(encoding="utf-8") for path in NOTEBOOKS},
     }
     for path, text in wanted.items():
         path.parent.mkdir(exist_ok=True)

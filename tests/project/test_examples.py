@@ -12,7 +12,7 @@ import pytest
 from panto_env import simulate
 from panto_env.metrics.spectrum import in_band
 
-from ..notebook import NOTEBOOK, changes, executed, told
+from ..notebook import LEARNING, UNSEEN_LINE, changes, executed, told
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -194,17 +194,27 @@ def test_ppo_example_is_better_than_passive(monkeypatch):
 
 def test_notebook_shows_what_it_prints_now():
     """Without the part that learns, which a slow test runs."""
-    stored = nbformat.read(NOTEBOOK, as_version=4)
-    again = told(executed(before="## Learning"))
+    stored = nbformat.read(LEARNING, as_version=4)
+    again = told(executed(LEARNING, before="## Learning"))
     assert told(stored).startswith(again)
     assert again == "mean force 115.6 N, sigma 35.36 N\nsigma 35.36 N\nDamper: sigma -8.9 %\n"
     assert [cell for cell in stored.cells if cell.cell_type == "code" and not cell.execution_count] == []
-    assert NOTEBOOK.stat().st_size < 300_000
+    assert LEARNING.stat().st_size < 300_000
     assert changes(stored)["SAC"] < changes(stored)["Damper"]
 
 
 @pytest.mark.slow
 def test_notebook_learns_as_it_shows():
-    assert changes(executed())["SAC"] == pytest.approx(
-        changes(nbformat.read(NOTEBOOK, as_version=4))["SAC"], abs=5.0
+    assert changes(executed(LEARNING))["SAC"] == pytest.approx(
+        changes(nbformat.read(LEARNING, as_version=4))["SAC"], abs=5.0
     )
+
+
+def test_notebook_films_an_agent_on_a_line_that_nobody_has_seen(tmp_path):
+    stored = nbformat.read(UNSEEN_LINE, as_version=4)
+    again = executed(UNSEEN_LINE, before="## The film", folder=tmp_path)
+    assert changes(again) == changes(stored)
+    assert changes(stored)["agent-any-line"] < changes(stored)["repetitive"] < -30
+    film = stored.cells[-1].outputs[0]["data"]["text/html"]
+    assert "data:video/mp4;base64," in film
+    assert UNSEEN_LINE.stat().st_size < 600_000
