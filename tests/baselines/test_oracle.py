@@ -310,6 +310,7 @@ def test_stored_oracles_are_what_simulate_says_today():
     for cell in cells:
         names = ["catenary", "speed_kmh", "actuator", "line_condition", "control_interval"]
         names += ["pantographs", "distances", "controlled"] if "pantographs" in cell else ["pantograph"]
+        names += [name for name in ("pantograph_scatter", "speed_drift") if name in cell]
         given, spans = {name: cell[name] for name in names}, tuple(cell["spans"])
         assert stored.fingerprint(given) == cell["asked"]["fingerprint"]
         ratios = [each["oracle"]["std"] / each["passive"]["std"] for each in cell["passes"]]
