@@ -52,3 +52,13 @@ def any_line() -> TrainedPolicy:
     realistic actuator on the frame and realistic sensors. It is told nothing of the line.
     """
     return load(FOLDER / "any-line.safetensors")
+
+
+def any_pantograph() -> TrainedPolicy:
+    """Agent for any line and section, 120 to 350 km/h, under the four pantographs that it was trained with.
+
+    These are dsa380, dsa250, identified-2dof and benchmark-2015. It was trained by the analytic policy
+    gradient on lines drawn from family:high-speed, section:fast-line and section:main-line, as built, from
+    nothing, with a realistic actuator on the frame and realistic sensors. It is told nothing of the line.
+    """
+    return load(FOLDER / "any-pantograph.safetensors")

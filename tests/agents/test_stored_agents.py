@@ -17,7 +17,14 @@ from panto_env.policies import find_policy, policy_names
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.safetensors"))
 KEPT = ("catenary", "pantograph", "pantographs", "distances", "controlled", "actuator", "sensors")
-GAINS = {"known-line": 0.72, "head": 0.40, "high-speed": 0.75, "train": 0.55, "any-line": 0.6}
+GAINS = {
+    "known-line": 0.72,
+    "head": 0.40,
+    "high-speed": 0.75,
+    "train": 0.55,
+    "any-line": 0.6,
+    "any-pantograph": 0.6,
+}
 """Of sigma to the passive pantograph at 300 km/h on a test seed: at most."""
 CONFIGS = {
     "known-line": "agent-clone",
@@ -25,6 +32,7 @@ CONFIGS = {
     "high-speed": "agent-high-speed",
     "train": "agent-train",
     "any-line": "agent-any-line",
+    "any-pantograph": "agent-any-pantograph",
 }
 
 
@@ -53,6 +61,7 @@ class TestAgent:
         training = load_training(CONFIGS[name])
         assert facts.qualified
         assert facts.environment == training.environment
+        assert facts.variants == training.variants
         assert facts.seed == training.seed
         assert facts.commit
         assert "dirty" not in facts.commit
