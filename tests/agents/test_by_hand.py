@@ -54,19 +54,19 @@ def test_a_learning_rate_goes_from_its_first_value_to_its_last_by_the_last_step(
 def test_minibatches_divide_the_steps_of_an_update(lanes, n_steps, batch_size, message):
     settings = PPO(n_steps=n_steps, batch_size=batch_size)
     if message is None:
-        settings.check(lanes, 10**6)
+        settings.check(SimpleNamespace(lanes=lanes))
         return
     with pytest.raises(InputError, match=message):
-        settings.check(lanes, 10**6)
+        settings.check(SimpleNamespace(lanes=lanes))
 
 
 def test_learning_starts_before_the_last_step():
-    SAC(learning_starts=99).check(1, 100)
+    SAC(learning_starts=99).check(SimpleNamespace(total_steps=100))
     for start in (100, 101):
         with pytest.raises(
             InputError, match=f"learning_starts = {start} must be less than total_steps = 100"
         ):
-            SAC(learning_starts=start).check(1, 100)
+            SAC(learning_starts=start).check(SimpleNamespace(total_steps=100))
 
 
 def test_the_table_of_trainings_cell_by_cell():

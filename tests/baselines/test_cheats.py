@@ -227,7 +227,7 @@ def test_one_that_wants_to_see_what_no_train_can_measure_is_refused(tmp_path):
 def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
     track = load_benchmark("benchmark/known-line")
     row = run_pass(track, track.lines[0], (10, 19), ORACLE_TAPE, 300.0, 0).row
-    cells = [each for each in stored.load()["cells"] if each["speed_kmh"] == 300.0]
+    cells = [each for each in stored.stored_cells() if each["speed_kmh"] == 300.0]
     best = next(each["passes"][0] for each in cells if each["actuator"]["place"] == "frame")
     assert best["seed"] == 0
     assert row.figures.std == pytest.approx(best["oracle"]["std"], rel=1e-6)

@@ -129,7 +129,7 @@ def test_gains_without_values_of_a_file_that_is_not_there_are_nobody_s(tmp_path:
 
 
 def test_the_tape_of_an_oracle_is_of_the_line_not_of_its_name(tmp_path: Path) -> None:
-    one = stored_cells()[0]
+    one = next(each for each in stored_cells() if each["catenary"] == "en50318-2002")
     given = {"speed_kmh": one["speed_kmh"], "actuator": one["actuator"]}
     named = given | {"catenary": one["catenary"], "pantograph": one["pantograph"]}
     actions = stored_actions(named)

@@ -118,7 +118,7 @@ def test_the_citation_names_this_version():
 
 
 def test_what_is_published_names_authors_and_addresses_that_a_release_fills_in(tmp_path):
-    """Each address begins with a placeholder until `make urls` replaces it, in both files."""
+    """Each address begins with a placeholder until `make urls` replaces it, in each file."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert [each["name"] for each in project["authors"]] == [each["name"] for each in citation["authors"]]
@@ -127,13 +127,15 @@ def test_what_is_published_names_authors_and_addresses_that_a_release_fills_in(t
     if not all(address.startswith("https://example.org/panto-env") for address in addresses):
         assert not any("example.org" in address for address in addresses)
         return
-    for name in ("Makefile", "pyproject.toml", "CITATION.cff"):
-        shutil.copy(ROOT / name, tmp_path)
+    filled_in = ("pyproject.toml", "CITATION.cff", "examples/unseen_line.ipynb")
+    (tmp_path / "examples").mkdir()
+    for name in ("Makefile", *filled_in):
+        shutil.copy(ROOT / name, tmp_path / name)
     own = "https://forge.invalid/us/panto-env"
     assert run(["make", "urls"], cwd=tmp_path).returncode != 0
     done = run(["make", "urls", f"URL={own}"], cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for name in ("pyproject.toml", "CITATION.cff"):
+    for name in filled_in:
         text = (tmp_path / name).read_text(encoding="utf-8")
         assert own in text
         assert "example.org" not in text
