@@ -24,7 +24,7 @@ from .settings import Training
 from .washout_policy import WashedOut
 
 MOST_FAILURES = 20
-"""Passes of a round that may end early, under the policy or a pulse, before the training does."""
+"""Passes in a row that may end early, under the policy or a pulse, before the training does."""
 
 
 class PassLanes:
@@ -53,7 +53,7 @@ class PassLanes:
         """One round of passes under a network, and the environment steps that they took.
 
         Passes run side by side: what each does in Python takes no time of the others' kernels. Raises
-        InputError where too many end early.
+        InputError where pass after pass ends early.
         """
         washout = self.terms.washout
         policy: Policy = actor if washout is None else WashedOut(actor, washout)
@@ -62,10 +62,10 @@ class PassLanes:
             jobs = [partial(self._pass, number, deepcopy(policy), self._seed()) for number in missing]
             for number, found in zip(missing, in_threads(jobs), strict=True):
                 if isinstance(found, LinearPass):
-                    passes[number] = found
+                    passes[number], failures = found, 0
                     continue
                 failures += 1
-                if failures >= MOST_FAILURES:
+                if failures == MOST_FAILURES:
                     raise found
         self.seconds += time.perf_counter() - start
         ordered = [passes[number] for number in range(self.count)]

@@ -73,10 +73,9 @@ def oracle(
     The minimum σ over the evaluated spans in the true plant, at the mean force of the passive run: a bound on
     what control can reach. It is a local optimum, reached by the plant, not a proof that nothing is better.
     The search for each further seed starts from the result of the one before, except where each seed draws a
-    line of its own. The picture shows the first
-    pass that was searched for. Cells that are in the output already, with the same settings, are kept, so
-    that an interrupted list continues. An output with other cells, which would be lost, is refused without
-    --force.
+    line of its own. The picture shows the first pass that was searched for. Cells that are in the output
+    already, with the same settings, are kept, so that an interrupted list continues. An output with other
+    cells, which would be lost, is refused without --force.
     """
     from panto_env.analysis.plots import save as save_plot
 

@@ -17,9 +17,8 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import is_entry
-from panto_env.catalog.drawn_lines import DrawnLines
 from panto_env.control.identity import OF_TRAINS
-from panto_env.control.lines import draws_line
+from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings, run_settings
 
 from .search import METHOD, Oracle
@@ -76,10 +75,10 @@ def requests(settings: OracleSettings) -> list[dict[str, Any]]:
 def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]:
     """A cell as plain data, with its passes under all seeds; request: its entry of ``requests``."""
     first = passes[0].problem
-    settings, lines = first.settings, run_settings(first.given).catenary
+    settings = first.settings
     table: dict[str, Any] = finite(
         {
-            "catenary": lines.full_name if isinstance(lines, DrawnLines) else settings.line.name,
+            "catenary": line_name(run_settings(first.given)),
             "pantograph": settings.pantograph.name,
             **_train(settings),
             "speed_kmh": settings.speed_kmh[0],

@@ -12,8 +12,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, write_whole
 from panto_env.base.version import __version__
 from panto_env.catalog.content import content_unless_catalogue
-from panto_env.catalog.drawn_lines import DrawnLines
-from panto_env.control.lines import draws_line
+from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
 
 from ..policies.gains import GainFile, Tuning, load_gains
@@ -94,15 +93,6 @@ def as_toml(file: GainFile) -> str:
                 continue
             lines.append(f"{key} = {_value(value)}")
     return "\n".join(lines) + "\n"
-
-
-def line_name(settings: RunSettings) -> str:
-    """Name of a tuning's line, or of the family or section that its lines are drawn from.
-
-    Raises InputError for a list of lines.
-    """
-    lines = settings.catenary
-    return lines.full_name if isinstance(lines, DrawnLines) else settings.line.name
 
 
 def _case(tuning: Tuning) -> tuple[str | None, ...]:

@@ -21,6 +21,15 @@ def draws_line(settings: RunSettings) -> bool:
     return not isinstance(settings.catenary, CatenaryData)
 
 
+def line_name(settings: RunSettings) -> str:
+    """Name of the line, or of the family or section that its lines are drawn from.
+
+    Raises InputError for a list of lines.
+    """
+    lines = settings.catenary
+    return lines.full_name if isinstance(lines, DrawnLines) else settings.line.name
+
+
 def fewest_spans(settings: RunSettings) -> int | None:
     """Number of spans after which a line ends at the earliest, whichever is drawn; None where none ends."""
     lines = settings.catenary

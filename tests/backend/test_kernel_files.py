@@ -88,7 +88,7 @@ def test_a_compilation_is_announced_where_somebody_sees_it(call):
     shown = "import sys; sys.stderr.isatty = lambda: True\n" + CALL
     told, said = call(code=shown)
     assert told == ["4.5", "0"]
-    assert said.startswith("Compiling kernels, ")
+    assert said.startswith("Compiling kernels, 10 to 30 s, ")
     assert said.count("\n") == 1
     assert call(code=shown) == (["4.5", "1"], "")
 
