@@ -4,61 +4,84 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from panto_env.base.errors import InputError
+from panto_env.base.shown import shown
+
 from .policy import TrainedPolicy, load
 
 FOLDER = Path(__file__).parent / "models"
-"""Folder of their model files."""
+"""Folder of their model files; further trainings of an agent lie in a folder of its name."""
 
 
-def known_line() -> TrainedPolicy:
+def _trained(name: str, seed: int) -> TrainedPolicy:
+    """The agent of a name, trained under a seed. Raises InputError for one that it was not trained under."""
+    if seed == 0:
+        return load(FOLDER / f"{name}.safetensors")
+    stored = {f"{each}": path for each, path in further_trainings(name).items()}
+    if str(seed) not in stored:
+        raise InputError(
+            f"agent-{name} was trained under the seeds {', '.join(('0', *stored))}, not {shown(seed)}."
+        )
+    return load(stored[str(seed)])
+
+
+def further_trainings(name: str) -> dict[int, Path]:
+    """Model files of an agent's further trainings, by their seeds."""
+    return {
+        int(path.stem.removeprefix("seed")): path
+        for path in sorted((FOLDER / name).glob("seed*.safetensors"))
+    }
+
+
+def known_line(seed: int = 0) -> TrainedPolicy:
     """Agent for en50318-2002 and its pantograph, 200 to 350 km/h, actuator on the frame.
 
     It started from ``fitted-fb+ff`` and was trained further by PPO, with realistic actuator and sensors. It
     has learnt this line by heart and is of no use on another one.
     """
-    return load(FOLDER / "known-line.safetensors")
+    return _trained("known-line", seed)
 
 
-def head() -> TrainedPolicy:
+def head(seed: int = 0) -> TrainedPolicy:
     """Agent for en50318-2002 and its pantograph, 200 to 350 km/h, motors in the head (``head-motor``).
 
     It started from ``periodic`` for the head and was trained further by PPO, with realistic sensors.
     """
-    return load(FOLDER / "head.safetensors")
+    return _trained("head", seed)
 
 
-def high_speed() -> TrainedPolicy:
+def high_speed(seed: int = 0) -> TrainedPolicy:
     """Agent for identified-2dof on shinkansen-simple, 250 to 400 km/h, for lines as built.
 
     It was trained by PPO from rewards only, with a realistic actuator on the frame and realistic sensors. Its
     observation is normalised by passive runs at these speeds, which a slower line refuses.
     """
-    return load(FOLDER / "high-speed.safetensors")
+    return _trained("high-speed", seed)
 
 
-def train() -> TrainedPolicy:
+def train(seed: int = 0) -> TrainedPolicy:
     """Agent for both of two dsa380, 200 m apart on en50318-2002, 200 to 300 km/h, as built.
 
     It adds to ``repetitive``. Both pantographs trained one network by PPO, with realistic actuator and
     sensors; it sees what the pantograph in front measured.
     """
-    return load(FOLDER / "train.safetensors")
+    return _trained("train", seed)
 
 
-def any_line() -> TrainedPolicy:
+def any_line(seed: int = 0) -> TrainedPolicy:
     """Agent for dsa380 on any line of family:high-speed, 240 to 310 km/h, as built.
 
     It was trained by the analytic policy gradient on lines drawn from the family, from nothing, with a
     realistic actuator on the frame and realistic sensors. It is told nothing of the line.
     """
-    return load(FOLDER / "any-line.safetensors")
+    return _trained("any-line", seed)
 
 
-def any_pantograph() -> TrainedPolicy:
+def any_pantograph(seed: int = 0) -> TrainedPolicy:
     """Agent for any line and section, 120 to 350 km/h, under the four pantographs that it was trained with.
 
     These are dsa380, dsa250, identified-2dof and benchmark-2015. It was trained by the analytic policy
     gradient on lines drawn from family:high-speed, section:fast-line and section:main-line, as built, from
     nothing, with a realistic actuator on the frame and realistic sensors. It is told nothing of the line.
     """
-    return load(FOLDER / "any-pantograph.safetensors")
+    return _trained("any-pantograph", seed)

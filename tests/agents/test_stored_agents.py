@@ -10,7 +10,7 @@ from safetensors.numpy import load_file
 
 from panto_agents.model_file import read_model
 from panto_agents.settings import load_training
-from panto_agents.stored import FOLDER
+from panto_agents.stored import FOLDER, further_trainings
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary
 from panto_env.policies import find_policy, policy_names
@@ -34,6 +34,7 @@ CONFIGS = {
     "any-line": "agent-any-line",
     "any-pantograph": "agent-any-pantograph",
 }
+FURTHER = [(name, seed) for name in NAMES for seed in further_trainings(name)]
 
 
 def given(name):
@@ -74,6 +75,33 @@ class TestAgent:
         )
         assert steadied.std < GAINS[name] * passive.std
         assert abs(steadied.mean / passive.mean - 1) < 0.015
+
+
+@pytest.mark.parametrize(("name", "seed"), FURTHER)
+class TestFurtherTraining:
+    def test_is_the_same_recipe_under_another_seed(self, name, seed):
+        path = further_trainings(name)[seed]
+        assert path.stat().st_size < 500_000
+        assert all(each.startswith("actor/") for each in load_file(path))
+        facts, _ = read_model(path)
+        first, _ = read_model(FOLDER / f"{name}.safetensors")
+        assert facts.seed == seed
+        assert facts.qualified
+        assert (facts.environment, facts.variants, facts.needs) == (
+            first.environment,
+            first.variants,
+            first.needs,
+        )
+        assert "dirty" not in facts.commit
+
+    def test_is_the_policy_of_that_seed(self, name, seed):
+        assert find_policy(f"agent-{name}:seed={seed}").facts.seed == seed
+
+
+@pytest.mark.parametrize("seed", ["999", "-1", "0.5", "'../head'"])
+def test_a_seed_that_nothing_was_trained_under_is_refused(seed):
+    with pytest.raises(InputError, match=r"agent-any-line was trained under the seeds 0.*, not "):
+        find_policy(f"agent-any-line:seed={seed}")
 
 
 def test_they_need_no_torch():
