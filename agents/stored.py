@@ -85,3 +85,17 @@ def any_pantograph(seed: int = 0) -> TrainedPolicy:
     nothing, with a realistic actuator on the frame and realistic sensors. It is told nothing of the line.
     """
     return _trained("any-pantograph", seed)
+
+
+def trailing(seed: int = 0) -> TrainedPolicy:
+    """Agent for the second of two dsa380, 200 m apart on en50318-2002, 190 to 310 km/h, as built.
+
+    It was trained by the analytic policy gradient, from nothing, with a realistic actuator on the frame and
+    realistic sensors. The first pantograph is passive; the agent sees what it measured.
+    """
+    return _trained("trailing", seed)
+
+
+def trailing_alone(seed: int = 0) -> TrainedPolicy:
+    """The same as agent-trailing without preview: it sees nothing of the pantograph in front."""
+    return _trained("trailing-alone", seed)

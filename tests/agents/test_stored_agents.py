@@ -24,6 +24,8 @@ GAINS = {
     "train": 0.55,
     "any-line": 0.6,
     "any-pantograph": 0.6,
+    "trailing": 0.6,
+    "trailing-alone": 0.6,
 }
 """Of sigma to the passive pantograph at 300 km/h on a test seed: at most."""
 CONFIGS = {
@@ -33,6 +35,8 @@ CONFIGS = {
     "train": "agent-train",
     "any-line": "agent-any-line",
     "any-pantograph": "agent-any-pantograph",
+    "trailing": "agent-trailing",
+    "trailing-alone": "agent-trailing-alone",
 }
 FURTHER = [(name, seed) for name in NAMES for seed in further_trainings(name)]
 
