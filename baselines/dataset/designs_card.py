@@ -13,7 +13,10 @@ from panto_env.metrics.labels import LABELS
 
 from .designs import FIGURES
 from .designs_settings import DesignsSettings
+from .front_matter import front_matter
 
+TABLE = "designs.parquet"
+"""Name of the table in its folder."""
 SI = {"mm": "m"}
 """Units in the table by the unit shown elsewhere: the table uses SI units."""
 
@@ -56,6 +59,7 @@ def card(settings: DesignsSettings, shown: Sequence[Column], table: Any, made_of
     """Text of the card, as Markdown. shown: columns to describe. table: Arrow table."""
     kinds = {name: _reasons(table[name].to_pylist()) for name in ("refused", "ending", "accuracy_warning")}
     lines = [
+        *front_matter(settings.title, TABLE, table.num_rows, "tabular-regression", ("surrogate-model",)),
         f"# {settings.title}",
         "",
         f"{table.num_rows:,} designs around the pantograph {settings.pantograph} on the line "

@@ -10,7 +10,9 @@ import numpy as np
 from panto_env.control.observation import Layout
 
 from .episodes import Episode
+from .front_matter import front_matter
 from .settings import ENVIRONMENT, EpisodesSettings, Plan, PolicySet
+from .steps_table import COLUMNS, STEPS
 
 REWARD = (
     "The reward is that of the environment: minus the cost function CF and the contact-loss ratio CL of "
@@ -43,8 +45,10 @@ def card(
     made_of: Mapping[str, Any],
 ) -> str:
     """Text of the card, as Markdown. rows: each episode's plan and its ``summary``."""
+    name, steps = settings.dataset_id(policy_set), int(sum(figures["steps"] for _, figures in rows))
     lines = [
-        f"# {settings.dataset_id(policy_set)}",
+        *front_matter(name, STEPS, steps, "reinforcement-learning", ("minari", "offline-rl", "gymnasium")),
+        f"# {name}",
         "",
         description(settings, policy_set),
         "",
@@ -57,6 +61,13 @@ def card(
         "",
         "Means over whole episodes, including their start. Each row has its own seeds, and so its own lines "
         "and speeds: the table describes the data; to rank policies use `panto benchmark`.",
+        "",
+        f"The folder is a data set of Minari. `{STEPS}` has the same steps in one table, a row for each:",
+        "",
+        "| column | description |",
+        "|---|---|",
+        *(f"| `{each.name}` | {each.description} |" for each in COLUMNS),
+        "| others | `infos` at the step's end |",
         "",
         "| | observed | value of 0 | value of 1 more |",
         "|---:|---|---:|---:|",

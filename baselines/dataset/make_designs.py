@@ -27,12 +27,11 @@ from panto_env.cluster.parts import (
 
 from .checksums import LIST, write_checksums
 from .designs import simulate_designs
-from .designs_card import card, columns
+from .designs_card import TABLE, card, columns
 from .designs_settings import DesignsSettings
 
 PER_PART = 64
 """Designs per part: some seconds of work."""
-TABLE = "designs.parquet"
 KEY = b"panto_env"
 """Key of the table's identity in the schema's metadata; a column's metadata hold its description."""
 

@@ -30,6 +30,7 @@ from .episodes import Episode, check_places, make, read_episodes, read_part, rec
 from .episodes_card import card, description, summary
 from .minari_set import KEY, check_minari, write_minari
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
+from .steps_table import STEPS, StepsTable
 
 PER_PART = 10
 """Episodes per part: a second or two of work, so that little is lost by an interruption."""
@@ -134,10 +135,13 @@ def _assemble(settings: EpisodesSettings, one: _Order) -> None:
         for path, plans in one.groups.items():
             for plan, episode in zip(plans, read_episodes(path, plans), strict=True):
                 rows.append((plan, summary(episode)))
+                table.add(plan, episode)
                 yield plan, episode
 
     paragraph = description(settings, one.policy_set)
-    write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
+    unfinished.mkdir()
+    with StepsTable(unfinished / STEPS) as table:
+        write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()

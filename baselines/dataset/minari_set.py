@@ -38,7 +38,7 @@ def write_minari(
     made_of: Mapping[str, Any],
     description: str,
 ) -> None:
-    """Write a data set to a new folder, for ``minari.load_dataset``.
+    """Write a data set to a folder, for ``minari.load_dataset``.
 
     Each episode's metadata hold its seed and options, with which ``reset`` begins it again, its policy, the
     noise on the action, and its figures.

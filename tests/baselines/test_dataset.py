@@ -11,8 +11,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
+from huggingface_hub import DatasetCard
 
 from panto_baselines.benchmark import seeds
 from panto_baselines.benchmark.controls import OTHER_SEED
@@ -21,6 +23,7 @@ from panto_baselines.dataset.checksums import LIST, verify
 from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs
 from panto_baselines.dataset.episodes import Stage, read_part
 from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
+from panto_baselines.dataset.steps_table import COLUMNS
 from panto_configs import names
 from panto_env import InputError, simulate
 from panto_env.base.array_file import write_arrays
@@ -183,15 +186,46 @@ class TestEpisodes:
         assert "Seeds 2000000 to 2000003" in told["description"]
         assert told["code_permalink"].startswith("panto-env ")
         card = (folder / one.dataset_id / "card.md").read_text()
-        assert card.startswith("# pantograph/tiny/noisy-pd-v0")
+        assert "\n# pantograph/tiny/noisy-pd-v0\n" in card
         assert "| pd | 0.2 | en50318-2002 | 2 |" in card
         assert "| 7 | force deviation |" in card
+
+    def test_the_table_of_steps_holds_the_same_as_minari(self, data, made):
+        folder, one = made
+        table = pq.read_table(folder / one.dataset_id / "steps.parquet")
+        assert table.num_rows == one.steps
+        assert table.column_names[: len(COLUMNS)] == [column.name for column in COLUMNS]
+        for number, episode in enumerate(data):
+            own = table.filter(pc.field("episode") == number).to_pydict()
+            assert own["step"] == list(range(len(episode.rewards)))
+            assert set(own["policy"]) == {"pd"}
+            for name, there in (
+                ("observation", episode.observations[:-1]),
+                ("next_observation", episode.observations[1:]),
+                ("action", episode.actions),
+                ("reward", episode.rewards),
+                ("terminated", episode.terminations),
+                ("truncated", episode.truncations),
+                ("contact_force", episode.infos["contact_force"][1:]),
+                ("policy_action", episode.infos["policy_action"][1:]),
+                ("reward_terms/rate", episode.infos["reward_terms"]["rate"][1:]),
+            ):
+                np.testing.assert_array_equal(own[name], there, err_msg=name)
+
+    def test_a_hub_reads_the_head_of_the_card(self, made):
+        folder, one = made
+        head = DatasetCard.load(folder / one.dataset_id / "card.md").data
+        assert (head.license, head.task_categories) == ("mit", ["reinforcement-learning"])
+        assert head.pretty_name == one.dataset_id
+        assert head.size_categories == ["n<1K" if one.steps < 1000 else "1K<n<10K"]
+        (config,) = head.to_dict()["configs"]
+        assert (folder / one.dataset_id / config["data_files"]).is_file()
 
     def test_the_same_is_made_again_to_the_last_byte_and_kept_where_it_is(self, made, tmp_path):
         _, one = made
         (again,) = make_episodes.make_episodes(settings(), tmp_path, workers=1)
-        file = "data/main_data.hdf5"
-        assert (again.folder / file).read_bytes() == (one.folder / file).read_bytes()
+        for file in ("data/main_data.hdf5", "steps.parquet", "card.md"):
+            assert (again.folder / file).read_bytes() == (one.folder / file).read_bytes()
         (kept,) = make_episodes.make_episodes(settings(), tmp_path, workers=1)
         assert kept.kept
         with pytest.raises(InputError, match=r"holds another data set of this id .*raise the version"):
@@ -299,7 +333,7 @@ class TestChecksums:
         _, one = made
         copied = tmp_path / "copy"
         shutil.copytree(one.folder, copied)
-        assert verify(tmp_path) == [(copied, 3)]
+        assert verify(tmp_path) == [(copied, 4)]
         listed = dict(reversed(line.split("  ")) for line in (copied / LIST).read_text().splitlines())
         file = copied / "data/main_data.hdf5"
         assert listed["data/main_data.hdf5"] == hashlib.sha256(file.read_bytes()).hexdigest()
@@ -381,6 +415,9 @@ class TestDesigns:
         assert b"drawn from 200 to 300" in table.schema.field("speed_kmh").metadata[b"description"]
         card = (made.folder / "card.md").read_text()
         assert f"- {made.refused} of 8 refused (`refused`):" in card
+        head = DatasetCard(card).data
+        assert (head.task_categories, head.size_categories) == (["tabular-regression"], ["n<1K"])
+        assert (made.folder / head.to_dict()["configs"][0]["data_files"]).is_file()
         assert verify(tmp_path) == [(made.folder, 2)]
         assert make_designs.make_designs(found, tmp_path, workers=1).kept
         with pytest.raises(InputError, match=r"holds another table .*its seed is 0, this is 1"):
