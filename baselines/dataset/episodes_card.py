@@ -15,10 +15,8 @@ from .settings import ENVIRONMENT, EpisodesSettings, Plan, PolicySet
 from .steps_table import COLUMNS, STEPS
 
 REWARD = (
-    "The reward is that of the environment: minus the cost function CF and the contact-loss ratio CL of "
-    "paper 1 over the control step, the rate of the action and the deviation of a running mean of the "
-    "contact force, with the weights of its argument `reward`; `infos/reward_terms` holds the terms, not "
-    "weighted."
+    "The reward is that of the environment: minus the sum of the terms in `infos/reward_terms`, each times "
+    "its weight, which the environment's argument `reward` gives."
 )
 
 
