@@ -7,6 +7,7 @@ from pathlib import Path
 from panto_env.base.errors import InputError
 from panto_env.base.shown import shown
 
+from .ensemble import Ensemble
 from .policy import TrainedPolicy, load
 
 FOLDER = Path(__file__).parent / "models"
@@ -75,6 +76,11 @@ def any_line(seed: int = 0) -> TrainedPolicy:
     realistic actuator on the frame and realistic sensors. It is told nothing of the line.
     """
     return _trained("any-line", seed)
+
+
+def any_line_five() -> Ensemble:
+    """Mean action of the five trainings of agent-any-line, for the same lines and pantograph."""
+    return Ensemble([any_line(seed) for seed in (0, *further_trainings("any-line"))])
 
 
 def any_pantograph(seed: int = 0) -> TrainedPolicy:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from safetensors.numpy import load_file
 
+from panto_agents.ensemble import Ensemble
 from panto_agents.model_file import read_model
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER, further_trainings
 from panto_env import InputError, simulate
+from panto_env.analysis.simulation import ready_pass
 from panto_env.catalog import load_catenary
 from panto_env.policies import find_policy, policy_names
 
@@ -51,7 +54,25 @@ def given(name):
 def test_each_file_is_a_policy_and_each_policy_has_its_file():
     assert sorted(GAINS) == NAMES
     agents = {each for each in policy_names() if each.startswith("agent-")}
-    assert agents == {f"agent-{name}" for name in NAMES}
+    assert agents == {f"agent-{name}" for name in NAMES} | {"agent-any-line-five"}
+
+
+def test_five_trainings_act_by_the_mean_of_their_actions():
+    task, _ = ready_pass("agent-any-line-five", given("any-line"), 0)
+    members = [find_policy(f"agent-any-line:seed={seed}") for seed in range(5)]
+    for policy in (five := find_policy("agent-any-line-five"), *members):
+        policy.reset(task.context(0))
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        observation = (task.results.observation[0] + random.normal(0, 0.3)).astype(np.float32)
+        actions = [member.act(observation) for member in members]
+        np.testing.assert_array_equal(five.act(observation), np.mean(actions, axis=0))
+    assert np.ptp(actions) > 1e-3  # they differ
+
+
+def test_an_ensemble_is_of_agents_for_the_same_task():
+    with pytest.raises(ValueError, match="the same task"):
+        Ensemble([find_policy("agent-any-line"), find_policy("agent-head")])
 
 
 @pytest.mark.parametrize("name", NAMES)
