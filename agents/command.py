@@ -134,13 +134,14 @@ def evaluate(
     from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy, wishes
 
+    from .ensemble import Ensemble
     from .evaluation import Comparison, in_words, verdict
     from .policy import TrainedPolicy
     from .settings import arguments, speeds
 
     driver = find_policy(policy)
-    environment = driver.facts.environment if isinstance(driver, TrainedPolicy) else {"id": "Pantograph-v0"}
-    environment = environment | settings
+    in_training = driver.facts.environment if isinstance(driver, TrainedPolicy | Ensemble) else {}
+    environment = {"id": "Pantograph-v0"} | in_training | settings
     chosen = speed or speeds(arguments(environment))
     check_passes(2 * seeds * len(chosen), "This evaluation")
     judged_on = range(TEST.start, TEST.start + seeds)

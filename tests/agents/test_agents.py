@@ -399,6 +399,13 @@ class TestCommand:
         unknown = panto("evaluate", "nobody")
         assert isinstance(unknown.exception, InputError)
 
+    @pytest.mark.parametrize("name", ["agent-any-line", "agent-any-line-five"])
+    def test_a_stored_agent_is_evaluated_as_in_its_training(self, panto, name):
+        result = panto("evaluate", name, "--speed", 275, "--seeds", 1, "--json")
+        assert result.exit_code == 0, result.output
+        (entry,) = json.loads(result.stdout)["passes"]
+        assert entry["std_change_percent"] < -35
+
     def test_says_what_is_missing(self, panto, config, monkeypatch):
         monkeypatch.setattr(packages, "find_spec", lambda name: None)
         result = panto("train", config)
