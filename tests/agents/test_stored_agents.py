@@ -130,6 +130,12 @@ def test_a_seed_that_nothing_was_trained_under_is_refused(seed):
         find_policy(f"agent-any-line:seed={seed}")
 
 
+def test_agent_trailing_alone_lacks_what_the_one_in_front_measured_and_nothing_else():
+    seeing, alone = (load_training(CONFIGS[name]).model_dump() for name in ("trailing", "trailing-alone"))
+    assert seeing["environment"].pop("front")
+    assert alone == seeing
+
+
 def test_they_need_no_torch():
     code = (
         "import sys, panto_env\n"
