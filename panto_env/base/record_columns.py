@@ -50,7 +50,7 @@ def read_columns(
     """
     lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
-    places = _places(path, header, columns, dict(units or {}))
+    places = places_of(path, header, columns, units)
     used = {place for name, (place, _) in places.items() if not columns[name].text}
     points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
     decimal = "." if separator == "," or points else ","
@@ -127,10 +127,14 @@ def _lines(path: str | Path) -> tuple[list[tuple[int, list[str]]], str]:
     return rows, separator
 
 
-def _places(
-    path: str | Path, header: list[str], columns: Mapping[str, Column], units: dict[str, str]
+def places_of(
+    path: str | Path, header: list[str], columns: Mapping[str, Column], units: Mapping[str, str] | None
 ) -> dict[str, tuple[int, float]]:
-    """Place and scale to SI of each column."""
+    """Place of each column among the headings of a file, and scale of its unit to SI.
+
+    Raises InputError for a missing column, one that is there twice, and an unknown or missing unit.
+    """
+    units = dict(units or {})
     unknown = [name for name in units if name not in columns]
     if unknown:
         raise InputError(f"Unit of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")

@@ -95,12 +95,14 @@ def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
     from . import (
         catalogue,
+        compare,
         diagnose,
         estimate,
         family,
         film,
         identify,
         line,
+        record,
         reproduce,
         rig,
         simulate,
@@ -131,6 +133,8 @@ def make_app() -> typer.Typer:
     app.command()(identify.identify)
     app.command()(estimate.estimate)
     app.command()(diagnose.diagnose)
+    app.command()(record.record)
+    app.command()(compare.compare)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)

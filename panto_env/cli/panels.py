@@ -8,7 +8,7 @@ from typer.core import TyperGroup
 
 PANELS = {
     "Simulate": ("list", "line", "simulate", "sweep", "family", "film"),
-    "Judge": ("report", "validate", "reproduce", "speed"),
+    "Judge": ("report", "record", "compare", "validate", "reproduce", "speed"),
     "Identify": ("identify", "estimate", "diagnose", "rig"),
     "Control": ("benchmark", "tune", "oracle", "replay", "returns", "submission"),
     "Learn": ("train", "trainings", "evaluate", "export", "ablation", "dataset"),

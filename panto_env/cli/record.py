@@ -1,0 +1,127 @@
+"""``panto record``: a measuring train's record of the contact force, judged like a run."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..base.files import PAGES
+from ..base.table_file import TABLES, write_rows
+from ..terminal import (
+    Json,
+    Plot,
+    alert,
+    console,
+    print_json,
+    print_table,
+    progress_console,
+    writable,
+    written_last,
+)
+from .identify import pairs
+
+if TYPE_CHECKING:
+    from ..records.judge import Judgement
+
+Unit = Annotated[
+    list[str] | None,
+    typer.Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+]
+Mass = Annotated[
+    float | None,
+    typer.Option(
+        help="Mass between force sensors and contact (kg), for EN 50317's correction by accelerations that "
+        "were recorded."
+    ),
+]
+Page = Annotated[
+    str | None,
+    typer.Option(help="Write a page with tables and charts to this file (.html).", callback=writable(PAGES)),
+]
+
+
+def record(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV or Parquet: two of time, position and speed; force, or force_1, force_2...; where "
+            "measured acceleration_1..., height, uplift, raised, run. Also a run that `panto simulate` wrote "
+            "as .csv."
+        ),
+    ],
+    line: Annotated[
+        str | None,
+        typer.Option(help="Line: a name in the catalogue or a TOML file, for spans, overlaps and limits."),
+    ] = None,
+    span: Annotated[
+        float | None,
+        typer.Option(help="Length of equal spans from 0 m on (m), instead of a line.", min=1, max=1000),
+    ] = None,
+    section: Annotated[
+        float | None,
+        typer.Option(
+            help="Length of sections (m).",
+            min=1,
+            max=1e6,
+            show_default="from one of the line's overlaps to the next, otherwise 1000",
+        ),
+    ] = None,
+    mass: Mass = None,
+    unit: Unit = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Write the figures of all parts to this file ({', '.join(TABLES)}).",
+            callback=writable(TABLES),
+        ),
+    ] = None,
+    plot: Plot = None,
+    html: Page = None,
+    json: Json = False,
+) -> None:
+    """Judge a measuring train's record of the contact force: figures as of a run, and requirements.
+
+    Figures are those of the whole record, by speed, by section and by span, behind EN 50317's low-pass;
+    losses of contact are those of the raw force. A record that cannot be a measuring train's is refused with
+    the likely mistake.
+    """
+    from ..catalog import load_catenary
+    from ..records.judge import judge
+    from ..records.record_file import read_record
+    from ..records.tables import FILE_HEADINGS, plain, rows_of
+
+    known = None if line is None else load_catenary(line)
+    with progress_console.status("reading and judging"):
+        measured = read_record(file, pairs(unit or []), mass_correction=mass)
+        found = judge(measured, known, span=span, section=section)
+    title = f"{file.name}: {found.whole.figures.distance:,.0f} m"
+    with written_last() as later:
+        if output is not None:
+            later(write_rows, rows_of(found), output, FILE_HEADINGS)
+        if plot is not None:
+            from ..analysis.plots import save
+            from ..records.plots import plot_record
+
+            later(save, plot_record(found, title), plot)
+        if html is not None:
+            from ..records.page import save_record_page
+
+            later(partial(save_record_page, found, title), html)
+        if json:
+            print_json(plain(found))
+            return
+        _print(found, title)
+
+
+def _print(found: Judgement, title: str) -> None:
+    from ..records.tables import part_tables, requirement_remarks, requirements_table, whole_table
+
+    for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
+        print_table(table)
+    for sentence in requirement_remarks(found):
+        console.print(sentence, soft_wrap=True)
+    for note in found.notes:
+        alert("Note:", note)

@@ -1,0 +1,223 @@
+"""A record held against a simulated run: aligned by place, and the deviations by which EN 50318 accepts it.
+
+The standard was not at hand; its acceptance of a simulation against a measurement is recalled.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..metrics.criterion import Criterion
+from ..metrics.labels import LABELS
+from ..metrics.low_pass import low_pass, zero_phase_low_pass
+from ..metrics.trajectory import Trajectory
+from .record import Record
+from .samples import Samples
+from .shift import Shift, find_shift
+
+SAME_SPEED = 0.03
+"""Relative difference of speeds up to which a record is compared with a run. Own choice."""
+STD, UPLIFT, HEIGHT = 20.0, 20.0, 20.0
+"""Accepted deviations of σ (%), of the maximum uplift (mm) and of the contact point's range (mm)."""
+SOURCE = "EN 50318, recalled"
+UNLIKE = 0.3
+"""Correlation below which a record hardly resembles the run, and figures agree by chance. Own choice."""
+COVERED = 0.98
+"""Share of a span that both must cover for it to be compared."""
+
+
+class SpanPair(NamedTuple):
+    """Figures of one span, of the record and of the run: forces in N, heights in m."""
+
+    span: int
+    begin: float  # m
+    end: float  # m
+    mean: tuple[float, float]
+    std: tuple[float, float]
+    max: tuple[float, float]
+    min: tuple[float, float]
+    height_range: tuple[float, float]  # of the contact point; nan where not measured
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A record beside a run, over the spans that both cover."""
+
+    samples: Samples  # of the record's pieces at the run's speed, shifted to the run's places
+    run: Trajectory
+    shift: Shift
+    spans: tuple[SpanPair, ...]
+    figures: dict[str, tuple[float, float]]  # mean, std, max and min of all these spans (N)
+    criteria: tuple[Criterion, ...]  # deviations, run minus record; the last ones for information
+    missing: tuple[str, ...]  # what was not measured, and so is not judged
+    notes: tuple[str, ...]
+
+    @property
+    def accepted(self) -> bool | None:
+        """Whether all limits are kept; None where something was not measured and all others are kept."""
+        if any(each.kept is False for each in self.criteria):
+            return False
+        return None if self.missing else True
+
+    @property
+    def verdict(self) -> str:
+        """The verdict as a clause."""
+        if self.accepted is None:
+            return f"not judged: {' and '.join(self.missing)} not measured"
+        return "accepted" if self.accepted else "not accepted"
+
+
+def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> Comparison:
+    """Hold a record against the evaluated spans of a run's first pantograph.
+
+    shift: about what is to be added to the record's positions (m), if known; else it is searched within 1.5
+    spans. Raises InputError where the run ended early or is too short, the speeds differ by more than 3 %, or
+    the two have less than a span in common.
+    """
+    covered = run.spans()
+    assert covered is not None  # it is for a choice of "all" only
+    begin, end = run.alignment.limits(covered)
+    same, notes = _at_speed(record, run)
+    found = find_shift(Samples(same), run, begin, end, shift)
+    moved = [replace(piece, position=piece.position + found.value) for piece in same.pieces]
+    samples = Samples(replace(same, pieces=tuple(moved)))
+    spans, own, other = _spans(samples, run, begin, end)
+    figures = {name: (call(own), call(other)) for name, call in _STATISTICS.items()}
+    uplift, where = _uplift(samples, run, begin, end)
+    heights = np.array([each.height_range for each in spans if not math.isnan(each.height_range[0])])
+    height = 1e3 * float((heights[:, 1] - heights[:, 0]).mean()) if len(heights) else math.nan
+    if found.correlation < UNLIKE:
+        notes.append(
+            f"Record and run hardly resemble each other (correlation {found.correlation:.2f}): it may be "
+            "of another line, the shift beyond the search, or columns may be swapped."
+        )
+    values = {"uplift at a support": uplift, "range of the contact point's height": height}
+    missing = tuple(name for name, value in values.items() if math.isnan(value))
+    alike = Criterion(
+        "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
+    )
+    criteria = (*_limits(figures, uplift, where, height), alike, *_information(figures))
+    return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
+
+
+def _limits(
+    figures: dict[str, tuple[float, float]], uplift: float, where: str, height: float
+) -> list[Criterion]:
+    measured, simulated = figures["std"]
+    std = 100 * (simulated / measured - 1)
+    heights = "mean over the spans of the range within each, low-passed at 20 Hz"
+    return [
+        Criterion("std", "σ of the contact force", "%", std, -STD, STD, SOURCE),
+        Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
+        Criterion(
+            "height", "range of the contact point's height", "mm", height, -HEIGHT, HEIGHT, SOURCE, heights
+        ),
+    ]
+
+
+def _information(figures: dict[str, tuple[float, float]]) -> list[Criterion]:
+    return [
+        Criterion(key, LABELS[key].name, "N", simulated - measured)
+        for key, (measured, simulated) in figures.items()
+        if key != "std"
+    ]
+
+
+_STATISTICS = {
+    "mean": lambda force: float(force.mean()),
+    "std": lambda force: float(force.std()),
+    "max": lambda force: float(force.max()),
+    "min": lambda force: float(force.min()),
+}
+
+
+def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
+    """The record's pieces at the run's speed, and notes."""
+    same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
+    if not same:
+        raise InputError(
+            f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's {run.speed_kmh:.1f} "
+            f"km/h; simulate the run at the record's speed: --speed {record.longest.speed_kmh:.1f}."
+        )
+    left = len(record.pieces) - len(same)
+    notes = list(record.notes)
+    if left:
+        notes.append(f"{left} pieces at other speeds are left out.")
+    return replace(record, pieces=tuple(same)), notes
+
+
+def _spans(
+    samples: Samples, run: Trajectory, begin: float, end: float
+) -> tuple[list[SpanPair], Array, Array]:
+    """Figures of the spans between begin and end (m) that both cover, and the filtered forces there (N)."""
+    filtered = low_pass(run.contact_force, run.time_step)
+    heights = zero_phase_low_pass(run.wire, run.time_step)
+    measured = _heights(samples)
+    settled, position = samples.settled, samples.position
+    numbers = run.alignment.span_of(np.array([begin + 1e-6, end - 1e-6]))
+    found, own, other = [], [], []
+    ways = samples.speed * samples.step
+    for span in range(int(numbers[0]), int(numbers[1]) + 1):
+        first, last = run.alignment.limits((span, span))
+        here, there = (
+            (position >= first) & (position < last) & settled,
+            run.alignment.within(run.position, (span, span)),
+        )
+        if ways[here].sum() < COVERED * (last - first):
+            continue
+        a, b = samples.filtered[here], filtered[there]
+        own.append(a)
+        other.append(b)
+        ranges = _range(measured, here), _range(heights, there)
+        each = {name: (call(a), call(b)) for name, call in _STATISTICS.items()}
+        found.append(SpanPair(span, first, last, **each, height_range=ranges))
+    if not found:
+        raise InputError(
+            "The record covers none of the run's evaluated spans without a gap; simulate a run along all "
+            "that was recorded, or give a record without so many gaps."
+        )
+    return found, np.concatenate(own), np.concatenate(other)
+
+
+def _heights(samples: Samples) -> Array:
+    """Height of the contact point, low-passed without delay, (n,), m; nan where it was not measured."""
+    found = []
+    for piece in samples.record.pieces:
+        height = np.full(len(piece.force), np.nan) if piece.height is None else piece.height
+        known = bool(np.isfinite(height).all())
+        found.append(zero_phase_low_pass(height, piece.time_step) if known else np.full(len(height), np.nan))
+    return np.concatenate(found)
+
+
+def _range(heights: Array, inside: NDArray[np.bool_]) -> float:
+    return float(np.ptp(heights[inside])) if inside.any() else math.nan
+
+
+def _uplift(samples: Samples, run: Trajectory, begin: float, end: float) -> tuple[float, str]:
+    """Deviation of the maximum uplift at the mast that was measured (mm), and which support that is.
+
+    It is nan where none was measured, or the mast stands outside the evaluated spans, begin to end (m).
+    """
+    pieces = [piece for piece in samples.record.pieces if piece.uplift is not None]
+    if not pieces or not run.uplift.size:
+        return math.nan, ""
+    best = max(pieces, key=lambda piece: float(np.nanmax(np.asarray(piece.uplift))))
+    rise = np.asarray(best.uplift)
+    at = int(np.nanargmax(rise))
+    nearest = int(np.argmin(np.abs(run.support_position - best.position[at])))
+    place = float(run.support_position[nearest])
+    if not begin - 1e-6 <= place <= end + 1e-6:
+        return math.nan, f"it was measured at {place:.6g} m, outside the run's evaluated spans"
+    measured, simulated = float(rise[at]), float(run.uplift[:, nearest].max())
+    words = (
+        f"{1e3 * measured:.1f} mm were measured when the train was at {best.position[at]:.1f} m, "
+        f"and {1e3 * simulated:.1f} mm simulated at the support at {place:.6g} m"
+    )
+    return 1e3 * (simulated - measured), words

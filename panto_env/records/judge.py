@@ -1,0 +1,223 @@
+"""Figures of a record as those of a run: of the whole, by speed, by section and by span; and requirements.
+
+Means, σ, maxima and minima are those behind EN 50317's low-pass, losses of contact those of the raw force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.units import from_kmh, to_kmh
+from ..metrics.compliance import LineFacts, compliance
+from ..metrics.criterion import Criterion
+from ..metrics.figures import ARC, Figures, arcing, contact_loss
+from ..metrics.spectrum import amplitudes
+from ..plant.alignment import Alignment
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.schema import CatenaryData
+from .record import Record
+from .samples import ABOVE, Samples
+
+CLASS_KMH, FIRST_KMH = 20.0, 15.0
+"""Width of a class of speeds, and where one begins (km/h): a train at 200 or 300 km/h is in one class, not on
+the edge of two. Own choice."""
+LONG_ENOUGH = 2.0
+"""Time (s) from which on a class of speeds has requirements of its own: a train passes others. Own choice."""
+SECTION = 1000.0
+"""Length of a section (m) where no other is known. Own choice."""
+COVERED = 0.9
+"""Share of a span that must be recorded for its figures to be shown."""
+WINDOW = 8.0
+"""Duration of the windows (s) whose spectra are averaged."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Figures of some of a record's samples; figures that a record cannot have are nan."""
+
+    kind: str  # "whole", "run", "speed", "section" or "span"
+    where: str
+    figures: Figures
+    arcing: float  # NQ (%), nan where the samples do not resolve it
+    speed: float  # mean (m/s)
+    samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """A record's figures and requirements."""
+
+    samples: Samples
+    parts: tuple[Part, ...]  # the whole first, then by run, speed, section and span
+    requirements: tuple[tuple[Part, list[Criterion]], ...]  # of each class of speeds
+    alignment: Alignment | None  # supports, where they are known
+    notes: tuple[str, ...]
+
+    @property
+    def whole(self) -> Part:
+        """Figures of all samples."""
+        return self.parts[0]
+
+    def of(self, kind: str) -> list[Part]:
+        """Parts of a kind; see ``Part``."""
+        return [part for part in self.parts if part.kind == kind]
+
+
+def judge(
+    record: Record,
+    line: CatenaryData | None = None,
+    *,
+    span: float | None = None,
+    section: float | None = None,
+) -> Judgement:
+    """Judge a record. line: its supports, overlaps, power supply and room for the uplift, where known.
+
+    span: length of equal spans (m), from 0 m on, where no line is given. section: length of sections (m), by
+    default from the middle of each overlap to the next, or ``SECTION`` where the line has none. Raises
+    InputError where both a line and spans are given, or the record lies beside the line.
+    """
+    samples = Samples(record)
+    alignment = _alignment(samples, line, span)
+    parts = [_part(samples, "whole", "whole record", np.ones(len(samples.raw), dtype=bool))]
+    runs = list(dict.fromkeys(piece.run for piece in record.pieces))
+    if len(runs) > 1:
+        parts += [_part(samples, "run", f"run {name}", samples.run == k) for k, name in enumerate(runs)]
+    number = np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
+    classes = [_part(samples, "speed", _class_name(k), number == k) for k in np.unique(number)]
+    parts += classes
+    edges = _section_edges(samples.position, line, section)
+    at = np.searchsorted(edges, samples.position, side="right") - 1
+    parts += [
+        _part(samples, "section", f"{edges[k]:,.0f} to {edges[k + 1]:,.0f} m", at == k) for k in np.unique(at)
+    ]
+    parts += _spans(samples, alignment) if alignment is not None else []
+    uplift = max(
+        (float(np.nanmax(p.uplift)) for p in record.pieces if p.uplift is not None), default=math.nan
+    )
+    judged = [part for part in classes if part.samples * samples.step >= LONG_ENOUGH] or parts[:1]
+    alone = len(judged) == 1
+    requirements = tuple((part, _criteria(part, line, uplift if alone else math.nan)) for part in judged)
+    return Judgement(samples, tuple(parts), requirements, alignment, tuple(_notes(samples, line, span)))
+
+
+def force_spectrum(record: Record) -> tuple[Array, Array]:
+    """Frequencies (Hz) and amplitudes (N) of a record's raw force, (m,) each, the rms of all windows.
+
+    A peak has the amplitude of its harmonic. Windows of ``WINDOW`` seconds, or as long as the longest piece.
+    """
+    step = record.longest.time_step
+    size = min(round(WINDOW / step), max(len(piece.force) for piece in record.pieces))
+    windows = [
+        piece.force[begin : begin + size]
+        for piece in record.pieces
+        for begin in range(0, len(piece.force) - size + 1, size)
+    ]
+    found = [amplitudes(window, step) for window in windows]
+    return found[0][0], np.sqrt(np.mean([own**2 for _, own in found], axis=0))
+
+
+def _class_name(number: float) -> str:
+    begin = FIRST_KMH + CLASS_KMH * number
+    return f"{max(begin, 0):g}-{begin + CLASS_KMH:g} km/h"
+
+
+def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) -> Part:
+    force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
+    speed = float(samples.speed[inside].mean())
+    whole = not samples.low_passed
+    mean, std = (float(force.mean()), float(force.std())) if force.size else (math.nan, math.nan)
+    figures = replace(
+        Figures.none(),
+        mean=mean,
+        std=std,
+        statistical_max=mean + 3 * std,
+        statistical_min=mean - 3 * std,
+        max=float(force.max()) if force.size else math.nan,
+        min=float(force.min()) if force.size else math.nan,
+        contact_loss=contact_loss(raw) if whole else math.nan,
+        distance=speed * samples.step * len(raw),
+    )
+    resolved = whole and samples.step <= ARC * (1 + 1e-6)
+    return Part(kind, where, figures, arcing(raw, samples.step) if resolved else math.nan, speed, len(raw))
+
+
+def _spans(samples: Samples, alignment: Alignment) -> list[Part]:
+    """Parts of the spans that at least one run covers."""
+    numbers, found = alignment.span_of(samples.position), []
+    for number in np.unique(numbers):
+        begin, end = alignment.limits((int(number), int(number)))
+        words = f"{number}: {begin:,.6g} to {end:,.6g} m"
+        part = _part(samples, "span", words, numbers == number)
+        if part.figures.distance >= COVERED * (end - begin):
+            found.append(part)
+    return found
+
+
+def _alignment(samples: Samples, line: CatenaryData | None, span: float | None) -> Alignment | None:
+    if line is not None and span is not None:
+        raise InputError("Give a line or the length of its spans, not both.")
+    begin, end = samples.position.min(), samples.position.max()
+    if span is not None:
+        return Alignment.equal(span, max(1, math.ceil(end / span)))
+    if line is None:
+        return None
+    own = line.alignment()
+    if line.ends and (end < 0 or begin > own.length):
+        raise InputError(
+            f"The record runs from {begin:,.0f} to {end:,.0f} m, and line '{line.name}' from 0 to "
+            f"{own.length:,.0f} m; write positions from the line's first support."
+        )
+    return own
+
+
+def _section_edges(position: Array, line: CatenaryData | None, section: float | None) -> Array:
+    """Where sections begin and end (m), rising, around all positions."""
+    overlaps: Any = getattr(line, "overlaps", None) or ()
+    begin, end = float(position.min()), float(position.max())
+    if section is None and line is not None and overlaps:
+        own = line.alignment()
+        middles = [own.support(each.first_span - 1 + each.spans / 2) for each in overlaps]
+        return np.array([min(0.0, begin), *middles, max(own.length, end) + 1e-6])
+    length = section or SECTION
+    return np.asarray(length * np.arange(math.floor(begin / length), math.floor(end / length) + 2))
+
+
+def _criteria(part: Part, line: CatenaryData | None, uplift: float) -> list[Criterion]:
+    """Requirements at the mean speed of a part; uplift: maximum at the mast that was measured (m)."""
+    speed = from_kmh(
+        round(to_kmh(part.speed), 1)
+    )  # limits change at 200 and 250 km/h: rounding decides nothing
+    facts = LineFacts(system_source="own choice, as no line is given")
+    if line is not None:
+        wave = line.contact_wire.wave_speed if isinstance(line, FlexibleCatenaryData) else math.inf
+        facts = LineFacts.of(line, wave, speed)
+    mean_span = line.alignment().mean_length if line is not None else 1.0
+    figures, none = replace(part.figures, max_uplift=uplift), np.zeros(0)
+    found = compliance(figures, part.arcing, facts, speed, mean_span, none, none)
+    # Its note for a run names an option that a record cannot have.
+    words = f"this and other limits are those for {facts.system}, the power supply ({facts.system_source})"
+    return [replace(each, note=words) if each.key == "mean" else each for each in found]
+
+
+def _notes(samples: Samples, line: CatenaryData | None, span: float | None) -> list[str]:
+    notes = list(samples.record.notes)
+    if samples.low_passed:
+        notes.append(
+            f"The force was low-passed before it was recorded (there is hardly any above {ABOVE:g} Hz): its "
+            "figures are of the force as it is, and losses of contact (CL, NQ) cannot be judged."
+        )
+    elif samples.step > ARC * (1 + 1e-6):
+        notes.append(
+            f"Samples are {1e3 * samples.step:.3g} ms apart, so losses of contact of {1e3 * ARC:g} ms are "
+            "not resolved and NQ cannot be judged; 200 samples a second are needed."
+        )
+    if line is None and span is not None:
+        notes.append(f"Supports are taken to stand every {span:g} m from 0 m on.")
+    return notes
