@@ -202,9 +202,12 @@ def parse_catenary(table: Mapping[str, Any], path: Path) -> CatenaryData:
     return _checked(line, path)
 
 
-def file_of(source: str | Path) -> Path:
-    """TOML file of a line by its name in the catalogue or its path. Raises InputError where there is none."""
-    return _find("catenary", source)
+def file_of(source: str | Path, family: str = "catenary") -> Path:
+    """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
+
+    Raises InputError where there is none.
+    """
+    return _find(family, source)
 
 
 @cache

@@ -59,7 +59,10 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
     """
     for key, field in type(entry).model_fields.items():
         value, own = getattr(entry, key), given and key in entry.model_fields_set
-        if isinstance(value, BaseModel):
+        if key == "as_found" and value is not None:  # only what was found to differ
+            for name, item in value.model_dump(exclude_defaults=True).items():
+                yield f"{prefix}{key}.{name}", item, field.description or "", own
+        elif isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{key}.", own)
         elif key in ("span_types", "sequence", "overlaps"):
             items = value.items() if isinstance(value, Mapping) else enumerate(value, start=1)

@@ -100,6 +100,7 @@ def make_app() -> typer.Typer:
         estimate,
         family,
         film,
+        fit,
         identify,
         line,
         record,
@@ -135,6 +136,7 @@ def make_app() -> typer.Typer:
     app.command()(diagnose.diagnose)
     app.command()(record.record)
     app.command()(compare.compare)
+    app.command()(fit.fit)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)

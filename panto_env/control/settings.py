@@ -6,7 +6,7 @@ The arguments in Python, the tables of trainings and benchmarks, and the command
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Self, TypeVar
 
@@ -29,7 +29,7 @@ from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count
 from ..plant.drift import largest_drift
-from ..plant.line_condition import LINE_CONDITIONS, LineCondition
+from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
@@ -347,6 +347,21 @@ class RunSettings(Numerics):
         if several and isinstance(several, list | tuple) and values.get("pantograph", usual) == usual:
             return {**values, "pantograph": several[0]}
         return values
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _as_found(cls, values: Any, handler: Callable[[Any], Self]) -> Self:
+        """A line that was found to differ from its design does so in every run."""
+        settings = handler(values)
+        found = getattr(settings.catenary, "as_found", None)
+        if found is None:
+            return settings
+        conditions = tuple(together(found, given) for given in settings.line_condition)
+        return (
+            settings
+            if conditions == settings.line_condition
+            else handler({**values, "catenary": settings.catenary, "line_condition": conditions})
+        )
 
     @model_validator(mode="after")
     def _fit_together(self) -> Self:

@@ -30,7 +30,8 @@ Mass = Annotated[float, Between(0, 100, "kg")]
 Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
 Length = Annotated[float, Between(2, 2000, "m")]
 Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
-Lost = Annotated[float, Between(0, 0.5)]
+# A little may also have been gained: by friction of the pulleys, or weights too heavy.
+Lost = Annotated[float, Between(-0.1, 0.5)]
 # Ice loads of standards reach 1.5 kg/m (recalled).
 Ice = Annotated[float, Between(0, 5, "kg/m")]
 # From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
@@ -87,10 +88,14 @@ class LineCondition(Settings):
         "distance from its first support (m), length (m), share of the section that is gone)",
     )
     lost_contact_tension: Lost = Field(
-        0.0, description="share of the contact wire's tension that is lost, along the whole line (-)"
+        0.0,
+        description="share of the contact wire's tension that is lost, along the whole line; gained, where "
+        "negative (-)",
     )
     lost_messenger_tension: Lost = Field(
-        0.0, description="share of the messenger wire's tension that is lost, along the whole line (-)"
+        0.0,
+        description="share of the messenger wire's tension that is lost, along the whole line; gained, where "
+        "negative (-)",
     )
     wind: WindSpeed = Field(
         0.0, description="mean wind along the track, at 10 m over the ground; a head wind is positive (m/s)"
@@ -193,6 +198,18 @@ class LineCondition(Settings):
 
 
 NEW = LineCondition()
+
+
+def together(found: LineCondition, given: LineCondition) -> LineCondition:
+    """A line as it was found, in a condition that is given besides: its values, and lists of both."""
+    changed: dict[str, Any] = {}
+    for name in LineCondition.model_fields:
+        one, other = getattr(found, name), getattr(given, name)
+        if isinstance(one, tuple):
+            changed[name] = tuple(dict.fromkeys((*one, *other)))
+        elif other != getattr(NEW, name):
+            changed[name] = other
+    return LineCondition.model_validate(found.model_dump() | changed)
 
 
 # "smooth", "fair" and "worn" are about the running surface alone, on any kind of line; "as-built" is about

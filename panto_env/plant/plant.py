@@ -245,26 +245,28 @@ class Plant:
             for lane in lanes.tolist():
                 samples.tension[lane] = self.model.rest_tension(lane)
 
-    def advance(self, command: Array, steps: int, samples: Samples) -> None:
-        """Advance all lanes by ``steps`` under commands (N), (lanes, collectors, places).
+    def advance(self, command: Array, steps: int, samples: Samples, lanes: int | None = None) -> None:
+        """Advance the first lanes, by default all, by ``steps``.
 
-        The sample of a lane's step n (counted from 0) is recorded in row n + 1. Raises InputError where a
-        train would run beyond the line's end, or the samples have no row for a step.
+        command: N, (lanes, collectors, places). The sample of a lane's step n (counted from 0) is recorded in
+        row n + 1. Raises InputError where a train would run beyond the line's end, or the samples have no row
+        for a step.
         """
-        self._check_way(steps, samples)
+        count = self.lanes if lanes is None else lanes
+        self._check_way(steps, samples, count)
         if self._advance is None:
             self._advance = bind(advance, pack(*self.arrays), samples, command, steps, 0, 1)
-        self._advance(samples, command, steps, 0, self.lanes)
+        self._advance(samples, command, steps, 0, count)
 
-    def _check_way(self, steps: int, samples: Samples) -> None:
-        """Raise InputError unless all lanes can advance by ``steps``, and the samples have rows for them."""
-        end, rows = self.row(Row.STEP) + steps, samples.rows.shape[1]
+    def _check_way(self, steps: int, samples: Samples, lanes: int) -> None:
+        """Raise InputError unless lanes can advance by ``steps``, and the samples have rows for them."""
+        end, rows = self.row(Row.STEP)[:lanes] + steps, samples.rows.shape[1]
         if rows > 1 and end.max() >= rows:
             raise InputError(
                 f"The samples have rows for {rows - 1} steps, not for {end.max():.0f}; make more rows."
             )
-        drifted = self.ahead(np.arange(self.lanes), end[:, None])[:, 0]
-        position = end * self.row(Row.STRIDE) + drifted
+        drifted = self.ahead(np.arange(lanes), end[:, None])[:, 0]
+        position = end * self.row(Row.STRIDE)[:lanes] + drifted
         if not self.model.massless and position.max() > self.model.length + 1e-6:
             farthest = beside(position.max(), self.model.length, ".1f")
             raise InputError(
@@ -272,6 +274,6 @@ class Plant:
                 f"{self.model.length:g} m; take fewer steps, or more spans."
             )
 
-    def advance_passively(self, steps: int, samples: Samples) -> None:
-        """Advance all lanes by ``steps`` without actuators."""
-        self.advance(np.zeros((self.lanes, len(self.train.collectors), len(Place))), steps, samples)
+    def advance_passively(self, steps: int, samples: Samples, lanes: int | None = None) -> None:
+        """Advance the first lanes, by default all, by ``steps`` without actuators, as ``advance`` does."""
+        self.advance(np.zeros((self.lanes, len(self.train.collectors), len(Place))), steps, samples, lanes)

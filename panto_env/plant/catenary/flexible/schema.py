@@ -12,6 +12,7 @@ from ....base.errors import InputError
 from ....base.ranges import Between
 from ....base.settings import Settings
 from ...alignment import Alignment
+from ...line_condition import LineCondition
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
 from .parts import (
     CLOSEST,
@@ -86,6 +87,11 @@ class FlexibleCatenaryData(CatenaryData):
     )
     overlaps: tuple[Overlap, ...] = Field(
         (), description="where one pair of wires ends and the next begins, in the order of travel"
+    )
+    as_found: LineCondition | None = Field(
+        None,
+        description="how the line was found to differ from its design, such as by `panto fit`: a line "
+        "condition in which all runs on it are, beside that of the run",
     )
 
     def __hash__(self) -> int:

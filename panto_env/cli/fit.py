@@ -1,0 +1,173 @@
+"""``panto fit``: what of a line explains measured forces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..base.errors import InputError
+from ..base.table_file import TABLES, write_rows
+from ..terminal import (
+    Json,
+    Plot,
+    alert,
+    bars,
+    console,
+    print_json,
+    print_table,
+    progress_console,
+    writable,
+    written_last,
+)
+from .identify import pairs
+from .record import Mass, Unit
+
+if TYPE_CHECKING:
+    from ..fitting.fit import Fit
+    from ..fitting.solve import State
+
+
+def fit(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="RECORD...", help="Records, as `panto record` reads them.")
+    ],
+    line: Annotated[str, typer.Option(help="Line as designed: a name in the catalogue or a TOML file.")],
+    pantograph: Annotated[str, typer.Option(help="Pantograph: a name in the catalogue or a TOML file.")],
+    free: Annotated[
+        str | None,
+        typer.Option(
+            help="What may differ from the design, of tensions, droppers, supports, damping, pantograph and "
+            "unevenness.",
+            show_default="tensions,droppers,supports,unevenness",
+        ),
+    ] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Standard deviation of a kind of values before any record is seen, e.g. droppers=0.01 (m), "
+            "tensions=0.03 (of the design's); may be repeated."
+        ),
+    ] = None,
+    mass: Mass = None,
+    unit: Unit = None,
+    output: Annotated[
+        str | None,
+        typer.Option(help="Write the fitted line to this file (.toml).", callback=writable((".toml",))),
+    ] = None,
+    pantograph_output: Annotated[
+        str | None,
+        typer.Option(help="Write the fitted pantograph to this file (.toml).", callback=writable((".toml",))),
+    ] = None,
+    values: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Write all values with their intervals to this file ({', '.join(TABLES)}).",
+            callback=writable(TABLES),
+        ),
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Find what of a line explains records of the contact force: tensions, droppers, supports.
+
+    Each value comes with its 95 % interval; what the records cannot tell is said, and stays as designed.
+    Records of several speeds tell more than as many of one. A fit that is broken off goes on where it was, if
+    it is given an --output or --values.
+    """
+    from ..catalog import load_catenary, load_pantograph
+    from ..fitting import fit as fits
+    from ..fitting.kept import SUFFIX, identity_of, keep, kept
+    from ..fitting.values import USUAL
+    from ..records.record_file import read_record
+
+    names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
+    tolerances = _numbers(tolerance or [])
+    records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
+    design, riding = load_catenary(line), load_pantograph(pantograph)
+    target = output or values
+    place = None if target is None else Path(f"{target}{SUFFIX}")
+    settings = {"free": list(names), "tolerances": tolerances}
+    settings |= {"line": design.model_dump_json(), "pantograph": riding.model_dump_json()}
+    identity = identity_of(records, settings)
+    begin = None if place is None else kept(place, identity)
+    if begin is not None:
+        progress_console.print(f"Going on from step {begin.steps} ({place}).")
+    with bars("{task.description}") as progress:
+        bar = progress.add_task("preparing")
+
+        def report(state: State, gain: float) -> None:
+            progress.update(bar, description=f"step {state.steps}, expected gain {gain:.3g}")
+            if place is not None:
+                keep(place, state, identity)
+
+        def working(share: float) -> None:
+            progress.update(bar, description=f"derivatives, {100 * share:.0f} %")
+
+        found = fits.fit(
+            records,
+            design,
+            riding,
+            free=names,
+            tolerances=tolerances,
+            begin=begin,
+            report=report,
+            working=working,
+        )
+    if place is not None:
+        place.unlink(missing_ok=True)
+    every = ", ".join(file.name for file in files)
+    with written_last() as later:
+        if output is not None:
+            from ..fitting.fitted_line import write_line
+
+            later(lambda: write_line(found, line, output, every))
+        if pantograph_output is not None:
+            from ..fitting.fitted_line import write_pantograph
+
+            later(lambda: write_pantograph(found, pantograph, pantograph_output, every))
+        if values is not None:
+            from ..fitting.tables import rows_of
+
+            later(write_rows, rows_of(found), values)
+        if plot is not None:
+            from ..analysis.plots import save
+            from ..fitting.plots import plot_fit
+
+            later(save, plot_fit(found, f"{every}: {riding.name} on {design.name}"), plot)
+        _print(found, json)
+
+
+def _numbers(given: list[str]) -> dict[str, float]:
+    """Tolerances by kind. Raises InputError for a kind that is unknown, or no positive number."""
+    from ..base.names import suggest
+    from ..fitting.values import FREE
+
+    found = {}
+    for name, text in pairs(given).items():
+        if name not in FREE:
+            raise InputError(f"--tolerance of unknown '{name}': {suggest(name, FREE)}.")
+        try:
+            value = float(text)
+        except ValueError:
+            value = 0.0
+        if not 0 < value <= 1:
+            raise InputError(f"--tolerance {name} must be a number above 0 and up to 1, not '{text}'.")
+        found[name] = value
+    return found
+
+
+def _print(found: Fit, json: bool) -> None:
+    from ..fitting.tables import parts_table, plain, remarks, summary_table, values_table
+
+    if json:
+        print_json(plain(found))
+        return
+    for table in (parts_table(found), summary_table(found), values_table(found)):
+        if table.rows:
+            print_table(table)
+    for sentence in remarks(found):
+        alert("Note:", sentence)
+    if not found.solution.settled:
+        console.print("More steps: repeat the command with an --output.", soft_wrap=True)

@@ -1,0 +1,130 @@
+"""What a fit found: each value with its interval, whether the records tell it, and what they leave over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..estimation.innovations import Whiteness, whiteness
+from ..plant.catenary.schema import CatenaryData
+from ..plant.pantograph.schema import PantographData
+from ..records.record import Record
+from .problem import Problem, problem
+from .solve import Part, Solution, State
+from .values import USUAL, Value
+
+INTERVAL = 1.96
+"""Standard deviations on each side of a 95 % interval."""
+TELLS = 0.6
+"""Share of its tolerance below which the standard deviation of a value must have fallen for the records to
+tell it."""
+CORRELATED = 0.9
+"""Correlation from which on two values are named: the records know their sum or difference better."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """One value of the fit, as its difference from the design."""
+
+    value: Value
+    difference: float
+    deviation: float  # standard deviation
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the difference."""
+        return self.difference - INTERVAL * self.deviation, self.difference + INTERVAL * self.deviation
+
+    @property
+    def told(self) -> bool:
+        """Whether the records tell it."""
+        return self.deviation < TELLS * self.value.tolerance
+
+    @property
+    def differs(self) -> bool:
+        """Whether the design's value lies outside the interval."""
+        return self.told and abs(self.difference) > INTERVAL * self.deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The end of a fit."""
+
+    problem: Problem
+    solution: Solution
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        """Pieces of records that were compared."""
+        return self.problem.fitting.parts
+
+    @cached_property
+    def found(self) -> tuple[Found, ...]:
+        """All values, of droppers and supports only those along what was compared."""
+        values = self.problem.fitting.values.all
+        deviations = np.sqrt(np.diag(self.solution.covariance))
+        triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
+        return tuple(Found(*each) for each in triples if self._compared(each[0]))
+
+    def of_kind(self, kind: str) -> list[Found]:
+        """Values of one kind."""
+        return [each for each in self.found if each.value.kind == kind]
+
+    @cached_property
+    def correlated(self) -> list[tuple[Value, Value, float]]:
+        """Pairs of told values that the records hardly tell apart, strongest first."""
+        values = self.problem.fitting.values.all
+        told = {each.value.name for each in self.found if each.told}
+        which = [k for k, value in enumerate(values) if value.name in told]
+        covariance = self.solution.covariance[np.ix_(which, which)]
+        scale = np.sqrt(np.diag(covariance))
+        matrix = np.triu(covariance / np.outer(scale, scale), 1)
+        pairs = np.argwhere(np.abs(matrix) > CORRELATED)
+        found = [(values[which[i]], values[which[j]], float(matrix[i, j])) for i, j in pairs]
+        return sorted(found, key=lambda pair: -abs(pair[2]))
+
+    @cached_property
+    def whiteness(self) -> list[Whiteness]:
+        """Of what is left of each part, over its noise: whether it is as random as noise."""
+        noise = self.solution.state.noise
+        rows = zip(self.solution.left, noise, self.parts, strict=True)
+        return [whiteness((left / own[part.measured.band])[:, None]) for left, own, part in rows]
+
+    @cached_property
+    def left(self) -> list[tuple[float, float]]:
+        """Standard deviation (N) of what is compared of each part, and of what is left of it."""
+        shifts = self.solution.state.x[len(self.problem.fitting.values) :]
+        found = []
+        for part, shift, left in zip(self.parts, shifts, self.solution.left, strict=True):
+            own = part.measured
+            found.append((own.std(own.coefficients(own.force(float(shift)))), own.std(left)))
+        return found
+
+    def _compared(self, value: Value) -> bool:
+        begin, end = self.problem.stretch
+        return value.place is None or begin <= value.place <= end
+
+
+def fit(
+    records: Sequence[Record],
+    line: CatenaryData,
+    pantograph: PantographData,
+    *,
+    free: Sequence[str] = USUAL,
+    tolerances: Mapping[str, float] | None = None,
+    begin: State | None = None,
+    report: Callable[[State, float], None] = lambda state, gain: None,
+    working: Callable[[float], None] = lambda share: None,
+) -> Fit:
+    """Fit ``free`` values of a line, and of the pantograph, to records of the contact force.
+
+    line, pantograph: as designed. tolerances: standard deviations of values before any record is seen, by
+    kind. begin: where to go on, by default with the design. report, working: as ``Fitting.run`` takes them.
+    Raises InputError as ``problem`` does, and where a simulated pass diverges.
+    """
+    ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
+    fitting = ready.fitting
+    return Fit(ready, fitting.run(fitting.start() if begin is None else begin, report, working))

@@ -1,0 +1,101 @@
+"""The fitted line, or pantograph, as a TOML file: the design's text with what was found, and its sources."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..base.files import check_output, write_whole
+from ..catalog.loader import file_of
+from .fit import INTERVAL, Fit, Found
+from .toml_text import with_table, with_value
+
+SUFFIXES = (".toml",)
+"""Of the files that a line and a pantograph are written to."""
+
+
+def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:
+    """Write the line with what was found, for ``panto simulate --catenary``, whole or not at all.
+
+    base: the design, a name of the catalogue or a TOML file, whose text is kept. The table ``as_found`` holds
+    by how much droppers, supports and tensions differ; values that the records cannot tell stay as designed.
+    records: their names, for the sources. Raises InputError for a name with another suffix, for a design
+    whose values cannot be replaced, or where it cannot be written.
+    """
+    check_output(path, SUFFIXES)
+    text = file_of(base).read_text(encoding="utf-8-sig")
+    design = fit.problem.fitting.values.design
+    for each in fit.of_kind("damping"):
+        if each.told:
+            name = each.value.index[0]
+            value = getattr(design.catenary.damping, name) * (1 + each.difference)
+            text = with_value(text, f"damping.{name}", value, source([each], records), str(base))
+    values, sources = as_found(fit, records)
+    needed = fit.problem.first_span + design.spans
+    if not design.catenary.ends and needed > design.catenary.spans:
+        text = with_value(text, "spans", needed, f"as long as {records}", str(base))
+    _write(path, with_table(text, "as_found", values, sources))
+
+
+def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:
+    """Write the pantograph with its fitted values, as ``write_line`` does."""
+    check_output(path, SUFFIXES)
+    text = file_of(base, "pantograph").read_text(encoding="utf-8-sig")
+    design = fit.problem.fitting.values.design.pantograph
+    chains: dict[str, list[Found]] = {}
+    for each in fit.of_kind("pantograph"):
+        if each.told:
+            chains.setdefault(each.value.index[0], []).append(each)
+    for name, found in chains.items():
+        values = list(getattr(design, name))
+        for each in found:
+            values[each.value.index[1]] *= 1 + each.difference
+        numbers = ", ".join(str(each.value.index[1] + 1) for each in found)
+        text = with_value(text, name, values, f"number {numbers} {source(found, records)}", str(base))
+    _write(path, text)
+
+
+def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """A line condition of what the records tell, and the source of each of its values."""
+    design, before = fit.problem.fitting.values.design, fit.problem.first_span
+    line = design.catenary
+    known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
+    sources = {key: line.sources.get(f"as_found.{key}", "not given") for key in known}
+    spans = line.alignment(design.spans).span_of(design.droppers)
+    cut = {(span, number): wrong for span, number, wrong in known.get("miscut_droppers", ())}
+    raised = dict(known.get("raised_supports", ()))
+    told = {
+        kind: [each for each in fit.of_kind(kind) if each.told]
+        for kind in ("droppers", "supports", "tensions")
+    }
+    for each in told["droppers"]:
+        k = each.value.index[0]
+        place = int(spans[k]) + before, int(k - (spans < spans[k]).sum()) + 1
+        cut[place] = cut.get(place, 0.0) + each.difference
+    for each in told["supports"]:
+        number = each.value.index[0] + 1 + before
+        raised[number] = raised.get(number, 0.0) + each.difference
+    values: dict[str, Any] = dict(known)
+    if told["droppers"]:
+        values["miscut_droppers"] = [[*place, round(wrong, 6)] for place, wrong in sorted(cut.items())]
+        sources["miscut_droppers"] = source(told["droppers"], records)
+    if told["supports"]:
+        values["raised_supports"] = [[number, round(wrong, 6)] for number, wrong in sorted(raised.items())]
+        sources["raised_supports"] = source(told["supports"], records)
+    for each in told["tensions"]:
+        key = f"lost_{('contact', 'messenger')[each.value.index[0]]}_tension"
+        values[key] = round(1 - (1 - known.get(key, 0.0)) * (1 + each.difference), 6)
+        sources[key] = source([each], records)
+    return values, sources
+
+
+def source(found: list[Found], records: str) -> str:
+    """Source of values that were fitted, with the size of their 95 % intervals."""
+    sizes = sorted(INTERVAL * each.value.scale * each.deviation for each in found)
+    size = f"{sizes[0]:.2g}" if len(sizes) == 1 else f"{sizes[0]:.2g} to {sizes[-1]:.2g}"
+    return f"fitted to {records}; 95 % intervals of ±{size} {found[0].value.unit}"
+
+
+def _write(path: str | Path, text: str) -> None:
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,72 @@
+"""Pictures of a fit: forces by place, and droppers and supports with their intervals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base import marks
+from ..base.colours import series_colour
+from ..base.legend import legend_above
+from .fit import INTERVAL, Fit, Found
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def plot_fit(fit: Fit, title: str) -> Figure:
+    """The record with the most left over beside the fitted force, and values along the line."""
+    from matplotlib.figure import Figure
+
+    kinds = [kind for kind in ("droppers", "supports") if fit.of_kind(kind)]
+    figure = Figure(figsize=(11, 3.2 + 2.6 * len(kinds)), layout="constrained")
+    force, *others = np.atleast_1d(figure.subplots(1 + len(kinds), 1, sharex=True)).tolist()
+    figure.suptitle(title)
+    _draw_force(force, fit)
+    for axes, kind in zip(others, kinds, strict=True):
+        _draw_values(axes, fit, fit.of_kind(kind))
+    (others[-1] if others else force).set_xlabel(marks.POSITION)
+    return figure
+
+
+def _before(fit: Fit) -> float:
+    """Way along the line before the simulated spans (m)."""
+    line = fit.problem.fitting.values.design.catenary
+    return 0.0 if line.ends else fit.problem.first_span * line.span_length
+
+
+def _draw_force(axes: Axes, fit: Fit) -> None:
+    worst = int(np.argmax([after / before for before, after in fit.left]))
+    part = fit.parts[worst]
+    own, shift = part.measured, fit.solution.state.x[len(fit.problem.fitting.values) + worst]
+    seen = own.coefficients(own.force(float(shift)))
+    place = own.place + _before(fit)
+    axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
+    fitted = own.back(seen - fit.solution.left[worst])
+    axes.plot(place, fitted, color=series_colour(0), linewidth=0.9, label="fitted")
+    axes.set_ylabel("contact force without\nits slow part, to 18 Hz (N)")
+    axes.set_xlim(place[0], place[-1])
+    legend_above(axes, 2)
+
+
+def _draw_values(axes: Axes, fit: Fit, found: list[Found]) -> None:
+    value = found[0].value
+    for told, colour, words in ((True, series_colour(0), "told"), (False, "0.7", "not told")):
+        own = [each for each in found if each.told is told]
+        if own:
+            axes.errorbar(
+                [(each.value.place or 0.0) + _before(fit) for each in own],
+                [value.scale * each.difference for each in own],
+                [INTERVAL * value.scale * each.deviation for each in own],
+                fmt=".",
+                color=colour,
+                elinewidth=1.0,
+                label=f"{words} by the records, 95 % intervals",
+            )
+    axes.axhline(0.0, color="0.4", linewidth=0.8)
+    what = "dropper too long" if value.kind == "droppers" else "support too high"
+    axes.set_ylabel(f"{what} ({value.unit})")
+    axes.grid(color="0.92")
+    legend_above(axes, 2)

@@ -1,0 +1,183 @@
+"""Gauss-Newton with tolerances as priors, and the noise of each band of frequencies found on the way.
+
+The fit minimises, over values x that count from the design,
+
+    sum over records and bands of |c - c(x)|^2 / s_b^2  +  sum of (x / tolerance)^2,
+
+with c the cosine coefficients of a measured force and c(x) those of the simulated one. s_b, the standard
+deviation of what a band has besides, is found with the values: from what is left over, counted with as many
+degrees of freedom as the values leave (MacKay, 1992, "Bayesian interpolation"). At first that is nearly
+everything that a record has, so that first steps are careful; then it falls to what the model cannot explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Array, Index
+from ..metrics.low_pass import low_pass, zero_phase_low_pass
+from .measured import BANDS, Measured
+from .normal import noise_of, normal
+from .passes import Passes, Variant
+from .values import Values
+
+SHIFT = 0.5
+"""Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
+STEPS = 40
+"""Most steps."""
+DONE = 0.05
+"""Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
+moves by a fifth of its standard deviation."""
+FRESH = 10.0
+"""How many times that much a first step with new derivatives may bring for them to be good to the end."""
+KEPT = 0.5
+"""Share of the expected decrease that a step must bring for the derivatives to be kept for the next one."""
+SHORTER = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a step that are tried."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One piece of a record, and the passes that are held against it."""
+
+    measured: Measured
+    passes: Passes
+    name: str
+    low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a fit is."""
+
+    # (values + parts,): values as differences from the design, then by how much positions are short (m)
+    x: Array
+    static_forces: Array  # (parts,): N
+    noise: Array  # (parts, bands): standard deviation of coefficients (N)
+    steps: int = 0
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The end of a fit."""
+
+    state: State
+    covariance: Array  # (values + parts, values + parts)
+    left: tuple[Array, ...]  # of each part, (coefficients,): measured less simulated (N)
+    settled: bool  # whether a further step would change little
+
+
+class Fitting:
+    """The iteration over some parts of records."""
+
+    def __init__(self, parts: Sequence[Part], values: Values) -> None:
+        self.parts, self.values = parts, values
+        self.prior = np.append(values.tolerances, np.full(len(parts), SHIFT))
+        self._done = DONE * len(self.prior)
+
+    def start(self) -> State:
+        """The line as designed."""
+        count = len(self.parts)
+        static = np.full(count, self.values.design.pantograph.static_force)
+        return State(np.zeros(len(self.prior)), static, np.full((count, BANDS), np.nan))
+
+    def as_designed(self) -> list[Array]:
+        """Force of the line as designed at the places of each part (N)."""
+        state = self.start()
+        count = len(self.values)
+        found = []
+        for k, part in enumerate(self.parts):
+            variant = self.values.variant(state.x[:count], float(state.static_forces[k]))
+            found.append(self._sampled(part, [variant])[0])
+        return found
+
+    def run(
+        self,
+        state: State,
+        report: Callable[[State, float], None] = lambda state, gain: None,
+        working: Callable[[float], None] = lambda share: None,
+    ) -> Solution:
+        """Iterate to the end.
+
+        report: called after each step with the state and the expected decrease of a further one. working:
+        called with the finished share of all derivatives while they are computed.
+        """
+        while True:
+            state, blocks, left = self._derivatives(state, working)
+            first = None  # expected decrease by the first step with these derivatives
+            while True:
+                noise = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
+                precision, pull = normal(blocks, left, self._weights(noise), self.prior, state.x)
+                covariance = np.linalg.inv(precision)
+                step = covariance @ pull
+                gain = float(pull @ step)
+                state = State(state.x, state.static_forces, noise, state.steps)
+                report(state, gain)
+                first = gain if first is None else first
+                if (gain < self._done and first < FRESH * self._done) or state.steps >= STEPS:
+                    return Solution(state, covariance, tuple(left), gain < self._done)
+                before = self._sum(left, noise, state.x)
+                state, left, after = self._step(state, step)
+                if gain < self._done or before - after < KEPT * gain:
+                    break
+
+    def _derivatives(
+        self, state: State, working: Callable[[float], None]
+    ) -> tuple[State, list[Array], list[Array]]:
+        """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part."""
+        blocks, left = [], []
+        static, count = state.static_forces.copy(), len(self.values)
+        now = state.x[:count]
+        changed = [now, *(now + each for each in np.diag(self.values.steps))]
+        for k, part in enumerate(self.parts):
+            working(k / len(self.parts))
+            variants = [self.values.variant(each, static[k]) for each in changed]
+            force, *others = self._sampled(part, variants)
+            by_value = (np.array(others) - force) / self.values.steps[:, None]
+            target = part.measured.force(state.x[count + k])
+            static[k] += target.mean() - force.mean()
+            by_shift = np.zeros((len(self.parts), len(target)))
+            by_shift[k] = np.gradient(target, part.measured.place)  # a larger shift takes this off the target
+            blocks.append(part.measured.coefficients(np.vstack([by_value, by_shift])).T)
+            left.append(part.measured.coefficients(target - force))
+        working(1.0)
+        return State(state.x, static, state.noise, state.steps), blocks, left
+
+    def _step(self, state: State, step: Array) -> tuple[State, list[Array], float]:
+        """The state after the share of a step that gives the least sum, what is left there, and the sum."""
+        count = len(self.values)
+        tried = [state.x + share * step for share in SHORTER]
+        left: list[list[Array]] = [[] for _ in tried]
+        for k, part in enumerate(self.parts):
+            variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
+            forces = self._sampled(part, variants)
+            for own, x, force in zip(left, tried, forces, strict=True):
+                own.append(part.measured.coefficients(part.measured.force(x[count + k]) - force))
+        sums = [self._sum(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
+        best = int(np.argmin(sums))
+        return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
+
+    def _sum(self, left: Sequence[Array], noise: Array, x: Array) -> float:
+        """What is minimised."""
+        parts = zip(left, noise, self._bands, strict=True)
+        misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
+        return misfit + float(np.sum((x / self.prior) ** 2))
+
+    def _sampled(self, part: Part, variants: Sequence[Variant]) -> Array:
+        """Low-passed forces of variants at the places that are compared, (n, places) (N)."""
+        passes, place = part.passes, part.measured.place
+        forces = passes.forces(variants)
+        if part.low_passed:
+            forces = low_pass(forces, passes.time_step)
+        smooth = (zero_phase_low_pass(force, passes.time_step) for force in forces)
+        return np.array([np.interp(place, passes.position, force) for force in smooth])
+
+    @property
+    def _bands(self) -> list[Index]:
+        return [part.measured.band for part in self.parts]
+
+    def _weights(self, noise: Array) -> list[Array]:
+        return [1 / own[band] ** 2 for own, band in zip(noise, self._bands, strict=True)]

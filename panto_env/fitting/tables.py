@@ -1,0 +1,158 @@
+"""Tables of a fit, to print, for files, and as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base.table import Alarm, Table
+from ..terminal import number
+from .fit import INTERVAL, Fit, Found
+from .values import FREE
+
+WHITE = 0.01
+"""Probability below which what is left over is called unlike noise."""
+NAMES = {
+    "tensions": "tensions",
+    "droppers": "lengths of droppers",
+    "supports": "heights of supports",
+    "damping": "damping of the line",
+    "pantograph": "pantograph",
+    "unevenness": "waves of the running surface",
+}
+
+
+def summary_table(fit: Fit) -> Table:
+    """A row for each kind of value: how many, how many are told, and how well."""
+    rows = []
+    for kind in FREE:
+        found = fit.of_kind(kind)
+        if not found:
+            continue
+        told, unit, scale = [each for each in found if each.told], found[0].value.unit, found[0].value.scale
+        size = [INTERVAL * scale * each.deviation for each in found]
+        differing = sum(each.differs for each in found)
+        rows.append(
+            (
+                f"{NAMES[kind]} ({unit})",
+                f"{len(found)}",
+                f"{len(told)}",
+                f"{differing}",
+                number(float(np.sqrt(np.mean([(scale * each.difference) ** 2 for each in found]))), 2),
+                number(float(np.median(size)), 2),
+            )
+        )
+    headings = ("values", "number", "told", "unlike the design", "rms difference", "95 % interval ±, median")
+    return Table("What the records tell", headings, rows)
+
+
+def values_table(fit: Fit, most: int = 20) -> Table:
+    """The values that differ most surely from the design."""
+    found = sorted((each for each in fit.found if each.differs), key=lambda each: -_sure(each))[:most]
+    rows = [
+        (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
+    ]
+    headings = ("value", "unit", "difference", "from", "to")
+    return Table(
+        f"Most surely unlike the design, {len(rows)} of {sum(e.differs for e in fit.found)}",
+        headings,
+        rows,
+        text_columns=2,
+    )
+
+
+def parts_table(fit: Fit) -> Table:
+    """A row for each piece of a record: what the fit explains of it, and whether the rest is noise."""
+    rows = []
+    shifts = fit.solution.state.x[len(fit.problem.fitting.values) :] + np.array(fit.problem.shifts)
+    triples = zip(fit.parts, fit.left, fit.whiteness, shifts.tolist(), strict=True)
+    for part, (before, after), white, shift in triples:
+        probability = f"{white.probability:.2g}"
+        rows.append(
+            (
+                part.name,
+                f"{part.measured.piece.speed_kmh:.1f}",
+                f"{shift + 0.0:+.2f}",
+                number(before, 2),
+                number(after, 2),
+                f"{100 * (1 - (after / before) ** 2):.1f}",
+                Alarm(probability) if white.probability < WHITE else probability,
+            )
+        )
+    headings = (
+        "record",
+        "speed (km/h)",
+        "shift (m)",
+        "σ compared (N)",
+        "σ left (N)",
+        "explained (%)",
+        "as noise, p",
+    )
+    return Table("What is left of each record", headings, rows)
+
+
+def rows_of(fit: Fit) -> list[dict[str, Any]]:
+    """A row for each value, for a file."""
+    return [
+        {
+            "kind": each.value.kind,
+            "name": each.value.name,
+            "unit": each.value.unit,
+            "position": each.value.place,
+            "difference": each.value.scale * each.difference,
+            "low": each.value.scale * each.interval[0],
+            "high": each.value.scale * each.interval[1],
+            "tolerance": each.value.scale * each.value.tolerance,
+            "told": each.told,
+        }
+        for each in fit.found
+    ]
+
+
+def remarks(fit: Fit) -> list[str]:
+    """Sentences on what the records cannot tell, or tell only together."""
+    found = []
+    for kind in FREE:
+        own = fit.of_kind(kind)
+        silent = [each for each in own if not each.told]
+        if silent:
+            some = "none of them" if len(silent) == len(own) else f"{len(silent)} of {len(own)} not"
+            found.append(
+                f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}: the records tell {some}; these stay as designed."
+            )
+    for one, other, r in fit.correlated[:3]:
+        found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
+    unlike = [
+        part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
+    ]
+    if unlike:
+        found.append(
+            f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
+            "intervals are too narrow."
+        )
+    if not fit.solution.settled:
+        found.append("The fit has not settled; intervals are not to be relied on.")
+    return [*fit.problem.notes, *found]
+
+
+def _signed(each: Found, *values: float) -> list[str]:
+    return [f"{each.value.scale * value:+.2f}" for value in values]
+
+
+def _sure(each: Found) -> float:
+    return abs(each.difference) / each.deviation
+
+
+def plain(fit: Fit) -> dict[str, Any]:
+    """All that was found, as plain data."""
+    triples = zip(fit.parts, fit.left, fit.whiteness, strict=True)
+    return {
+        "settled": fit.solution.settled,
+        "records": [
+            {"name": part.name, "compared": before, "left": after, "as_noise": white.probability}
+            for part, (before, after), white in triples
+        ],
+        "values": rows_of(fit),
+        "notes": remarks(fit),
+    }

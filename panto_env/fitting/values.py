@@ -1,0 +1,201 @@
+"""Values of a line, and of the pantograph under it, that a fit may change; each counts from the design's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.names import suggest
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.line_condition import IRREGULARITY, DrawnLine, LineCondition
+from ..plant.pantograph.schema import PantographData
+from .passes import Variant
+
+FREE = ("tensions", "droppers", "supports", "damping", "pantograph", "unevenness")
+"""What can be freed."""
+USUAL = ("tensions", "droppers", "supports", "unevenness")
+"""What is freed by default; the last, waves of the running surface, so that droppers don't explain them."""
+TOLERANCES = {
+    "tensions": 0.017,  # relative
+    "droppers": 5e-3,  # m
+    "supports": 5e-3,  # m
+    "damping": 0.3,  # relative
+    "pantograph": 0.05,  # relative
+    "unevenness": 1.0,  # as a multiple of a smooth wire's
+}
+"""Standard deviations of values about the design, before any record is seen: those of a line as built
+(``LINE_CONDITIONS``); of damping and pantograph own choice."""
+STEPS = {
+    "tensions": 1e-5,
+    "droppers": 1e-6,
+    "supports": 1e-6,
+    "damping": 1e-4,
+    "pantograph": 1e-5,
+    "unevenness": 1e-6,
+}
+"""Differences by which derivatives are found. A dropper 0.1 mm shorter pulls with 10 N more, and goes slack
+later: its derivative then is off by 5 %, and that of a smooth shift of all droppers, which a force hardly
+shows, by ten times its size. With a micrometre both are exact, in double precision."""
+CHAIN = ("masses", "stiffnesses", "dampings")
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value, as its difference from the design's."""
+
+    kind: str  # of ``FREE``
+    name: str
+    unit: str  # for people; "" for a relative one
+    scale: float  # from the value to this unit
+    tolerance: float  # standard deviation before any record is seen
+    step: float  # for its derivative
+    place: float | None  # along the line (m); None where it acts everywhere
+    index: tuple[Any, ...]  # of what it is
+
+
+@dataclass(frozen=True)
+class Design:
+    """The line and pantograph as designed, and how many spans are simulated."""
+
+    catenary: FlexibleCatenaryData
+    pantograph: PantographData
+    condition: LineCondition
+    spans: int
+    droppers: Array  # (droppers,): positions along the simulated line (m)
+    supports: Array  # (supports,): positions of those between two spans (m)
+
+
+class Values:
+    """The free values of a fit, in a fixed order: a vector, (values,), of differences from the design."""
+
+    def __init__(
+        self,
+        design: Design,
+        free: Sequence[str],
+        stretch: tuple[float, float],
+        tolerances: dict[str, float] | None = None,
+    ) -> None:
+        """stretch: of the simulated line in which droppers and supports are freed (m).
+
+        tolerances: instead of those of ``TOLERANCES``. Raises InputError for a name that cannot be freed.
+        """
+        unknown = [name for name in free if name not in FREE]
+        if unknown or not free:
+            name = unknown[0] if unknown else ""
+            raise InputError(f"'{name}' cannot be freed: {suggest(name, FREE)}.")
+        self.design, self._tolerances = design, TOLERANCES | (tolerances or {})
+        self.all: tuple[Value, ...] = tuple(
+            value for name in FREE if name in free for value in getattr(self, f"_{name}")(stretch)
+        )
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+    @cached_property
+    def tolerances(self) -> Array:
+        """(values,)."""
+        return np.array([value.tolerance for value in self.all])
+
+    @cached_property
+    def steps(self) -> Array:
+        """(values,)."""
+        return np.array([value.step for value in self.all])
+
+    def of_kind(self, kind: str) -> list[int]:
+        """Numbers of the values of a kind."""
+        return [k for k, value in enumerate(self.all) if value.kind == kind]
+
+    def variant(self, differences: Array, static_force: float) -> Variant:
+        """The line and pantograph with these differences, (values,), from the design."""
+        design = self.design
+        scatter, heights = np.zeros(len(design.droppers)), np.zeros(len(design.supports))
+        tensions, waves = [1.0, 1.0], np.zeros((len(IRREGULARITY), 2))
+        damping = {"alpha": 1.0, "beta": 1.0}
+        chain = {name: list(getattr(design.pantograph, name)) for name in CHAIN}
+        for value, difference in zip(self.all, differences.tolist(), strict=True):
+            (*which, last) = value.index
+            match value.kind:
+                case "droppers":
+                    scatter[last] = difference
+                case "supports":
+                    heights[last] = difference
+                case "tensions":
+                    tensions[last] += difference
+                case "unevenness":
+                    waves[which[0], last] = difference
+                case "damping":
+                    damping[last] += difference
+                case "pantograph":
+                    chain[which[0]][last] *= 1 + difference
+        catenary, pantograph = design.catenary, design.pantograph
+        if damping != {"alpha": 1.0, "beta": 1.0}:
+            own = catenary.damping
+            changed = {name: share * getattr(own, name) for name, share in damping.items()}
+            catenary = catenary.model_copy(update={"damping": own.model_copy(update=changed)})
+        if self.of_kind("pantograph"):
+            pantograph = pantograph.model_copy(update={name: tuple(own) for name, own in chain.items()})
+        contact, messenger = tensions
+        line = DrawnLine(design.condition, _rows(waves), scatter, heights, (contact, messenger))
+        return Variant(catenary, line, pantograph, static_force)
+
+    def _tensions(self, stretch: tuple[float, float]) -> list[Value]:
+        names = ("tension of the contact wire", "tension of the messenger wire")
+        return [self._value("tensions", name, "%", 100.0, None, k) for k, name in enumerate(names)]
+
+    def _droppers(self, stretch: tuple[float, float]) -> list[Value]:
+        alignment = self.design.catenary.alignment(self.design.spans)
+        spans = alignment.span_of(self.design.droppers)
+        firsts = np.searchsorted(spans, spans)  # of the droppers of each one's span
+        return [
+            self._value("droppers", f"dropper {k - firsts[k] + 1} of span {spans[k]}", "mm", 1e3, float(x), k)
+            for k, x in enumerate(self.design.droppers)
+            if stretch[0] < x < stretch[1]
+        ]
+
+    def _supports(self, stretch: tuple[float, float]) -> list[Value]:
+        return [
+            self._value("supports", f"support {k + 1}", "mm", 1e3, float(x), k)
+            for k, x in enumerate(self.design.supports)
+            if stretch[0] < x < stretch[1]
+        ]
+
+    def _damping(self, stretch: tuple[float, float]) -> list[Value]:
+        return [
+            self._value("damping", f"damping {name}", "%", 100.0, None, name) for name in ("alpha", "beta")
+        ]
+
+    def _pantograph(self, stretch: tuple[float, float]) -> list[Value]:
+        return [
+            self._value("pantograph", f"{name} {k + 1} of the pantograph", "%", 100.0, None, name, k)
+            for name in CHAIN
+            for k, value in enumerate(getattr(self.design.pantograph, name))
+            if value > 0
+        ]
+
+    def _unevenness(self, stretch: tuple[float, float]) -> list[Value]:
+        found = []
+        for k, (length, amplitude) in enumerate(IRREGULARITY):
+            for part, name in enumerate(("cosine", "sine")):
+                words = f"{name} of waves of {length:g} m"
+                value = self._value("unevenness", words, "mm", 1e3, None, k, part)
+                rms = amplitude / np.sqrt(2)  # of either part, where the phase is drawn
+                found.append(replace(value, tolerance=value.tolerance * rms))
+        return found
+
+    def _value(
+        self, kind: str, name: str, unit: str, scale: float, place: float | None, *index: Any
+    ) -> Value:
+        return Value(kind, name, unit, scale, self._tolerances[kind], STEPS[kind], place, index)
+
+
+def _rows(waves: Array) -> Array:
+    """Cosine and sine parts of waves, (waves, 2), as rows of ``DrawnLine.waves``."""
+    amplitude = np.hypot(waves[:, 0], waves[:, 1])
+    phase = np.arctan2(-waves[:, 1], waves[:, 0]) / (2 * np.pi)
+    return np.stack([amplitude, [1 / length for length, _ in IRREGULARITY], phase], axis=1)
