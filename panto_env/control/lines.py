@@ -60,7 +60,7 @@ def on_drawn_line(settings: R, random: Callable[[], np.random.Generator]) -> R:
     if isinstance(lines, DrawnLines):
         line, speed_kmh = lines.draw(own, settings.speed_kmh)
         return settings.model_copy(update={"catenary": line, "speed_kmh": speed_kmh})
-    return settings.model_copy(update={"catenary": lines[own.integers(len(lines))]})
+    return settings.on_line(lines[own.integers(len(lines))])
 
 
 def line_of_seed(lines: DrawnLines, seed: int) -> tuple[CatenaryData, tuple[float, float]]:
@@ -73,5 +73,5 @@ def line_of_seed(lines: DrawnLines, seed: int) -> tuple[CatenaryData, tuple[floa
 def on_example(settings: R) -> R:
     """Settings on one line: their own, the first of a list, or one drawn, always the same one."""
     if isinstance(settings.catenary, tuple):
-        return settings.model_copy(update={"catenary": settings.catenary[0]})
+        return settings.on_line(settings.catenary[0])
     return on_drawn_line(settings, lambda: np.random.default_rng(EXAMPLE))

@@ -353,15 +353,21 @@ class RunSettings(Numerics):
     def _as_found(cls, values: Any, handler: Callable[[Any], Self]) -> Self:
         """A line that was found to differ from its design does so in every run."""
         settings = handler(values)
-        found = getattr(settings.catenary, "as_found", None)
-        if found is None:
+        if not isinstance(settings.catenary, CatenaryData):
             return settings
-        conditions = tuple(together(found, given) for given in settings.line_condition)
+        conditions = settings.on_line(settings.catenary).line_condition
         return (
             settings
             if conditions == settings.line_condition
             else handler({**values, "catenary": settings.catenary, "line_condition": conditions})
         )
+
+    def on_line(self, line: CatenaryData) -> Self:
+        """These settings on another line, in the conditions in which runs on it are."""
+        found, conditions = getattr(line, "as_found", None), self.line_condition
+        if found is not None:
+            conditions = tuple(together(found, given) for given in conditions)
+        return self.model_copy(update={"catenary": line, "line_condition": conditions})
 
     @model_validator(mode="after")
     def _fit_together(self) -> Self:

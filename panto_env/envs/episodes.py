@@ -25,7 +25,7 @@ class Episodes:
         self.task = Task(on_example(settings), **of_task)
         """The task of all episodes. Where lines are drawn: one on an example, to know the spaces by."""
         for line in settings.catenary[1:] if isinstance(settings.catenary, tuple) else ():
-            Task(settings.model_copy(update={"catenary": line}), keep_samples=False)  # each is possible
+            Task(settings.on_line(line), keep_samples=False)  # each is possible
 
     def draw(self, random: Callable[[], np.random.Generator]) -> Task:
         """The task of an episode, on a line drawn from the generator where lines are drawn."""

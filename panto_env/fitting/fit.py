@@ -103,6 +103,12 @@ class Fit:
             found.append((own.std(own.coefficients(own.force(float(shift)))), own.std(left)))
         return found
 
+    @property
+    def before(self) -> float:
+        """Way along the line before the simulated spans (m)."""
+        line = self.problem.fitting.values.design.catenary
+        return 0.0 if line.ends else self.problem.first_span * line.span_length
+
     def _compared(self, value: Value) -> bool:
         begin, end = self.problem.stretch
         return value.place is None or begin <= value.place <= end

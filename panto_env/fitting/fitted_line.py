@@ -34,7 +34,7 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     needed = fit.problem.first_span + design.spans
     if not design.catenary.ends and needed > design.catenary.spans:
         text = with_value(text, "spans", needed, f"as long as {records}", str(base))
-    _write(path, with_table(text, "as_found", values, sources))
+    _write(path, with_table(text, "as_found", values, sources, str(base)))
 
 
 def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:

@@ -31,18 +31,12 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     return figure
 
 
-def _before(fit: Fit) -> float:
-    """Way along the line before the simulated spans (m)."""
-    line = fit.problem.fitting.values.design.catenary
-    return 0.0 if line.ends else fit.problem.first_span * line.span_length
-
-
 def _draw_force(axes: Axes, fit: Fit) -> None:
     worst = int(np.argmax([after / before for before, after in fit.left]))
     part = fit.parts[worst]
     own, shift = part.measured, fit.solution.state.x[len(fit.problem.fitting.values) + worst]
     seen = own.coefficients(own.force(float(shift)))
-    place = own.place + _before(fit)
+    place = own.place + fit.before
     axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
     fitted = own.back(seen - fit.solution.left[worst])
     axes.plot(place, fitted, color=series_colour(0), linewidth=0.9, label="fitted")
@@ -57,7 +51,7 @@ def _draw_values(axes: Axes, fit: Fit, found: list[Found]) -> None:
         own = [each for each in found if each.told is told]
         if own:
             axes.errorbar(
-                [(each.value.place or 0.0) + _before(fit) for each in own],
+                [(each.value.place or 0.0) + fit.before for each in own],
                 [value.scale * each.difference for each in own],
                 [INTERVAL * value.scale * each.deviation for each in own],
                 fmt=".",

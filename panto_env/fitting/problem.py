@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def problem(
     alignment = line.alignment(spans)
     offset = float(line.alignment(first_span + 1).support(first_span)) if first_span else 0.0
     stretch = (float(alignment.support(FIRST_SETTLED - 1)), distance)
-    condition = _condition(line, free, tolerances)
+    condition = _condition(line, free, tolerances, first_span, spans)
     parts, notes, shifts = [], [], []
     droppers: Array = np.zeros(0)
     supports: Array = np.zeros(0)
@@ -87,7 +88,7 @@ def problem(
         raise InputError(f"No record can be compared. {' '.join(notes)}")
     begin = min(float(part.measured.place[0]) for part in parts)
     end = max(float(part.measured.place[-1]) for part in parts)
-    design = Design(line, pantograph, condition, spans, droppers, supports)
+    design = Design(line, pantograph, condition, spans, droppers, supports, first_span)
     values = Values(design, free, (-1.0, end + BEYOND * alignment.mean_length), dict(tolerances or {}))
     fitting = Fitting(parts, values)
     shifted = []
@@ -122,7 +123,11 @@ def _spans(pieces: Sequence[Piece], line: FlexibleCatenaryData) -> tuple[int, in
 
 
 def _condition(
-    line: FlexibleCatenaryData, free: Sequence[str], tolerances: Mapping[str, float] | None
+    line: FlexibleCatenaryData,
+    free: Sequence[str],
+    tolerances: Mapping[str, float] | None,
+    first_span: int,
+    spans: int,
 ) -> LineCondition:
     """The condition in which each lane draws a line of its own: the plant makes room for what is freed."""
     known = TOLERANCES | dict(tolerances or {})
@@ -132,7 +137,19 @@ def _condition(
         support_scatter=TOLERANCES["supports"],
         tension_scatter=known["tensions"] if "tensions" in free else 0.0,
     )
-    return room if line.as_found is None else together(line.as_found, room)
+    return room if line.as_found is None else together(_within(line.as_found, first_span, spans), room)
+
+
+def _within(condition: LineCondition, first_span: int, spans: int) -> LineCondition:
+    """A condition of a line, of which so many spans behind some first ones are simulated."""
+    moved: dict[str, Any] = {}
+    for name in LineCondition.model_fields:
+        rows = getattr(condition, name)
+        if isinstance(rows, tuple):  # all begin with the number of a span, or of the support at its end
+            most = spans - 1 if name == "raised_supports" else spans
+            numbers = [(row[0] - first_span, *row[1:]) for row in rows]
+            moved[name] = tuple(row for row in numbers if 1 <= row[0] <= most)
+    return condition.model_copy(update=moved)
 
 
 def _shift(own: Measured, force: Array, reach: float) -> float:

@@ -137,10 +137,11 @@ class Fitting:
             variants = [self.values.variant(each, static[k]) for each in changed]
             force, *others = self._sampled(part, variants)
             by_value = (np.array(others) - force) / self.values.steps[:, None]
-            target = part.measured.force(state.x[count + k])
+            shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
+            target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()
             by_shift = np.zeros((len(self.parts), len(target)))
-            by_shift[k] = np.gradient(target, part.measured.place)  # a larger shift takes this off the target
+            by_shift[k] = (near[0] - near[1]) / (2 * sample)  # a larger shift takes this off the target
             blocks.append(part.measured.coefficients(np.vstack([by_value, by_shift])).T)
             left.append(part.measured.coefficients(target - force))
         working(1.0)

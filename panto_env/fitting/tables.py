@@ -99,7 +99,7 @@ def rows_of(fit: Fit) -> list[dict[str, Any]]:
             "kind": each.value.kind,
             "name": each.value.name,
             "unit": each.value.unit,
-            "position": each.value.place,
+            "position": None if each.value.place is None else each.value.place + fit.before,
             "difference": each.value.scale * each.difference,
             "low": each.value.scale * each.interval[0],
             "high": each.value.scale * each.interval[1],

@@ -27,16 +27,25 @@ def with_value(text: str, key: str, value: Any, source: str, name: str) -> str:
     return made
 
 
-def with_table(text: str, section: str, values: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """The text with a table at its end, instead of the one of that name if there is one."""
-    if re.search(rf"^\[{section}\]", text, re.MULTILINE):
-        begin, end = _section(text, section)
-        text = text[: text.rindex("[", 0, begin)] + text[end:]
+def with_table(
+    text: str, section: str, values: Mapping[str, Any], sources: Mapping[str, str], name: str
+) -> str:
+    """The text with a table at its end, instead of the one of that name if there is one.
+
+    name: of the file, for messages. Raises InputError where what is there is no table of its own.
+    """
+    begin, end = _section(text, section)
+    if begin < len(text):
+        text = text[: text.rfind("\n", 0, begin) + 1] + text[end:]
+    rest = _read(text)
     lines = [
         f"{key} = {{ value = {json.dumps(value)}, source = {json.dumps(sources[key], ensure_ascii=False)} }}"
         for key, value in values.items()
     ]
-    return "\n".join([text.rstrip(), "", f"[{section}]", *lines]) + "\n"
+    made = "\n".join([text.rstrip(), "", f"[{section}]", *lines]) + "\n"
+    if _read(made) != rest | {f"{section}.{key}": value for key, value in values.items()}:
+        raise InputError(f"{section} of {name} cannot be replaced: write it as a table [{section}].")
+    return made
 
 
 def _section(text: str, section: str) -> tuple[int, int]:
@@ -46,7 +55,8 @@ def _section(text: str, section: str) -> tuple[int, int]:
     return begin, next((start for start, _, _ in headers if start >= begin), len(text))
 
 
-_HEADER = re.compile(r"^[ \t]*\[+([^\]\n]*)\]+.*$", re.MULTILINE)
+_HEADER = re.compile(r"^[ \t]*\[{1,2}[ \t]*([A-Za-z_][^\[\],\n]*)\]{1,2}[ \t]*(?:#.*)?$", re.MULTILINE)
+"""Of a table, and not a row of numbers in a list."""
 
 
 def _read(text: str) -> dict[str, Any]:

@@ -69,6 +69,7 @@ class Design:
     spans: int
     droppers: Array  # (droppers,): positions along the simulated line (m)
     supports: Array  # (supports,): positions of those between two spans (m)
+    first_span: int = 0  # spans of the line before the simulated ones
 
 
 class Values:
@@ -149,18 +150,19 @@ class Values:
         return [self._value("tensions", name, "%", 100.0, None, k) for k, name in enumerate(names)]
 
     def _droppers(self, stretch: tuple[float, float]) -> list[Value]:
-        alignment = self.design.catenary.alignment(self.design.spans)
-        spans = alignment.span_of(self.design.droppers)
-        firsts = np.searchsorted(spans, spans)  # of the droppers of each one's span
+        spans = self.design.catenary.alignment(self.design.spans).span_of(self.design.droppers)
+        numbers = np.arange(len(spans)) - np.searchsorted(spans, spans) + 1  # in each one's span
+        rows = zip(numbers.tolist(), (spans + self.design.first_span).tolist(), strict=True)
+        names = [f"dropper {number} of span {span}" for number, span in rows]
         return [
-            self._value("droppers", f"dropper {k - firsts[k] + 1} of span {spans[k]}", "mm", 1e3, float(x), k)
+            self._value("droppers", names[k], "mm", 1e3, float(x), k)
             for k, x in enumerate(self.design.droppers)
             if stretch[0] < x < stretch[1]
         ]
 
     def _supports(self, stretch: tuple[float, float]) -> list[Value]:
         return [
-            self._value("supports", f"support {k + 1}", "mm", 1e3, float(x), k)
+            self._value("supports", f"support {k + 1 + self.design.first_span}", "mm", 1e3, float(x), k)
             for k, x in enumerate(self.design.supports)
             if stretch[0] < x < stretch[1]
         ]

@@ -253,6 +253,35 @@ def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
         np.testing.assert_array_equal(samples.rows[0], together.rows[lane])
 
 
+def test_first_lanes_advance_alone():
+    """They have the forces that they have beside others, which stay as they are until it is their turn."""
+    line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
+
+    def batch():
+        plant = Plant(line, Train.of(pantograph), lanes=4)
+        for lane, speed in enumerate([200 / 3.6, 300 / 3.6, 250 / 3.6, 350 / 3.6]):
+            plant.start(lane, speed)
+        return plant, plant.samples(801)
+
+    whole, expected = batch()
+    whole.advance_passively(800, expected)
+    plant, samples = batch()
+    rest = plant.run.table[:, 2:].copy()
+    plant.advance_passively(500, samples, 2)
+    plant.advance(np.zeros((4, 1, 2)), 300, samples, 1)
+    np.testing.assert_array_equal(samples.rows[0], expected.rows[0])
+    np.testing.assert_array_equal(samples.rows[1, :501], expected.rows[1, :501])
+    assert not samples.rows[1, 501:].any()
+    assert not samples.rows[2:, 1:].any()
+    np.testing.assert_array_equal(plant.run.table[:, 2:], rest)
+    with pytest.raises(InputError, match="not for 1600"):
+        plant.advance_passively(800, samples, 2)
+    for lane in range(4):
+        plant.start(lane, [200 / 3.6, 300 / 3.6, 250 / 3.6, 350 / 3.6][lane])
+    plant.advance_passively(800, samples)  # all lanes again
+    np.testing.assert_array_equal(samples.rows[1:], expected.rows[1:])
+
+
 def test_restarted_lane_forgets_the_run_before():
     plant = Plant(
         load_catenary("en50318-2002"), Train.of(load_pantograph("en50318-2002")), numerics=Numerics(window=3)

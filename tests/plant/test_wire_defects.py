@@ -208,6 +208,17 @@ def test_less_tension_is_a_slower_line():
         simulate(line_condition={"lost_contact_tension": 0.19}, speed_kmh=400.0)
 
 
+def test_more_tension_is_a_faster_line():
+    """A loss below 0 is a gain, of up to a tenth: a train may then be faster than on the line as designed."""
+    gained = {"lost_contact_tension": -0.1}
+    run, intact = simulate(line_condition=gained, distance=200.0), simulate(distance=200.0)
+    assert run.line.wave_speed == pytest.approx(np.sqrt(1.1) * intact.line.wave_speed)
+    fast = 3.6 * 1.02 * intact.line.wave_speed
+    with pytest.raises(InputError, match="below the wave speed"):
+        Task(run_settings({"speed_kmh": fast}))
+    Task(run_settings({"speed_kmh": fast, "line_condition": gained}))
+
+
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
@@ -220,6 +231,7 @@ def test_less_tension_is_a_slower_line():
         ({"worn_stretches": [(2, 5.0, 9.0, 0.1), (2, 1.0, 5.0, 0.1)]}, "must not overlap: .* 61 and 65 m"),
         ({"worn_stretches": [(2, 5.0, 1.0, 0.1)]}, "worn_stretches.1.3"),
         ({"lost_contact_tension": 0.6}, "lost_contact_tension"),
+        ({"lost_messenger_tension": -0.11}, "lost_messenger_tension"),
     ],
 )
 def test_defects_that_the_wire_cannot_have_are_refused(condition, message):

@@ -1,0 +1,143 @@
+"""Coverage of the intervals of ``panto fit`` on lines as built, and what the errors are; a line is a file.
+
+python -m tests.fitting.coverage FOLDER --lines 200           # goes on where it was broken off
+python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong, in one of several ways
+python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
+python -m tests.fitting.coverage FOLDER --table
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from panto_env import simulate
+from panto_env.base.files import write_whole
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.fitting.fit import fit
+from panto_env.plant.line_condition import LINE_CONDITIONS, draw
+from panto_env.records.measured import measured
+from panto_env.records.record import Record
+
+LINE, PANTOGRAPH, SPANS, BEYOND = "en50318-2002", "dsa380", 16, 12
+SPEEDS = (180.0, 220.0, 250.0, 200.0)
+"""Of the passes (km/h), as many as are asked for, from the end of this list on backwards."""
+NOISE, RATE, PLACE = 2.0, 500.0, 0.3
+"""Of sensors: rms of a sample (N), samples a second, and standard deviation of the odometer's error (m)."""
+WRONG = ("nothing", "damping", "pantograph", "drift", "window")
+
+
+def records_of(seed: int, passes: int, wrong: str) -> list[Record]:
+    """Records of passes over one line; wrong: what the fit will not know."""
+    random = np.random.default_rng([seed, passes])
+    line, pantograph = load_catenary(LINE), load_pantograph(PANTOGRAPH)
+    settings: dict[str, Any] = {}
+    if wrong == "damping":
+        damping = line.damping  # type: ignore[attr-defined]
+        other = damping.model_copy(update={"alpha": 2 * damping.alpha, "beta": 2 * damping.beta})
+        line = line.model_copy(update={"damping": other})
+    if wrong == "pantograph":
+        signs = random.choice([-1, 1], 3)
+        masses = tuple(float(m * (1 + 0.05 * s)) for m, s in zip(pantograph.masses, signs, strict=True))
+        springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
+        pantograph = pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
+    if wrong == "window":
+        settings = {"window": 0}
+    found = []
+    for k, speed in enumerate(SPEEDS[-passes:]):
+        run = simulate(
+            line,
+            pantograph,
+            speed,
+            line_condition="as-built",
+            seed=seed,
+            spans=SPANS + BEYOND,
+            distance=SPANS * 60.0,
+            record_droppers=False,
+            **settings,
+        )
+        record = measured(
+            run,
+            rate=RATE,
+            force_noise=NOISE,
+            position_error=float(PLACE * random.standard_normal()),
+            seed=1000 * seed + k,
+            name=f"{speed:g} km/h",
+        )
+        if wrong == "drift":
+            (piece,) = record.pieces
+            piece.force[:] *= 1.03  # of the sensors' gain
+            piece.force[:] += 8.0 * np.sin(2 * np.pi * piece.time / 30.0)
+        found.append(record)
+    return found
+
+
+def judge(seed: int, passes: int, wrong: str) -> dict[str, Any]:
+    """Errors and standard deviations of one fit by kind, in the values' own units."""
+    records = records_of(seed, passes, wrong)
+    found = fit(records, load_catenary(LINE), load_pantograph(PANTOGRAPH))
+    true = draw(
+        (LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), 9 * (SPANS + BEYOND), SPANS + BEYOND - 1
+    )
+    assert true.scatter is not None and true.heights is not None
+    truths = {"tensions": np.array(true.tensions) - 1, "droppers": true.scatter, "supports": true.heights}
+    rows: dict[str, Any] = {"seed": seed, "passes": passes, "wrong": wrong, "settled": found.solution.settled}
+    rows["left"] = [left for _, left in found.left]
+    rows["as_noise"] = [white.probability for white in found.whiteness]
+    for kind, truth in truths.items():
+        own = found.of_kind(kind)
+        rows[kind] = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
+    return rows
+
+
+def write(folder: Path, seed: int, passes: int, wrong: str) -> None:
+    """Judge one line, and write what was found."""
+    with write_whole(folder / f"{wrong}-{passes}-{seed}.json") as temporary:
+        temporary.write_text(json.dumps(judge(seed, passes, wrong)), encoding="utf-8")
+
+
+def table(folder: Path) -> Iterator[str]:
+    """Rows of a table in Markdown: coverage and errors by what is wrong and the number of passes."""
+    results = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
+    yield "| model | passes | lines | tension: median error (%), in 95 % | dropper (mm) | support (mm) | no noise |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    for wrong, passes in sorted({(each["wrong"], each["passes"]) for each in results}):
+        own = [each for each in results if (each["wrong"], each["passes"]) == (wrong, passes)]
+        cells = []
+        for kind, scale in (("tensions", 100.0), ("droppers", 1e3), ("supports", 1e3)):
+            errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
+            inside = 100 * np.mean(np.abs(errors) < 1.96 * deviations)
+            cells.append(f"{scale * np.median(np.abs(errors)):.2f}, {inside:.0f} %")
+        unlike = np.mean([min(each["as_noise"]) < 0.01 for each in own])
+        what = "right" if wrong == "nothing" else f"wrong: {wrong}"
+        yield f"| {what} | {passes} | {len(own)} | {' | '.join(cells)} | {100 * unlike:.0f} % |"
+
+
+def main() -> None:
+    """Judge lines that are missing, or print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--lines", type=int, default=20)
+    parser.add_argument("--passes", type=int, default=4, choices=range(1, len(SPEEDS) + 1))
+    parser.add_argument("--wrong", choices=WRONG, default=WRONG[0])
+    parser.add_argument("--table", action="store_true")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    if not given.table:
+        for seed in range(given.lines):
+            if not (given.folder / f"{given.wrong}-{given.passes}-{seed}.json").is_file():
+                write(given.folder, seed, given.passes, given.wrong)
+                print(f"line {seed + 1} of {given.lines}", flush=True)
+    for row in table(given.folder):
+        print(row)
+
+
+if __name__ == "__main__":
+    main()

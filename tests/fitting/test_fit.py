@@ -1,0 +1,134 @@
+"""A fit finds the line of a record, within its intervals, and leaves the sensors' noise."""
+
+import numpy as np
+import pytest
+
+from panto_env.fitting.fit import fit
+from panto_env.fitting.plots import plot_fit
+from panto_env.fitting.problem import problem
+from panto_env.fitting.solve import STEPS
+from panto_env.fitting.tables import parts_table, plain
+from panto_env.fitting.values import TOLERANCES
+
+from .test_problem import moved
+
+WRONG = 0.15
+"""Position error (m): less than the search's grid."""
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """Steps that were reported, with what a further one was expected to gain."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def fitted(record, design, pantograph, coarse, steps):
+    return fit(
+        [moved(record, WRONG)], design, pantograph, report=lambda state, gain: steps.append((state, gain))
+    )
+
+
+@pytest.fixture(scope="module")
+def errors(fitted, truth):
+    """Errors of each kind of value, and their standard deviations."""
+    found = {}
+    for kind in ("tensions", "droppers", "supports"):
+        own = fitted.of_kind(kind)
+        found[kind] = (
+            np.array([each.difference - truth.of(each.value) for each in own]),
+            np.array([each.deviation for each in own]),
+        )
+    return found
+
+
+def test_tensions(errors):
+    assert np.abs(errors["tensions"][0]).max() < 5e-3
+    assert (errors["tensions"][1] < 0.2 * TOLERANCES["tensions"]).all()
+
+
+def test_droppers(errors):
+    error, deviation = errors["droppers"]
+    assert len(error) == 42
+    assert np.median(np.abs(error)) < 3e-3
+    assert error.std() < 2.5e-3  # of 5 mm that they were drawn with
+    assert 0.1 < np.median(deviation) / TOLERANCES["droppers"] < 0.7
+
+
+def test_supports(errors):
+    error, deviation = errors["supports"]
+    assert len(error) == 5
+    assert np.median(np.abs(error)) < 6e-3  # hardly told by 4.6 spans
+    assert (deviation < TOLERANCES["supports"]).all()
+
+
+def test_truths_lie_within_intervals(errors):
+    inside = np.concatenate([np.abs(error) < 1.96 * deviation for error, deviation in errors.values()])
+    assert inside.mean() >= 0.8
+    shares = np.concatenate([error / deviation for error, deviation in errors.values()])
+    assert 0.4 < np.sqrt(np.mean(shares**2)) < 1.7
+
+
+def test_what_is_left_is_the_sensors_noise(fitted):
+    """2 N at 500 samples a second are 0.63 N in a coefficient; values take some of it up."""
+    ((before, after),) = fitted.left
+    assert before > 20
+    assert 0.2 < after < 0.7
+    (white,) = fitted.whiteness
+    assert white.probability > 0.001
+    assert 0.3 < np.median(fitted.solution.state.noise) < 0.9
+
+
+def test_the_position_error_is_found(fitted):
+    shift = fitted.solution.state.x[-1] + fitted.problem.shifts[0]
+    deviation = np.sqrt(fitted.solution.covariance[-1, -1])
+    assert shift == pytest.approx(-WRONG, abs=4 * deviation)
+    assert deviation < 0.05
+
+
+def test_it_settles(fitted, steps):
+    assert fitted.solution.settled
+    assert steps[-1][0].steps == fitted.solution.state.steps < STEPS
+    assert [state.steps for state, _ in steps] == list(range(len(steps)))
+    assert steps[-1][1] < 1e-2 * steps[0][1]
+
+
+def test_it_goes_on_from_where_it_was(fitted, steps, record, design, pantograph):
+    """From its end, no step is left to do."""
+    begin, more = steps[-1][0], []
+    same = fit(
+        [moved(record, WRONG)], design, pantograph, begin=begin, report=lambda state, gain: more.append(state)
+    )
+    assert more[0].steps == begin.steps
+    assert same.solution.state.steps <= begin.steps + 3
+    away = np.abs(same.solution.state.x - fitted.solution.state.x)
+    assert np.median(away / np.sqrt(np.diag(fitted.solution.covariance))) < 0.5
+
+
+def test_droppers_known_to_be_right_stay(record, design, pantograph):
+    """A tolerance is a prior: with hardly any, droppers do not move, and what they did is left over."""
+    rigid = fit([record], design, pantograph, free=("tensions", "droppers"), tolerances={"droppers": 1e-6})
+    assert max(abs(each.difference) for each in rigid.of_kind("droppers")) < 2e-5
+    assert rigid.left[0][1] > 5
+
+
+def test_tables_and_picture(fitted):
+    told = plain(fitted)
+    assert told["settled"] is True
+    assert told["records"][0]["left"] == fitted.left[0][1]
+    assert len(told["values"]) == len(fitted.found)
+    (row,) = parts_table(fitted).rows
+    assert row[:2] == ("run", "250.0")
+    assert float(row[2]) == pytest.approx(-WRONG, abs=0.1)
+    assert float(row[5]) > 99
+    figure = plot_fit(fitted, "A fit")
+    force, droppers, supports = figure.axes
+    assert len(force.lines) == 2
+    assert "dropper" in droppers.get_ylabel()
+    assert "support" in supports.get_ylabel()
+
+
+def test_a_search_of_half_a_span_is_far_enough(record, design, pantograph):
+    assert problem([moved(record, 12.3)], design, pantograph, free=("tensions",)).shifts[0] == pytest.approx(
+        -12.3, abs=0.3
+    )

@@ -1,0 +1,161 @@
+"""The fitted line and pantograph as files: the design's text, what was found, and where it comes from."""
+
+import numpy as np
+import pytest
+
+from panto_env import simulate
+from panto_env.base.errors import InputError
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog.loader import text_of
+from panto_env.catalog.values import values_of
+from panto_env.fitting.fitted_line import write_line, write_pantograph
+from panto_env.fitting.problem import problem
+from panto_env.fitting.tables import remarks, rows_of, summary_table, values_table
+from panto_env.plant.line_condition import LineCondition
+
+from .conftest import LINE, PANTOGRAPH
+from .made_up import made_up
+
+FOUND = {
+    "dropper 4 of span 12": 0.003,
+    "dropper 1 of span 11": -0.002,
+    "dropper 9 of span 12": 0.004,
+    "support 12": 0.0025,
+    "tension of the contact wire": 0.01,
+    "tension of the messenger wire": -0.02,
+}
+CONDITION = LineCondition(
+    miscut_droppers=((11, 1, -0.002), (12, 4, 0.003)),
+    raised_supports=((12, 0.0025),),
+    lost_contact_tension=-0.01,
+    lost_messenger_tension=0.02,
+)
+SHORT = {"distance": 780.0, "spans": 20, "accuracy": "fast", "record_droppers": False}
+
+
+@pytest.fixture(scope="module")
+def done(ready):
+    return made_up(ready, FOUND, silent=["dropper 9 of span 12"])
+
+
+@pytest.fixture(scope="module")
+def written(done, tmp_path_factory):
+    path = tmp_path_factory.mktemp("fitted") / "found.toml"
+    write_line(done, LINE, path, "run.csv")
+    return path
+
+
+def test_the_file_is_the_design_s_with_what_was_found(written, done):
+    line = load_catenary(written)
+    assert line.as_found == CONDITION  # without the dropper that was not told
+    plan = done.problem.fitting.values.design
+    assert line.spans == plan.spans
+    assert line.model_copy(update={"as_found": None, "spans": 10, "name": LINE, "sources": {}}) == (
+        load_catenary(LINE).model_copy(update={"sources": {}})
+    )
+    own, text = written.read_text(encoding="utf-8").splitlines(), text_of(LINE).splitlines()
+    assert [k for k, line in enumerate(text) if line != own[k]] == [4]  # spans
+    assert own[len(text) + 1] == "[as_found]"
+
+
+def test_sources_are_shown(written):
+    shown = {each.key: each for each in values_of(load_catenary(written))}
+    assert shown["as_found.raised_supports"].value == ((12, 0.0025),)
+    assert shown["as_found.raised_supports"].source == "fitted to run.csv; 95 % intervals of ±0.98 mm"
+    assert shown["as_found.lost_contact_tension"].source == "fitted to run.csv; 95 % intervals of ±0.33 %"
+    assert "0.98 to 0.98 mm" in shown["as_found.miscut_droppers"].source
+    assert "as_found.ice" not in shown  # only what was found
+    assert shown["spans"].source == "as long as run.csv"
+    assert not [key for key in {each.key for each in values_of(load_catenary(LINE))} if "as_found" in key]
+
+
+def test_runs_on_it_are_those_on_the_design_in_that_condition(written):
+    found = simulate(str(written), PANTOGRAPH, 250.0, **SHORT)
+    same = simulate(LINE, PANTOGRAPH, 250.0, line_condition=CONDITION, **SHORT)
+    np.testing.assert_array_equal(found.contact_force, same.contact_force)
+    plain = simulate(LINE, PANTOGRAPH, 250.0, **SHORT)
+    assert np.abs(found.contact_force - plain.contact_force).max() > 1
+
+
+def test_a_fit_of_a_fitted_line_adds_to_it(written, record, pantograph, tmp_path):
+    again = problem([record], load_catenary(written), pantograph)
+    assert again.fitting.values.design.condition.miscut_droppers == CONDITION.miscut_droppers
+    more = {"dropper 4 of span 12": -0.001, "dropper 2 of span 12": 0.005, "support 13": 0.001}
+    write_line(
+        made_up(again, more | {"tension of the contact wire": 0.01}), written, tmp_path / "b.toml", "b.csv"
+    )
+    line = load_catenary(tmp_path / "b.toml")
+    assert line.as_found == LineCondition(
+        miscut_droppers=((11, 1, -0.002), (12, 2, 0.005), (12, 4, 0.002)),
+        raised_supports=((12, 0.0025), (13, 0.001)),
+        lost_contact_tension=round(1 - 1.01 * 1.01, 6),
+        lost_messenger_tension=0.02,
+    )
+    assert line.sources["as_found.lost_messenger_tension"].startswith("fitted to run.csv")
+    assert line.sources["as_found.miscut_droppers"].startswith("fitted to b.csv")
+    text = (tmp_path / "b.toml").read_text(encoding="utf-8")
+    assert text.count("[as_found]") == 1
+
+
+def test_a_fitted_line_s_force_is_its_fit_s_and_goes_on_from_there(written, record, pantograph, done):
+    """What the second fit begins with is what the first one ended with."""
+    again = problem([record], load_catenary(written), pantograph)
+    (before,) = again.fitting.as_designed()
+    fitting = done.problem.fitting
+    x = done.solution.state.x[: len(fitting.values)].copy()
+    x[[value.name == "dropper 9 of span 12" for value in fitting.values.all]] = 0.0
+    (after,) = fitting._sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
+    np.testing.assert_allclose(before, after, atol=0.2)
+
+
+def test_damping_and_pantograph(record, design, pantograph, tmp_path):
+    ready = problem([record], design, pantograph, free=("damping", "pantograph"))
+    found = {"damping beta": 0.2, "masses 2 of the pantograph": 0.05, "masses 3 of the pantograph": -0.1}
+    fit = made_up(ready, found | {"damping alpha": 0.5}, silent=["damping alpha"])
+    write_line(fit, LINE, tmp_path / "a.toml", "run.csv")
+    line = load_catenary(tmp_path / "a.toml")
+    assert line.damping.beta == pytest.approx(1.2e-4)
+    assert line.damping.alpha == 0.0125
+    assert line.sources["damping.beta"].startswith("fitted to run.csv; 95 % intervals of ±5.9 %")
+    write_pantograph(fit, PANTOGRAPH, tmp_path / "p.toml", "run.csv")
+    riding = load_pantograph(tmp_path / "p.toml")
+    assert riding.masses == pytest.approx((7.12, 6.3, 5.22))
+    assert riding.stiffnesses == pantograph.stiffnesses
+    assert riding.sources["masses"].startswith("number 2, 3 fitted to run.csv")
+    assert (tmp_path / "p.toml").read_text(encoding="utf-8").startswith("# DSA 380.\n")
+
+
+def test_where_nothing_is_told_the_line_is_the_design(ready, tmp_path):
+    write_line(made_up(ready, {}), LINE, tmp_path / "a.toml", "run.csv")
+    found = simulate(str(tmp_path / "a.toml"), PANTOGRAPH, 250.0, **SHORT)
+    plain = simulate(LINE, PANTOGRAPH, 250.0, **SHORT)
+    np.testing.assert_array_equal(found.contact_force, plain.contact_force)
+
+
+def test_a_file_that_cannot_be_written_leaves_none(done, tmp_path):
+    with pytest.raises(InputError, match=r"\.toml"):
+        write_line(done, LINE, tmp_path / "a.csv", "run.csv")
+    base = tmp_path / "mine.toml"
+    base.write_text(text_of(LINE).replace("spans = ", "'spans' = ", 1), encoding="utf-8")
+    with pytest.raises(InputError, match=r"spans of .*mine\.toml cannot be replaced"):
+        write_line(done, base, tmp_path / "a.toml", "run.csv")
+    assert not (tmp_path / "a.toml").exists()
+
+
+def test_tables_say_what_was_found(done):
+    rows = {row["name"]: row for row in rows_of(done)}
+    dropper = rows["dropper 4 of span 12"]
+    assert dropper["difference"] == 3.0
+    assert (dropper["low"], dropper["high"]) == pytest.approx((3 - 0.98, 3 + 0.98))
+    assert (dropper["unit"], dropper["position"], dropper["tolerance"]) == ("mm", 683.5, 5.0)
+    assert dropper["told"] is True
+    assert rows["dropper 9 of span 12"]["told"] is False
+    assert "dropper 1 of span 1" not in rows  # before what is compared
+    told = {row[0]: row for row in summary_table(done).rows}
+    assert told["lengths of droppers (mm)"][1:4] == ("42", "2", "2")
+    names = [row[0] for row in values_table(done).rows]
+    assert names[0] == "tension of the messenger wire"
+    assert set(names) == set(FOUND) - {"dropper 9 of span 12"}
+    notes = remarks(done)
+    assert "Lengths of droppers: the records tell 40 of 42 not; these stay as designed." in notes
+    assert not [note for note in notes if "settled" in note]

@@ -1,0 +1,157 @@
+"""What a fit begins with: the true line's force is the record's, its derivatives, a record's place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_env.base.errors import InputError
+from panto_env.catalog import load_catenary
+from panto_env.fitting.problem import problem
+from panto_env.fitting.values import TOLERANCES
+from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.plant.line_condition import LineCondition
+
+from .conftest import BUILT, SEED, SPANS, record_of
+
+
+def moved(record, by):
+    """The record with other positions."""
+    (piece,) = record.pieces
+    return replace(record, pieces=(replace(piece, position=piece.position + by),))
+
+
+def force_of(fitting, x):
+    (part,) = fitting.parts
+    return fitting._sampled(part, [fitting.values.variant(x, 70.0)])[0]
+
+
+@pytest.fixture(scope="module")
+def derivatives(ready):
+    """Derivatives of coefficients at the design, and what is left there."""
+    _, (block,), (left,) = ready.fitting._derivatives(ready.fitting.start(), lambda share: None)
+    return block, left
+
+
+def test_where_things_are(ready, design):
+    plan = ready.fitting.values.design
+    begins = 60.0 * np.arange(plan.spans)
+    np.testing.assert_allclose(plan.droppers, (begins[:, None] + design.droppers.positions).ravel())
+    np.testing.assert_allclose(plan.supports, begins[1:])
+    assert ready.first_span == 0
+    assert ready.stretch[0] == 60.0 * (FIRST_SETTLED - 1)
+    assert 60.0 * SPANS - 25 < ready.stretch[1] < 60.0 * SPANS - 20
+    assert ready.shifts == (0.0,)
+
+
+def test_the_true_line_gives_the_force_of_a_record_without_noise(ready, truth, design, pantograph):
+    """Index by index: no value stands in another's place, or with another sign."""
+    clean = record_of(line_condition=BUILT, seed=SEED, force_noise=0.0)
+    fitting = problem([clean], design, pantograph).fitting
+    x = np.array([truth.of(value) for value in fitting.values.all])
+    (part,) = fitting.parts
+    away = part.measured.force() - force_of(fitting, x)
+    assert away.std() < 0.01  # beyond the last value the true line differs from the fit's
+    assert (part.measured.force() - force_of(fitting, 0 * x)).std() > 10
+
+
+def test_derivatives_of_all_droppers_add_up(ready, derivatives):
+    """A smooth shift of all droppers, which a force hardly shows, is the sum of columns that nearly cancel.
+
+    With droppers changed by 0.1 mm the sum is several times its true size, for they pull with 10 N more and
+    go slack later: the steps have to be a micrometre.
+    """
+    values, (part,) = ready.fitting.values, ready.fitting.parts
+    which = values.of_kind("droppers")
+    places = np.array([values.all[k].place for k in which])
+    d = np.zeros(len(values))
+    d[which] = np.sin(np.pi * (places - places[0]) / np.ptp(places))
+    small = 1e-6 * d
+    change = force_of(ready.fitting, small) - force_of(ready.fitting, -small)
+    actual = part.measured.coefficients(change) / 2e-6
+    summed = derivatives[0][:, : len(values)] @ d
+    np.testing.assert_allclose(summed, actual, atol=0.05 * np.linalg.norm(actual) / np.sqrt(len(actual)))
+    single = np.median(np.linalg.norm(derivatives[0][:, which], axis=0))
+    assert np.linalg.norm(actual) < 3 * single  # 130 of them cancel
+
+
+@pytest.mark.parametrize(("kind", "size"), [("tensions", 1e-5), ("supports", 1e-6), ("unevenness", 1e-6)])
+def test_derivatives_of_one_value(ready, derivatives, kind, size):
+    values, (part,) = ready.fitting.values, ready.fitting.parts
+    number = values.of_kind(kind)[-1 if kind != "supports" else 10]
+    x = size * np.eye(len(values))[number]
+    change = force_of(ready.fitting, x) - force_of(ready.fitting, -x)
+    actual = part.measured.coefficients(change) / (2 * size)
+    assert np.linalg.norm(derivatives[0][:, number] - actual) < 0.02 * np.linalg.norm(actual)
+
+
+def test_derivatives_of_a_shift(ready, derivatives):
+    """What is left falls by the derivative times the shift."""
+    (part,) = ready.fitting.parts
+    target = part.measured.coefficients(part.measured.force(0.02))
+    change = part.measured.coefficients(part.measured.force(-0.02)) - target
+    column = derivatives[0][:, -1]
+    assert np.linalg.norm(column - change / 0.04) < 0.05 * np.linalg.norm(column)
+    assert part.measured.std(column) > 1
+
+
+@pytest.mark.parametrize("by", [3.2, -7.5])
+def test_a_position_error_is_found(record, ready, design, pantograph, by):
+    """Roughly, before any step; steps find the rest (``test_fit``)."""
+    found = problem([moved(record, by)], design, pantograph, free=("tensions",))
+    assert found.shifts[0] == pytest.approx(-by, abs=0.3)
+    away = found.fitting.parts[0].measured
+    seen = away.force(-by - found.shifts[0])
+    same = np.interp(
+        away.place, ready.fitting.parts[0].measured.place, ready.fitting.parts[0].measured.force()
+    )
+    np.testing.assert_allclose(seen[5:-20], same[5:-20], atol=1.0)
+
+
+def test_a_record_from_far_along_the_line(record, ready, design, pantograph):
+    """40 spans on, a record is held against as many spans of a line, which are named by their place on it."""
+    far = problem([moved(record, 40 * 60.0)], design, pantograph, free=("droppers",))
+    assert far.first_span == 40 - (FIRST_SETTLED - 1)
+    assert far.shifts == (0.0,)
+    own, same = far.fitting.parts[0].measured, ready.fitting.parts[0].measured
+    skipped = 60.0 * (FIRST_SETTLED - 1)
+    assert own.place[0] == pytest.approx(skipped, abs=0.5)
+    np.testing.assert_allclose(own.piece.position - own.offset - skipped, same.piece.position)
+    names = [value.name for value in far.fitting.values.all]
+    assert names[0] == f"dropper 1 of span {far.first_span + 1}"
+
+
+def test_what_was_found_before_is_moved_with_the_spans(record, design, pantograph):
+    """A line of which dropper 3 of span 50 is known to be broken, and others outside what is simulated."""
+    known = LineCondition(
+        broken_droppers=((50, 3), (5, 1)), raised_supports=((45, 0.004), (2, 0.01), (400, 0.01)), ice=0.1
+    )
+    line = design.model_copy(update={"as_found": known})
+    far = problem([moved(record, 40 * 60.0)], line, pantograph, free=("tensions",))
+    condition = far.fitting.values.design.condition
+    assert condition.broken_droppers == ((50 - far.first_span, 3),)
+    assert condition.raised_supports == ((45 - far.first_span, 0.004),)
+    assert condition.ice == 0.1
+    assert condition.tension_scatter == TOLERANCES["tensions"]
+
+
+def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
+    with pytest.raises(
+        InputError, match="Only flexible lines can be fitted, and 'periodic-stiffness' is none"
+    ):
+        problem([record], load_catenary("periodic-stiffness"), pantograph)
+    with pytest.raises(InputError, match=r"run from -500 to .* add what their positions are short of"):
+        problem([moved(record, -500.0)], design, pantograph)
+    ending = load_catenary("re250-curves")
+    with pytest.raises(InputError, match="add what their positions are short of"):
+        problem([moved(record, ending.alignment().length)], ending, pantograph)
+    (piece,) = record.pieces
+    half = len(piece.force) // 2
+    short = replace(piece, position=piece.position[:half], force=piece.force[:half])
+    with pytest.raises(InputError, match=r"No record can be compared\. run is left out: Run '' has only 0 m"):
+        problem([replace(record, pieces=(short,))], design, pantograph)
+    both = problem(
+        [record, replace(record, name="b", pieces=(short,))], design, pantograph, free=("tensions",)
+    )
+    assert both.notes[0].startswith("b is left out: Run '' has only")
+    assert len(both.fitting.parts) == 1

@@ -1,0 +1,131 @@
+"""The free values of a fit: their names and places, and where a variant of the line has each."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_env.base.errors import InputError
+from panto_env.fitting.values import FREE, STEPS, TOLERANCES, USUAL, Design, Values
+from panto_env.plant.line_condition import IRREGULARITY, LineCondition
+
+SPANS = 14
+
+
+@pytest.fixture
+def plan(design, pantograph):
+    """14 spans of 60 m with 9 droppers each."""
+    begins = 60.0 * np.arange(SPANS)
+    droppers = (begins[:, None] + design.droppers.positions).ravel()
+    return Design(design, pantograph, LineCondition(), SPANS, droppers, begins[1:])
+
+
+def everything(plan, **more):
+    return Values(plan, FREE, (-1.0, 900.0), **more)
+
+
+def at(values, name, difference):
+    """Differences of which only one, of the value of this name, is not 0."""
+    (number,) = [k for k, value in enumerate(values.all) if value.name == name]
+    return difference * np.eye(len(values))[number]
+
+
+def test_names_and_places(plan):
+    values = everything(plan)
+    by_name = {value.name: value for value in values.all}
+    assert len(by_name) == len(values) == 2 + 9 * SPANS + (SPANS - 1) + 2 + 7 + 6
+    dropper = by_name["dropper 4 of span 12"]
+    assert dropper.place == 11 * 60.0 + 23.5
+    assert dropper.index == (11 * 9 + 3,)
+    assert (dropper.kind, dropper.unit, dropper.scale) == ("droppers", "mm", 1e3)
+    assert by_name["support 13"].place == 780.0
+    assert by_name["tension of the messenger wire"].place is None
+    # The DSA 380's upper dampers are 0, so no share of them can be found.
+    assert {name for name in by_name if name.startswith("dampings")} == {"dampings 3 of the pantograph"}
+    assert [value.kind for value in values.all] == sorted((v.kind for v in values.all), key=FREE.index)
+
+
+def test_names_count_along_the_whole_line(plan):
+    values = everything(replace(plan, first_span=40))
+    names = {value.name: value.index for value in values.all}
+    assert names["dropper 4 of span 52"] == (11 * 9 + 3,)
+    assert names["support 53"] == (12,)
+    assert "dropper 4 of span 12" not in names
+
+
+def test_only_those_within_the_stretch_are_freed(plan):
+    values = Values(plan, ("supports", "droppers"), (100.0, 200.0))
+    assert [value.name for value in values.all if value.kind == "supports"] == ["support 2", "support 3"]
+    places = [value.place for value in values.all if value.kind == "droppers"]
+    assert places == [place for place in plan.droppers if 100 < place < 200]
+    assert values.of_kind("supports") == [len(places), len(places) + 1]
+
+
+@pytest.mark.parametrize("free", [("dropper",), (), ("tensions", "Droppers")])
+def test_what_cannot_be_freed_is_refused(plan, free):
+    name = next((each for each in free if each not in FREE), "")
+    with pytest.raises(InputError, match=f"'{name}' cannot be freed: .*droppers"):
+        Values(plan, free, (0.0, 900.0))
+
+
+def test_tolerances(plan):
+    values = everything(plan, tolerances={"droppers": 0.01})
+    own = dict(zip((value.name for value in values.all), values.tolerances, strict=True))
+    assert own["dropper 1 of span 1"] == 0.01
+    assert own["support 1"] == TOLERANCES["supports"]
+    # Parts of a wave of a drawn phase: cosine and sine of it have half its power each.
+    assert own["sine of waves of 5 m"] == IRREGULARITY[1][1] / np.sqrt(2)
+    assert values.steps[values.of_kind("droppers")[0]] == STEPS["droppers"]
+
+
+def test_the_design_is_the_variant_of_zeros(plan):
+    values = everything(plan)
+    variant = values.variant(np.zeros(len(values)), 70.0)
+    assert variant.catenary == plan.catenary
+    assert variant.pantograph == plan.pantograph
+    assert variant.static_force == 70.0
+    assert variant.line.tensions == (1.0, 1.0)
+    assert not variant.line.scatter.any()
+    assert not variant.line.heights.any()
+    assert not variant.line.waves[:, 0].any()
+
+
+def test_a_variant_has_each_value_in_its_place(plan):
+    values = everything(plan)
+
+    def variant(name, difference):
+        return values.variant(at(values, name, difference), 70.0)
+
+    scatter = variant("dropper 4 of span 12", 3e-3).line.scatter
+    assert (np.flatnonzero(scatter).tolist(), scatter[102]) == ([102], 3e-3)
+    heights = variant("support 13", -2e-3).line.heights
+    assert (np.flatnonzero(heights).tolist(), heights[12]) == ([12], -2e-3)
+    assert variant("tension of the contact wire", 0.01).line.tensions == (1.01, 1.0)
+    assert variant("tension of the messenger wire", -0.02).line.tensions == (1.0, 0.98)
+    damping = variant("damping beta", 0.5).catenary.damping
+    assert (damping.alpha, damping.beta) == (plan.catenary.damping.alpha, 1.5 * plan.catenary.damping.beta)
+    masses = variant("masses 2 of the pantograph", 0.1).pantograph.masses
+    assert masses == pytest.approx((7.12, 6.6, 5.8))
+    assert variant("stiffnesses 1 of the pantograph", -0.1).pantograph.stiffnesses[0] == pytest.approx(8487)
+    for name in ("masses 2 of the pantograph", "damping beta"):
+        assert not variant(name, 0.1).line.scatter.any()
+
+
+def test_waves_have_their_cosine_and_sine_parts(plan):
+    """The wire's height is the sum of amplitude cos(2 pi (x / length + phase)), as ``Plant.start`` has it."""
+    values = everything(plan)
+    x = np.linspace(0, 30, 200)
+    differences = at(values, "cosine of waves of 5 m", 2e-4) + at(values, "sine of waves of 12 m", -3e-4)
+    waves = values.variant(differences, 70.0).line.waves
+    assert waves.shape == (len(IRREGULARITY), 3)
+    height = sum(a * np.cos(2 * np.pi * (x * turns + phase)) for a, turns, phase in waves)
+    expected = 2e-4 * np.cos(2 * np.pi * x / 5) - 3e-4 * np.sin(2 * np.pi * x / 12)
+    np.testing.assert_allclose(height, expected, atol=1e-12)
+
+
+def test_usual_values_leave_line_and_pantograph_as_they_are(plan):
+    """So one plant serves all variants."""
+    values = Values(plan, USUAL, (0.0, 900.0))
+    variant = values.variant(values.tolerances, 70.0)
+    assert variant.catenary is plan.catenary
+    assert variant.pantograph is plan.pantograph
