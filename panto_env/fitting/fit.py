@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..estimation.innovations import Whiteness, whiteness
+from ..estimation.innovations import Whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
@@ -89,9 +89,7 @@ class Fit:
     @cached_property
     def whiteness(self) -> list[Whiteness]:
         """Of what is left of each part, over its noise: whether it is as random as noise."""
-        noise = self.solution.state.noise
-        rows = zip(self.solution.left, noise, self.parts, strict=True)
-        return [whiteness((left / own[part.measured.band])[:, None]) for left, own, part in rows]
+        return self.solution.whiteness([part.measured.band for part in self.parts])
 
     @cached_property
     def left(self) -> list[tuple[float, float]]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array, Index
+from ..estimation.innovations import Whiteness, whiteness
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .measured import BANDS, Measured
 from .normal import noise_of, normal
@@ -31,8 +32,19 @@ STEPS = 40
 DONE = 0.05
 """Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
 moves by a fifth of its standard deviation."""
+PUSHES, PUSHED, PUSH_STEPS, LESS = 2, (0.5, 0.25), 5, 0.9
+"""How often values are pushed on, with which shares of the noise and steps with each; and what share of what
+was left must be left at most for that to go on."""
+HOPED = 0.5
+"""Least standard deviation of a coefficient (N) to which noise is held down: of a white noise of 2 N."""
+WHITE = 0.01
+"""Probability below which what is left is called unlike noise."""
 FRESH = 10.0
 """How many times that much a first step with new derivatives may bring for them to be good to the end."""
+WIDE = 1.0
+"""Standard deviations of the differences from which derivatives are taken, once it is known how uncertain
+values are. Droppers that go slack bend the course of the force; small differences only see the nearest bend.
+"""
 KEPT = 0.5
 """Share of the expected decrease that a step must bring for the derivatives to be kept for the next one."""
 SHORTER = (1.0, 0.5, 0.2, 0.05)
@@ -69,6 +81,20 @@ class Solution:
     left: tuple[Array, ...]  # of each part, (coefficients,): measured less simulated (N)
     settled: bool  # whether a further step would change little
 
+    @property
+    def size(self) -> float:
+        """Sum of squares of what is left (N^2)."""
+        return float(sum(np.sum(own**2) for own in self.left))
+
+    def whiteness(self, bands: Sequence[Index]) -> list[Whiteness]:
+        """Of what is left of each part, over its noise: whether it is as random as noise."""
+        rows = zip(self.left, self.state.noise, bands, strict=True)
+        return [whiteness((left / own[band])[:, None]) for left, own, band in rows]
+
+    def like_noise(self, bands: Sequence[Index]) -> bool:
+        """Whether what is left of each part is as random as noise."""
+        return all(white.probability >= WHITE for white in self.whiteness(bands))
+
 
 class Fitting:
     """The iteration over some parts of records."""
@@ -104,12 +130,40 @@ class Fitting:
 
         report: called after each step with the state and the expected decrease of a further one. working:
         called with the finished share of all derivatives while they are computed.
+
+        Where what is left is not like noise, values may have settled where only small steps lead to nothing
+        better. Then the noise is held down for some steps, which lets values move further, and found anew.
         """
+        best = self._settle(state, np.inf, report, working)
+        for _ in range(PUSHES):
+            if best.like_noise(self._bands):
+                break
+            level = float(np.median(best.state.noise))
+            pushed = best
+            for share in PUSHED:
+                pushed = self._settle(pushed.state, max(share * level, HOPED), report, working)
+            found = self._settle(pushed.state, np.inf, report, working)
+            if not found.size < LESS * best.size:
+                break
+            best = found
+        return best
+
+    def _settle(
+        self,
+        state: State,
+        most: float,
+        report: Callable[[State, float], None],
+        working: Callable[[float], None],
+    ) -> Solution:
+        """Iterate until a further step would change little, with a noise of up to ``most`` (N)."""
+        differences, begin = np.diag(self.values.steps), state.steps
+        steps = STEPS if most == np.inf else PUSH_STEPS
         while True:
-            state, blocks, left = self._derivatives(state, working)
+            state, blocks, left = self._derivatives(state, differences, working)
             first = None  # expected decrease by the first step with these derivatives
             while True:
                 noise = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
+                noise = np.minimum(noise, most)
                 precision, pull = normal(blocks, left, self._weights(noise), self.prior, state.x)
                 covariance = np.linalg.inv(precision)
                 step = covariance @ pull
@@ -117,26 +171,35 @@ class Fitting:
                 state = State(state.x, state.static_forces, noise, state.steps)
                 report(state, gain)
                 first = gain if first is None else first
-                if (gain < self._done and first < FRESH * self._done) or state.steps >= STEPS:
-                    return Solution(state, covariance, tuple(left), gain < self._done)
+                settled = gain < self._done and first < FRESH * self._done
+                if settled or state.steps >= begin + steps:
+                    return Solution(state, covariance, tuple(left), settled)
                 before = self._sum(left, noise, state.x)
                 state, left, after = self._step(state, step)
                 if gain < self._done or before - after < KEPT * gain:
+                    differences = self._uncertain(covariance)
                     break
 
+    def _uncertain(self, covariance: Array) -> Array:
+        """Differences, (values, values), a row each, along which values are uncertain, by as much."""
+        count, scale = len(self.values), self.values.tolerances
+        sizes, directions = np.linalg.eigh(covariance[:count, :count] / np.outer(scale, scale))
+        found: Array = WIDE * np.sqrt(np.maximum(sizes, 1e-12))[:, None] * directions.T * scale
+        return found
+
     def _derivatives(
-        self, state: State, working: Callable[[float], None]
+        self, state: State, differences: Array, working: Callable[[float], None]
     ) -> tuple[State, list[Array], list[Array]]:
         """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part."""
         blocks, left = [], []
         static, count = state.static_forces.copy(), len(self.values)
         now = state.x[:count]
-        changed = [now, *(now + each for each in np.diag(self.values.steps))]
+        changed = [now, *(now + each for each in differences)]
         for k, part in enumerate(self.parts):
             working(k / len(self.parts))
             variants = [self.values.variant(each, static[k]) for each in changed]
             force, *others = self._sampled(part, variants)
-            by_value = (np.array(others) - force) / self.values.steps[:, None]
+            by_value = np.linalg.solve(differences, np.array(others) - force)
             shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()

@@ -9,10 +9,9 @@ import numpy as np
 from ..base.table import Alarm, Table
 from ..terminal import number
 from .fit import INTERVAL, Fit, Found
+from .solve import WHITE
 from .values import FREE
 
-WHITE = 0.01
-"""Probability below which what is left over is called unlike noise."""
 NAMES = {
     "tensions": "tensions",
     "droppers": "lengths of droppers",

@@ -84,7 +84,8 @@ def judge(seed: int, passes: int, wrong: str) -> dict[str, Any]:
     true = draw(
         (LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), 9 * (SPANS + BEYOND), SPANS + BEYOND - 1
     )
-    assert true.scatter is not None and true.heights is not None
+    assert true.scatter is not None
+    assert true.heights is not None
     truths = {"tensions": np.array(true.tensions) - 1, "droppers": true.scatter, "supports": true.heights}
     rows: dict[str, Any] = {"seed": seed, "passes": passes, "wrong": wrong, "settled": found.solution.settled}
     rows["left"] = [left for _, left in found.left]
@@ -104,7 +105,7 @@ def write(folder: Path, seed: int, passes: int, wrong: str) -> None:
 def table(folder: Path) -> Iterator[str]:
     """Rows of a table in Markdown: coverage and errors by what is wrong and the number of passes."""
     results = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
-    yield "| model | passes | lines | tension: median error (%), in 95 % | dropper (mm) | support (mm) | no noise |"
+    yield "| model | passes | lines | tension (%), inside | dropper (mm) | support (mm) | unlike noise |"
     yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
     for wrong, passes in sorted({(each["wrong"], each["passes"]) for each in results}):
         own = [each for each in results if (each["wrong"], each["passes"]) == (wrong, passes)]
