@@ -72,7 +72,7 @@ def fit(
 ) -> None:
     """Find what of a line explains records of the contact force: tensions, droppers, supports.
 
-    Each value comes with its 95 % interval; what the records cannot tell is said, and stays as designed.
+    Each value comes with its 95 % interval; what the records cannot tell is said.
     Records of several speeds tell more than as many of one. A fit that is broken off goes on where it was, if
     it is given an --output or --values.
     """

@@ -18,9 +18,10 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     """Write the line with what was found, for ``panto simulate --catenary``, whole or not at all.
 
     base: the design, a name of the catalogue or a TOML file, whose text is kept. The table ``as_found`` holds
-    by how much droppers, supports and tensions differ; values that the records cannot tell stay as designed.
-    records: their names, for the sources. Raises InputError for a name with another suffix, for a design
-    whose values cannot be replaced, or where it cannot be written.
+    by how much droppers, supports and tensions differ: together the most likely values, also where the
+    records hardly tell one alone, which sources count. records: their names, for the sources. Raises
+    InputError for another suffix, for a design whose values cannot be replaced, or where it cannot
+    be written.
     """
     check_output(path, SUFFIXES)
     text = file_of(base).read_text(encoding="utf-8-sig")
@@ -56,7 +57,7 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
 
 
 def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """A line condition of what the records tell, and the source of each of its values."""
+    """A line condition of the most likely values, and the source of each of its keys."""
     design, before = fit.problem.fitting.values.design, fit.problem.first_span
     line = design.catenary
     known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
@@ -64,36 +65,42 @@ def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     spans = line.alignment(design.spans).span_of(design.droppers)
     cut = {(span, number): wrong for span, number, wrong in known.get("miscut_droppers", ())}
     raised = dict(known.get("raised_supports", ()))
-    told = {
-        kind: [each for each in fit.of_kind(kind) if each.told]
-        for kind in ("droppers", "supports", "tensions")
-    }
-    for each in told["droppers"]:
+    # All of them, also those that the records hardly tell: droppers were found together with these.
+    found = {kind: fit.of_kind(kind) for kind in ("droppers", "supports", "tensions")}
+    for each in found["droppers"]:
         k = each.value.index[0]
         place = int(spans[k]) + before, int(k - (spans < spans[k]).sum()) + 1
         cut[place] = cut.get(place, 0.0) + each.difference
-    for each in told["supports"]:
+    for each in found["supports"]:
         number = each.value.index[0] + 1 + before
         raised[number] = raised.get(number, 0.0) + each.difference
     values: dict[str, Any] = dict(known)
-    if told["droppers"]:
-        values["miscut_droppers"] = [[*place, round(wrong, 6)] for place, wrong in sorted(cut.items())]
-        sources["miscut_droppers"] = source(told["droppers"], records)
-    if told["supports"]:
-        values["raised_supports"] = [[number, round(wrong, 6)] for number, wrong in sorted(raised.items())]
-        sources["raised_supports"] = source(told["supports"], records)
-    for each in told["tensions"]:
+    if found["droppers"]:
+        values["miscut_droppers"] = [[*place, wrong] for place, wrong in _rounded(cut)]
+        sources["miscut_droppers"] = source(found["droppers"], records)
+    if found["supports"]:
+        values["raised_supports"] = [list(each) for each in _rounded(raised)]
+        sources["raised_supports"] = source(found["supports"], records)
+    for each in found["tensions"]:
         key = f"lost_{('contact', 'messenger')[each.value.index[0]]}_tension"
         values[key] = round(1 - (1 - known.get(key, 0.0)) * (1 + each.difference), 6)
         sources[key] = source([each], records)
     return values, sources
 
 
+def _rounded(differences: dict[Any, float]) -> list[tuple[Any, float]]:
+    """Differences (m) by place, in their order, to a micrometre; without those that are none."""
+    rounded = ((place, round(wrong, 6)) for place, wrong in sorted(differences.items()))
+    return [(place, wrong) for place, wrong in rounded if wrong]
+
+
 def source(found: list[Found], records: str) -> str:
     """Source of values that were fitted, with the size of their 95 % intervals."""
     sizes = sorted(INTERVAL * each.value.scale * each.deviation for each in found)
     size = f"{sizes[0]:.2g}" if len(sizes) == 1 else f"{sizes[0]:.2g} to {sizes[-1]:.2g}"
-    return f"fitted to {records}; 95 % intervals of ±{size} {found[0].value.unit}"
+    silent = sum(not each.told for each in found)
+    more = f"; {silent} of {len(found)} hardly told by the records" if silent else ""
+    return f"fitted to {records}; 95 % intervals of ±{size} {found[0].value.unit}{more}"
 
 
 def _write(path: str | Path, text: str) -> None:

@@ -27,6 +27,10 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
         _draw_values(axes, fit, fit.of_kind(kind))
+    plan, before = fit.problem.fitting.values.design, fit.before
+    for axes in (force, *others):
+        low, high = axes.get_xlim()
+        marks.mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
     (others[-1] if others else force).set_xlabel(marks.POSITION)
     return figure
 

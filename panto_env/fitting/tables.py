@@ -48,7 +48,8 @@ def summary_table(fit: Fit) -> Table:
 
 def values_table(fit: Fit, most: int = 20) -> Table:
     """The values that differ most surely from the design."""
-    found = sorted((each for each in fit.found if each.differs), key=lambda each: -_sure(each))[:most]
+    differing = [each for each in fit.found if each.differs and each.value.kind != "unevenness"]
+    found = sorted(differing, key=lambda each: -_sure(each))[:most]
     rows = [
         (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
     ]
@@ -116,10 +117,8 @@ def remarks(fit: Fit) -> list[str]:
         own = fit.of_kind(kind)
         silent = [each for each in own if not each.told]
         if silent:
-            some = "none of them" if len(silent) == len(own) else f"{len(silent)} of {len(own)} not"
-            found.append(
-                f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}: the records tell {some}; these stay as designed."
-            )
+            what, told = f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}", len(own) - len(silent)
+            found.append(f"{what}: the records tell {told or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
     unlike = [

@@ -123,7 +123,7 @@ def test_tables_and_picture(fitted):
     assert float(row[5]) > 99
     figure = plot_fit(fitted, "A fit")
     force, droppers, supports = figure.axes
-    assert len(force.lines) == 2
+    assert len(force.lines) == 2 + 5  # and five supports
     assert "dropper" in droppers.get_ylabel()
     assert "support" in supports.get_ylabel()
 
