@@ -28,7 +28,7 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     for axes, kind in zip(others, kinds, strict=True):
         _draw_values(axes, fit, fit.of_kind(kind))
     plan, before = fit.problem.fitting.values.design, fit.before
-    for axes in (force, *others):
+    for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
         marks.mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
     (others[-1] if others else force).set_xlabel(marks.POSITION)

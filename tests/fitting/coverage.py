@@ -104,7 +104,8 @@ def write(folder: Path, seed: int, passes: int, wrong: str) -> None:
 
 def table(folder: Path) -> Iterator[str]:
     """Rows of a table in Markdown: coverage and errors by what is wrong and the number of passes."""
-    results = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
+    paths = sorted(path for wrong in WRONG for path in folder.glob(f"{wrong}-*.json"))
+    results = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
     yield "| model | passes | lines | tension (%), inside | dropper (mm) | support (mm) | unlike noise |"
     yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
     for wrong, passes in sorted({(each["wrong"], each["passes"]) for each in results}):
