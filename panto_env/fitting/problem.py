@@ -31,6 +31,8 @@ BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
 EXACT = Numerics(precision="double")
 """Of simulated passes: derivatives by a micrometre need double precision."""
+ENOUGH = 2.0
+"""Coefficients of forces for each value from which on noise is known well enough. Own choice."""
 SEARCH, GRID = 0.5, 0.25
 """Spans on each side within which a record's place is searched, and the distance of the trials (m)."""
 
@@ -90,6 +92,12 @@ def problem(
     end = max(float(part.measured.place[-1]) for part in parts)
     design = Design(line, pantograph, condition, spans, droppers, supports, first_span)
     values = Values(design, free, (-1.0, end + BEYOND * alignment.mean_length), dict(tolerances or {}))
+    told = sum(len(part.measured.kept) for part in parts)
+    if told < ENOUGH * len(values):
+        notes.append(
+            f"The records have {told} coefficients for {len(values)} values, so noise is hardly known, and "
+            f"intervals may be too narrow; give more passes, or free less, for {ENOUGH:g} times as many."
+        )
     fitting = Fitting(parts, values)
     shifted = []
     for part, force in zip(parts, fitting.as_designed(), strict=True):

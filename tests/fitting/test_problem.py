@@ -57,6 +57,13 @@ def test_the_true_line_gives_the_force_of_a_record_without_noise(ready, truth, d
     assert (part.measured.force() - force_of(fitting, 0 * x)).std() > 10
 
 
+def test_too_few_coefficients_for_so_many_values_are_noted(ready, record, design, pantograph):
+    told = sum(len(part.measured.kept) for part in ready.fitting.parts)
+    assert told < 2 * len(ready.fitting.values)
+    assert f"{told} coefficients for {len(ready.fitting.values)} values" in ready.notes[-1]
+    assert problem([record], design, pantograph, free=("tensions",)).notes == ()
+
+
 def test_derivatives_of_all_droppers_add_up(ready, derivatives):
     """A smooth shift of all droppers, which a force hardly shows, is the sum of columns that nearly cancel.
 
