@@ -16,6 +16,8 @@ from panto_env.catalog.loader import text_of
 from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import write_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
+from panto_env.records.measured import measured
+from panto_env.records.record_file import write_record as write_measured
 
 DOCS = Path(__file__).parents[2] / "docs"
 TRAINING = """
@@ -157,6 +159,7 @@ def write_made_files(folder: Path) -> None:
         speed = 220.0 + 0.2 * k
         run = simulate("en50318-2002", "dsa250", speed, accuracy="fast", distance=1200.0)
         run.save(folder / "passes" / f"{k}.parquet")
+    write_measured(measured(run, position_error=0.3), folder / "measured.csv")
     shutil.copy(next(MODELS.glob("*.safetensors")), folder / "agent.safetensors")
     shutil.copy(DOCS / "benchmark" / "head.json", folder / "benchmark.json")
     run_benchmark(load_benchmark(folder / "small.toml"), workers=1).save(folder / "result.json")

@@ -41,6 +41,17 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
     ("validate",): (),
     ("identify",): ("rig.csv", "--measured", "k1T=32992,m2=5,k2=14544"),
     ("estimate",): ("motion.csv", "--pantograph", "own-two-mass"),
+    ("record",): ("measured.csv", "--line", "en50318-2002"),
+    ("compare",): ("measured.csv", "passes/4.parquet"),
+    ("fit",): (
+        "measured.csv",
+        "--line",
+        "en50318-2002",
+        "--pantograph",
+        "dsa250",
+        "--free",
+        "tensions",
+    ),
     ("diagnose",): (
         "passes/1.parquet",
         "--healthy",
